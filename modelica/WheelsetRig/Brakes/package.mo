@@ -1,0 +1,3 @@
+within WheelsetRig;
+package Brakes "Disc brakes: from cylinder pressure to friction"
+end Brakes;

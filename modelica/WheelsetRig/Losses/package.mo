@@ -1,0 +1,3 @@
+within WheelsetRig;
+package Losses "Bearing friction and windage"
+end Losses;

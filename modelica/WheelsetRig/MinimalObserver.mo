@@ -1,0 +1,63 @@
+within WheelsetRig;
+model MinimalObserver "Minimal observer model: wheelset and roller, two degrees of freedom"
+  parameter Units.Length rW(min=0.1) = 0.46 "Wheel radius";
+  parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
+  parameter Units.Length rB(min=0.1) = 0.30 "Radius at which the pads act";
+  parameter Units.Inertia JW = 110.0 "Inertia of the wheelset about its axle";
+  parameter Units.Inertia JR = 1500.0 "Inertia of the roller alone";
+  parameter Units.Force Fz(min=1000.0) = 80000.0 "Wheel load";
+  parameter Units.FrictionCoefficient muWR = 0.15 "Friction wheel-rail at zero slip velocity";
+  parameter Units.FrictionCoefficient muDC = 0.30 "Friction disc-pad";
+  parameter Units.AngularVelocity omega0(min=1e-6) = 0.05 "Speed below which pad friction is smoothed";
+  parameter Contact.PolachParameters polach "Law of the creep force";
+  final parameter Integer nDiscs = 3 "Brake discs on the axle";
+
+  input Units.Pressure pB "Brake cylinder pressure";
+  input Units.Torque tauR "Torque of the drive on the roller";
+  input Real dmuWR(unit="1") "Correction of muWR";
+  input Real dmuDC(unit="1") "Correction of muDC";
+  input Units.AngularAcceleration correctionW "Correction added to der(omegaW)";
+  input Units.AngularAcceleration correctionR "Correction added to der(omegaR)";
+
+  output Units.AngularVelocity omegaW(start=0.0, fixed=true, nominal=50.0) "Angular velocity of the wheelset";
+  output Units.AngularVelocity omegaR(start=0.0, fixed=true, nominal=50.0) "Angular velocity of the roller";
+  output Units.Force Fx "Longitudinal creep force of both wheels";
+  output Units.Velocity slip "Slip velocity";
+
+  replaceable Brakes.LinearActuation actuation(pB=pB)
+    constrainedby Brakes.PartialActuation "Brake actuation";
+  replaceable Brakes.ConstantPadFriction padFriction(
+    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW)
+    constrainedby Brakes.PartialPadFriction "Pad friction";
+  replaceable Contact.ConstantAdhesion adhesion(
+    level=muWR + dmuWR, w=slip, v=rR*omegaR, Fx=Fx/2.0)
+    constrainedby Contact.PartialAdhesion "Contact friction";
+  replaceable Losses.QuadraticLoss wheelsetLoss(c0=25.0, c1=0.6, c2=0.004, omega=omegaW)
+    constrainedby Losses.PartialLoss "Bearings and discs of the wheelset";
+  replaceable Losses.QuadraticLoss rollerLoss(c0=40.0, c1=1.0, c2=0.02, omega=omegaR)
+    constrainedby Losses.PartialLoss "Bearings and windage of the roller";
+
+protected
+  parameter Units.Force K = Contact.kalkerStiffness(Fz) "Creep force per creepage at zero slip";
+  Units.Torque tauB "Torque of the pads on the wheelset";
+equation
+  slip = rR*omegaR - rW*omegaW;
+  Fx = 2.0*Contact.creepForce(slip, rR*omegaR, Fz, K, adhesion.mu0, polach);
+  tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
+  JW*der(omegaW) = rW*Fx - tauB - wheelsetLoss.tau + JW*correctionW;
+  JR*der(omegaR) = tauR - rR*Fx - rollerLoss.tau + JR*correctionR;
+  annotation (
+    experiment(StopTime=40.0, Tolerance=1e-6),
+    Documentation(info="<html>
+<p>Wheelset and roller as two rotating bodies, coupled by the creep force of both wheels. This is
+the model of the disturbance observer; the friction corrections <code>dmuWR</code> and
+<code>dmuDC</code> and the corrections of the state derivatives are what an observer feeds back.
+<code>tauR</code> is the torque of an inertia-simulating drive, <code>JR</code> the roller's own
+inertia.</p>
+<h4>Slots</h4>
+<p>Actuation, pad friction, contact friction and losses are replaceable: a new physical effect is a
+<code>redeclare</code>.</p>
+<h4>References</h4>
+<p>C. Schwarz, J. Brembeck, B. Heckmann (2018), equations (1) to (3).</p>
+</html>"));
+end MinimalObserver;

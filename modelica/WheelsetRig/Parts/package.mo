@@ -1,0 +1,3 @@
+within WheelsetRig;
+package Parts "Bodies of the rig and where they are attached"
+end Parts;

@@ -1,0 +1,3 @@
+within WheelsetRig;
+package Tests "Claims: each model asserts what its name says"
+end Tests;

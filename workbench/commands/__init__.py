@@ -1,0 +1,6 @@
+"""The commands of the command line, one module each."""
+
+from workbench.commands.fmu import add_fmu
+from workbench.commands.simulate import add_simulate
+
+__all__ = ["add_fmu", "add_simulate"]

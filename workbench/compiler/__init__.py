@@ -1,0 +1,187 @@
+"""Modelica to FMU: flatten, make explicit, generate C, describe, compile and pack.
+
+This package needs the extra `[compiler]`; running FMUs does not.
+"""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import fmpy
+
+from workbench.compiler.archive import (
+    PLATFORMS,
+    RUNTIME,
+    compile_library,
+    digest,
+    digest_file,
+    library_sources,
+    pack,
+    write_sources,
+)
+from workbench.compiler.ccode import generate, identifier
+from workbench.compiler.description import describe
+from workbench.compiler.explicit import make_explicit
+from workbench.compiler.flat import flatten
+from workbench.errors import InputError
+
+__all__ = ["BuiltFMU", "build", "build_all", "differences", "source_hash"]
+
+# What `fmus/` holds: every model in both versions of FMI.
+MODELS = ("MinimalObserver",)
+FMI_VERSIONS = (2,)
+
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+
+@dataclass(frozen=True)
+class BuiltFMU:
+    """A built FMU and what made it."""
+
+    path: Path
+    model: str
+    fmi: int
+    token: str
+    sha256: str
+
+
+def source_hash(package: Path) -> str:
+    """SHA-256 over all Modelica files of the library and all files of the compiler."""
+    modelica = sorted(p for p in package.parent.rglob("*") if p.suffix in (".mo", ".order"))
+    compiler = sorted([*Path(__file__).parent.glob("*.py"), *RUNTIME.glob("*.[ch]")])
+    parts: list[str | bytes] = []
+    for root, files in ((package.parent, modelica), (Path(__file__).parent, compiler)):
+        for file in files:
+            parts += [file.relative_to(root).as_posix(), file.read_bytes()]
+    return digest(parts)
+
+
+def build(
+    package: Path,
+    model: str,
+    fmu: Path,
+    *,
+    fmi: int = 2,
+    platforms: Sequence[str] = tuple(PLATFORMS),
+) -> BuiltFMU:
+    """Compile a Modelica model to an FMU (Model Exchange and Co-Simulation).
+
+    Parameters
+    ----------
+    package : `package.mo` of the library.
+    model : dotted name of the model.
+    fmu : file to write; written whole or not at all.
+    fmi : 2 or 3.
+    platforms : names from `archive.PLATFORMS`.
+
+    Raises
+    ------
+    InputError
+        If the sources have errors or the model is not one this compiler treats.
+    """
+    if fmi not in (2, 3):
+        raise InputError(
+            where="fmi", found=str(fmi), expected="2 or 3", remedy="choose one of the two"
+        )
+    if unknown := [p for p in platforms if p not in PLATFORMS]:
+        raise InputError(
+            where="platforms",
+            found=", ".join(unknown),
+            expected=", ".join(PLATFORMS),
+            remedy="choose from the list",
+        )
+    state_space = make_explicit(flatten(package, model))
+    # The token must change with anything that changes the FMU's behaviour, and be in the code.
+    draft = generate(state_space, "")
+    runtime = [p.read_bytes() for p in sorted(RUNTIME.iterdir()) if p.suffix in (".c", ".h")]
+    digits = digest([draft.header, draft.source, *runtime, str(fmi)])
+    token = "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
+    code = generate(state_space, token)
+    tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / identifier(model)
+        sources = folder / "sources"
+        generated = {"model.c": code.source, "model_data.h": code.header}
+        write_sources(sources, fmi, generated, _HEADERS)
+        for name in platforms:
+            fmi2_name, fmi3_name, target, suffix = PLATFORMS[name]
+            binaries = folder / "binaries" / (fmi2_name if fmi == 2 else fmi3_name)
+            compile_library(sources, binaries / f"{identifier(model)}{suffix}", fmi, target)
+        files = library_sources(fmi)
+        (folder / "modelDescription.xml").write_text(
+            describe(state_space, code, token, fmi, tool, files)
+        )
+        if fmi == 3:
+            (sources / "buildDescription.xml").write_text(_build_description(model, files))
+        pack(folder, fmu)
+    return BuiltFMU(fmu, model, fmi, token, digest_file(fmu))
+
+
+def _build_description(model: str, files: Sequence[str]) -> str:
+    listed = "\n".join(f'      <SourceFile name="{name}"/>' for name in files)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
+        f'  <BuildConfiguration modelIdentifier="{identifier(model)}">\n'
+        f'    <SourceFileSet language="C99">\n{listed}\n    </SourceFileSet>\n'
+        "  </BuildConfiguration>\n</fmiBuildDescription>\n"
+    )
+
+
+def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
+    """Build every model of `MODELS` for FMI 2.0 and 3.0 into `folder`, and its manifest.
+
+    Files in `folder` change only when all of them have been built.
+    """
+    library = package.parent.name
+    with tempfile.TemporaryDirectory() as scratch:
+        built = [
+            build(package, f"{library}.{model}", Path(scratch) / f"fmi{fmi}" / f"{model}.fmu", fmi=fmi)
+            for fmi in FMI_VERSIONS
+            for model in MODELS
+        ]
+        manifest = {
+            "source_sha256": source_hash(package),
+            "compiler": {name: version(name) for name in ("rumoca", "casadi", "ziglang", "fmpy")},
+            "fmus": {
+                b.path.relative_to(scratch).as_posix(): {
+                    "model": b.model,
+                    "fmi": f"{b.fmi}.0",
+                    "token": b.token,
+                    "sha256": b.sha256,
+                }
+                for b in built
+            },
+        }
+        (Path(scratch) / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+        for file in sorted(p for p in Path(scratch).rglob("*") if p.is_file()):
+            target = folder / file.relative_to(scratch)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_suffix(target.suffix + ".part")
+            shutil.copyfile(file, part)
+            part.replace(target)
+    return [replace(b, path=folder / b.path.relative_to(scratch)) for b in built]
+
+
+def differences(package: Path, folder: Path) -> list[str]:
+    """Build everything anew and compare with what `folder` holds; returns what differs, in words."""
+    with tempfile.TemporaryDirectory() as scratch:
+        build_all(package, Path(scratch))
+        fresh = {p.relative_to(scratch): digest_file(p) for p in _files(Path(scratch))}
+        held = {p.relative_to(folder): digest_file(p) for p in _files(folder)}
+    return [
+        *(f"{folder / name} is missing" for name in sorted(fresh.keys() - held.keys())),
+        *(f"{folder / name} is not built from anything" for name in sorted(held.keys() - fresh.keys())),
+        *(
+            f"{folder / name} does not match its sources"
+            for name in sorted(fresh.keys() & held.keys())
+            if fresh[name] != held[name]
+        ),
+    ]
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.rglob("*") if p.is_file())

@@ -1,0 +1,210 @@
+"""An explicit state space to C, stage 3 of the compiler.
+
+The C is written for readers too: one static-free function per evaluation, straight-line code over
+named arrays, constants with all their digits. `runtime/model.h` documents the interface.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.compiler.explicit import StateSpace
+from workbench.errors import InputError
+
+_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+_COMPARE = {
+    ca.OP_LT: "<",
+    ca.OP_LE: "<=",
+    ca.OP_EQ: "==",
+    ca.OP_NE: "!=",
+    ca.OP_AND: "&&",
+    ca.OP_OR: "||",
+}
+_FUNCTIONS = {
+    ca.OP_EXP: "exp",
+    ca.OP_LOG: "log",
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_SQRT: "sqrt",
+    ca.OP_SIN: "sin",
+    ca.OP_COS: "cos",
+    ca.OP_TAN: "tan",
+    ca.OP_ASIN: "asin",
+    ca.OP_ACOS: "acos",
+    ca.OP_ATAN: "atan",
+    ca.OP_ATAN2: "atan2",
+    ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh",
+    ca.OP_FABS: "fabs",
+    ca.OP_FMIN: "fmin",
+    ca.OP_FMAX: "fmax",
+    ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil",
+}
+_FORMS = {
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_SQ: "{0}*{0}",
+    ca.OP_TWICE: "2*{0}",
+    ca.OP_INV: "1/{0}",
+    ca.OP_NOT: "!{0}",
+    ca.OP_SIGN: "({0} > 0) - ({0} < 0)",
+    ca.OP_IF_ELSE_ZERO: "{0} != 0 ? {1} : 0",
+}
+_ARGUMENTS = ("t", "x", "u", "p")
+
+
+@dataclass(frozen=True)
+class GeneratedCode:
+    """C sources of a model.
+
+    Attributes
+    ----------
+    header : text of model_data.h.
+    source : text of model.c.
+    jacobian_xu, jacobian_p : sparsity of d[f; w]/d[x; u] and d[f; w]/dp.
+    """
+
+    header: str
+    source: str
+    jacobian_xu: ca.Sparsity
+    jacobian_p: ca.Sparsity
+
+
+def generate(model: StateSpace, token: str) -> GeneratedCode:
+    """Write the C of `model`; `token` identifies the FMU (FMI's guid, instantiationToken)."""
+    rows = ca.vertcat(model.f, model.w)
+    jacobian_xu = ca.jacobian(rows, ca.vertcat(model.x, model.u))
+    jacobian_p = ca.jacobian(rows, model.p)
+    evaluations = {
+        "derivatives": ("xdot", model.f),
+        "algebraics": ("w", model.w),
+        "assertions": ("holds", model.assertions),
+        "jacobian_xu": ("nonzeros", _nonzeros(jacobian_xu)),
+        "jacobian_p": ("nonzeros", _nonzeros(jacobian_p)),
+    }
+    variables = [*model.states, *model.inputs, *model.parameters]
+    tables = [
+        _table("double", "model_start", [_number(v.start) for v in variables]),
+        _table("double", "model_nominal", [_number(v.nominal or 1.0) for v in model.states]),
+        _table("unsigned char", "model_tunable", [str(int(t)) for t in model.tunable]),
+        _table("char *const", "model_assertion_text", [_text(t) for t in model.assertion_texts]),
+    ]
+    for name, pattern in (("xu", jacobian_xu.sparsity()), ("p", jacobian_p.sparsity())):
+        tables += [
+            _table("int", f"model_jacobian_{name}_column", [str(c) for c in pattern.colind()]),
+            _table("int", f"model_jacobian_{name}_row", [str(r) for r in pattern.row()]),
+        ]
+    functions = [
+        _function(model, name, result, expression)
+        for name, (result, expression) in evaluations.items()
+    ]
+    sizes = {
+        "NX": model.x.numel(),
+        "NU": model.u.numel(),
+        "NP": model.p.numel(),
+        "NW": model.w.numel(),
+        "NA": model.assertions.numel(),
+        "NNZ_XU": jacobian_xu.nnz(),
+        "NNZ_P": jacobian_p.nnz(),
+    }
+    header = "\n".join(
+        [
+            f"/* Sizes of the model {model.name}. */",
+            f"#define MODEL_IDENTIFIER {_text(identifier(model.name))}",
+            f"#define MODEL_TOKEN {_text(token)}",
+            *(f"#define {name} {size}" for name, size in sizes.items()),
+            "",
+        ]
+    )
+    opening = f'/* Equations of the model {model.name}. */\n#include "model.h"\n#include <math.h>\n'
+    return GeneratedCode(
+        header=header,
+        source="\n".join([opening, *tables, "", *functions]),
+        jacobian_xu=jacobian_xu.sparsity(),
+        jacobian_p=jacobian_p.sparsity(),
+    )
+
+
+def identifier(model: str) -> str:
+    """FMI model identifier of a Modelica name: its last part."""
+    return model.rsplit(".", 1)[-1]
+
+
+def _nonzeros(matrix: ca.SX) -> ca.SX:
+    return ca.vertcat(*matrix.nonzeros())
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _text(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def _table(kind: str, name: str, entries: Sequence[str]) -> str:
+    # An empty array is no C; a dummy element is never read.
+    listed = ", ".join(entries) if entries else "0"
+    return f"const {kind} {name}[] = {{{listed}}};"
+
+
+def _function(model: StateSpace, name: str, result: str, expression: ca.SX) -> str:
+    """C text of one evaluation."""
+    (shared,) = ca.cse([ca.densify(expression)]) if expression.numel() else (expression,)
+    function = ca.Function(name, [model.t, model.x, model.u, model.p], [shared])
+    signature = (
+        f"int model_{name}(double t, const double *x, const double *u, const double *p, "
+        f"double *{result})"
+    )
+    body = list(_statements(model, function, result))
+    text = "\n".join(body)
+    work = [int(slot) for slot in re.findall(r"\ba\[(\d+)\]", text)]
+    declarations = [f"    double a[{max(work) + 1}];"] if work else []
+    names = (*_ARGUMENTS, result)
+    unused = [f"    (void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
+    return "\n".join([signature + " {", *declarations, *unused, *body, "    return 0;", "}", ""])
+
+
+def _statements(model: StateSpace, function: ca.Function, result: str) -> Iterator[str]:
+    """Assignments to work variables a[i] and results; constants and inputs stand in place."""
+    slots: dict[int, str] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        if operation == ca.OP_OUTPUT:
+            (source,) = function.instruction_input(k)
+            yield f"    {result}[{function.instruction_output(k)[1]}] = {slots[source]};"
+            continue
+        (slot,) = function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            constant = function.instruction_constant(k)
+            slots[slot] = _number(constant) if constant >= 0 else f"({_number(constant)})"
+        elif operation == ca.OP_INPUT:
+            argument, element = function.instruction_input(k)
+            name = _ARGUMENTS[argument]
+            slots[slot] = name if name == "t" else f"{name}[{element}]"
+        else:
+            operands = [slots[i] for i in function.instruction_input(k)]
+            yield f"    a[{slot}] = {_expression(model, operation, operands)};"
+            slots[slot] = f"a[{slot}]"
+
+
+def _expression(model: StateSpace, operation: int, operands: Sequence[str]) -> str:
+    if operation in _INFIX:
+        return f"{operands[0]} {_INFIX[operation]} {operands[1]}"
+    if operation in _COMPARE:
+        return f"{operands[0]} {_COMPARE[operation]} {operands[1]}"
+    if operation in _FUNCTIONS:
+        return f"{_FUNCTIONS[operation]}({', '.join(operands)})"
+    if operation in _FORMS:
+        return _FORMS[operation].format(*operands)
+    raise InputError(
+        where=f"model {model.name}",
+        found=f"an operation (CasADi number {operation}) that has no C form here",
+        expected="elementary functions of Modelica",
+        remedy="rewrite the expression",
+    )

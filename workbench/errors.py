@@ -1,0 +1,44 @@
+"""Errors that a user can mend."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from functools import partial
+from typing import Any
+
+
+class InputError(ValueError):
+    """A user's mistake: where it is, what was found, what was expected, what to do.
+
+    Parameters
+    ----------
+    where : file, and the line, column or key in it.
+    found, expected : noun phrases without a full stop.
+    remedy : what to do, an imperative without a full stop.
+    """
+
+    def __init__(self, *, where: str, found: str, expected: str, remedy: str) -> None:
+        super().__init__(f"{where}: found {found}; expected {expected}. To do: {remedy}.")
+        self.where = where
+        self.found = found
+        self.expected = expected
+        self.remedy = remedy
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Pickle would call the class with the message alone and hang a pool of processes.
+        parts = {key: getattr(self, key) for key in ("where", "found", "expected", "remedy")}
+        return partial(type(self), **parts), ()
+
+
+def closest(name: str, names: Iterable[str]) -> str:
+    """Say which of `names` was probably meant, or nothing.
+
+    Examples
+    --------
+    >>> closest("omega_w", ["time", "omegaW"])
+    " (closest: 'omegaW')"
+    >>> closest("torque", ["time", "omegaW"])
+    ''
+    """
+    folded = {other.casefold(): other for other in names}
+    matches = get_close_matches(name.casefold(), folded, n=1)
+    return f" (closest: '{folded[matches[0]]}')" if matches else ""

@@ -1,0 +1,89 @@
+"""Units of measured columns and of conditions: anything accepted becomes a factor to SI."""
+
+import math
+import re
+from functools import cache
+
+import pint
+
+from workbench.errors import InputError
+
+_EXAMPLES = {
+    "s": "s or ms",
+    "Pa": "Pa, kPa or bar",
+    "N.m": "N.m or kN.m",
+    "rad/s": "rad/s, deg/s, rpm or 1/min",
+    "N": "N or kN",
+    "m/s": "m/s or km/h",
+}
+
+# Angles have a dimension of their own here, so that Hz and 1/s are not taken for rad/s.
+_DEFINITIONS = f"""\
+micro- = 1e-6 = \u00b5- = \u03bc- = u-
+milli- = 1e-3 = m-
+hecto- = 1e2 = h-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+second = [time] = s
+minute = 60 * second = min
+hour = 3600 * second = h
+meter = [length] = m
+gram = [mass] = g
+newton = kilogram * meter / second ** 2 = N
+newton_meter = newton * meter = Nm
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+radian = [angle] = rad
+degree = {math.pi!r} / 180 * radian = deg = °
+revolution = {2 * math.pi!r} * radian = rev
+rpm = revolution / minute
+hertz = 1 / second = Hz
+"""
+_UNIT = re.compile(r"(1/)?[A-Za-z\u00b5\u03bc°]+([.·*/][A-Za-z\u00b5\u03bc°]+)*")
+_REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
+_QUANTITY = re.compile(
+    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?) *(?P<unit>[^0-9., ].*)"
+)
+
+
+def si_factor(unit: str, si: str, where: str) -> float:
+    """Return the factor from a unit to the SI unit `si` of the same dimension."""
+    rotation = si == "rad/s"
+    spelling = "rpm" if rotation and unit in _REVOLUTIONS_PER_MINUTE else unit
+    registry = _units()
+    remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
+    try:
+        parsed = registry.parse_units(spelling) if _UNIT.fullmatch(spelling) else None
+    except (pint.UndefinedUnitError, ValueError):  # ValueError: "nan", a number to pint
+        parsed = None
+    if parsed is None:
+        found = f"unknown unit [{unit}]"
+    elif parsed.is_compatible_with(si):
+        return float(registry.Quantity(1.0, parsed).to(si).magnitude)
+    elif rotation and parsed.is_compatible_with("Hz"):
+        found = f"[{unit}], which leaves open whether it counts revolutions or radians"
+    else:
+        found = f"[{unit}], a unit of another dimension"
+    raise InputError(
+        where=where, found=found, expected=f"a unit such as {_EXAMPLES[si]}", remedy=remedy
+    )
+
+
+@cache
+def _units() -> pint.UnitRegistry[float]:
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
+    registry.load_definitions(_DEFINITIONS.splitlines())
+    return registry
+
+
+def quantity(text: str, si: str, where: str) -> float:
+    """Read a quantity such as '4.2 bar' in the SI unit `si`."""
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"a number with a decimal point and a unit, {_EXAMPLES[si]}",
+            remedy="write for instance '4.2 bar' or '160 km/h'",
+        )
+    return float(match["number"]) * si_factor(match["unit"], si, where)
