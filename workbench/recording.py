@@ -45,9 +45,10 @@ def read_text(path: Path, remedy: str) -> str:
     try:
         raw = path.read_bytes()
     except OSError as error:
+        missing = isinstance(error, FileNotFoundError)
         raise InputError(
             where=str(path),
-            found=(error.strerror or type(error).__name__).lower(),
+            found="no such file" if missing else f"a file that cannot be read ({error.strerror})",
             expected="a readable file",
             remedy=remedy,
         ) from None

@@ -88,6 +88,7 @@ def _simulate(options: argparse.Namespace) -> int:
                 "L": gains.L.tolist(),
                 "T_WR": gains.T_WR,
                 "T_DC": gains.T_DC,
+                "effect": gains.effect.tolist(),
                 "source": "stationary Kalman gain of the linearised model",
             },
         }

@@ -485,7 +485,7 @@ class _Reader:
         )
 
     def _refuse_events(self) -> None:
-        asserted = {self._relation(a["guard"]) for a in self.storage["event_actions"]}
+        asserted = {r for a in self.storage["event_actions"] for r in self._relations(a["guard"])}
         for root in [*self.storage["roots"], *self.storage["structured_roots"]]:
             body = root.get("root", root)
             if "relation" not in body or body["relation"] not in asserted:
@@ -501,11 +501,16 @@ class _Reader:
             if self.storage[kind]:
                 raise self._refuse(f"{kind.replace('_', ' ')} in the model")
 
-    def _relation(self, condition: int) -> int | None:
+    def _relations(self, condition: int) -> Iterator[int]:
+        """The relations that a condition is made of."""
         node = self.storage["conditions"][condition]["node"]
-        while isinstance(node, dict) and "not" in node:
-            node = self.storage["conditions"][node["not"]]["node"]
-        return node["relation"] if isinstance(node, dict) and "relation" in node else None
+        if not isinstance(node, dict):
+            return
+        ((kind, body),) = node.items()
+        if kind == "relation":
+            yield body
+        for part in [body] if kind == "not" else body.values() if kind in ("and", "or") else []:
+            yield from self._relations(part)
 
     def _bind_parameters(self, entries: Sequence[Mapping[str, Any]]) -> tuple[list[int], list[Any]]:
         """Split into free parameters and (symbols, expression) pairs of bound ones."""
@@ -614,6 +619,9 @@ class _Reader:
                 return self.value(relation.get("relation", relation)["expression"])[()]
             case "not":
                 return ca.logic_not(self._condition(body))
+            case "and" | "or":
+                lhs, rhs = self._condition(body["lhs"]), self._condition(body["rhs"])
+                return _BINARY[kind](lhs, rhs)
             case "expression":
                 return self.value(body)[()]
         raise self._refuse(f"a condition of kind '{kind}'")

@@ -62,10 +62,9 @@ def draw_case(result: CaseResult, roller_radius: float, path: Path) -> None:
                 score = result.scores[name].Fx_nrmse
                 label = name if score is None else f"{name} ({100 * score:.2f} %)"
                 residual.plot(case.time, error / 1e3, color=colour, label=label)
-            for signal, line in (("muWR", "-"), ("muDC", "--")):
+            for signal, shade in (("muWR", "#009E73"), ("muDC", "#CC79A7")):
                 if name == "disturbance_observer":
-                    values = run.signal(signal)
-                    friction.plot(case.time, values, line, color=colour, label=signal)
+                    friction.plot(case.time, run.signal(signal), color=shade, label=signal)
         if case.Fx is not None:
             # Open loop may be off by the whole force: the axis serves the estimators that follow.
             scale = 0.15 * float(abs(low_pass(case.time, case.Fx)).max()) / 1e3
@@ -80,7 +79,7 @@ def draw_case(result: CaseResult, roller_radius: float, path: Path) -> None:
         residual.set_ylabel("Fx error [kN]")
         residual.axhline(0.0, color="black", linewidth=0.5)
         friction.set_ylabel("friction [1]")
-        friction.set_ylim(0.0, 0.5)
+        friction.set_ylim(0.0, 0.6)
         friction.legend(loc="upper right", ncols=2)
         friction.set_xlabel("time [s]")
         figure.align_ylabels()
