@@ -306,23 +306,23 @@ def _read_signals(source: Path, columns: dict[str, str]) -> dict[str, Vector]:
             where = f"{source}, line 1, column '{column}'"
             factor = si_factor(recorded[column].unit, _SIGNALS[signal], where)
             signals[signal] = _read_only(recorded[column].values * factor)
-    _check_time(signals["time"], f"{source}, column '{columns['time']}'")
+    _check_time(signals["time"], source, columns["time"])
     return signals
 
 
-def _check_time(time: Vector, where: str) -> None:
+def _check_time(time: Vector, source: Path, column: str) -> None:
     steps = np.diff(time)
     if not (steps > 0).all():
         late = int(np.argmin(steps > 0)) + 1
         raise InputError(
-            where=f"{where}, line {late + 2}",
+            where=f"{source}, line {late + 2}, column '{column}'",
             found=f"{time[late]:.9g} s after {time[late - 1]:.9g} s",
             expected="strictly increasing time",
             remedy="export with more digits, or remove the repeated or misplaced samples",
         )
     if time.size < _MIN_SAMPLES or time[-1] - time[0] < _MIN_DURATION:
         raise InputError(
-            where=where,
+            where=f"{source}, column '{column}'",
             found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
             expected=f"at least {_MIN_SAMPLES} samples, which tell signal from noise, over "
             f"{_MIN_DURATION:g} s, in which a brake stop has begun",

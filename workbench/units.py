@@ -47,9 +47,27 @@ _QUANTITY = re.compile(
 
 
 def si_factor(unit: str, si: str, where: str) -> float:
-    """Return the factor from a unit to the SI unit `si` of the same dimension."""
-    rotation = si == "rad/s"
-    spelling = "rpm" if rotation and unit in _REVOLUTIONS_PER_MINUTE else unit
+    """Return the factor from a unit to the SI unit of its dimension.
+
+    Per minute means revolutions where `si` is rad/s; Hz and 1/s are refused there.
+
+    Parameters
+    ----------
+    unit : as a file spells it; case matters.
+    si : one of s, Pa, N.m, rad/s, N, m/s.
+    where : place for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown, of another dimension, or ambiguous.
+
+    Examples
+    --------
+    >>> si_factor("kPa", "Pa", "measured.csv")
+    1000.0
+    """
+    spelling = "rpm" if unit in _REVOLUTIONS_PER_MINUTE else unit
     registry = _units()
     remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
     try:
@@ -60,7 +78,7 @@ def si_factor(unit: str, si: str, where: str) -> float:
         found = f"unknown unit [{unit}]"
     elif parsed.is_compatible_with(si):
         return float(registry.Quantity(1.0, parsed).to(si).magnitude)
-    elif rotation and parsed.is_compatible_with("Hz"):
+    elif si == "rad/s" and parsed.is_compatible_with("Hz"):
         found = f"[{unit}], which leaves open whether it counts revolutions or radians"
     else:
         found = f"[{unit}], a unit of another dimension"
@@ -77,7 +95,13 @@ def _units() -> pint.UnitRegistry[float]:
 
 
 def quantity(text: str, si: str, where: str) -> float:
-    """Read a quantity such as '4.2 bar' in the SI unit `si`."""
+    """Read a quantity such as '4.2 bar' in the SI unit `si`; see `si_factor`.
+
+    Examples
+    --------
+    >>> quantity("4.2 bar", "Pa", "case.toml")
+    420000.0
+    """
     match = _QUANTITY.fullmatch(text)
     if match is None:
         raise InputError(

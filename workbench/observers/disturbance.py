@@ -49,11 +49,11 @@ class OperatingPoint:
     Attributes
     ----------
     speed : rolling velocity [m/s], half of 160 km/h.
-    pressure : brake cylinder pressure [Pa], below that of any service braking.
+    pressure : brake cylinder pressure [Pa], that of a light service braking.
     """
 
     speed: float = 22.0
-    pressure: float = 1.0e5
+    pressure: float = 1.5e5
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class NoiseLevels:
         taken at 160 km/h.
     sample_time : of the recording [s].
     model : unmodelled acceleration of wheelset and roller, random walk [rad/s / sqrt(s)].
-    muWR, muDC : random walk of the frictions [1/sqrt(s)]: a drying disc gains 0.1 within a second,
-        the rail changes half as fast.
+    muWR, muDC : random walk of the frictions [1/sqrt(s)]: a drying disc or a patch of rail changes
+        them by 0.05 within a second.
     decay : rate at which a friction deviation is forgotten [1/s]; 50 s outlast a stop.
     """
 
@@ -76,7 +76,7 @@ class NoiseLevels:
     sample_time: float = 0.005
     model: float = 0.01
     muWR: float = 0.05
-    muDC: float = 0.1
+    muDC: float = 0.05
     decay: float = -0.02
 
 
@@ -104,11 +104,14 @@ def stationary_gains(
     extended[:2, 2:] = fmu.input_jacobian(corrections)[order]
     extended[2, 2] = extended[3, 3] = noise.decay
     measured = np.eye(2, 4)
-    process = np.diag([noise.model, noise.model, noise.muWR, noise.muDC]) ** 2
+    process = np.array([noise.model, noise.model, noise.muWR, noise.muDC])
     # White noise of a continuous signal that, sampled, has the given variance.
-    measurement = np.diag([noise.omegaW, noise.omegaR]) ** 2 * noise.sample_time
-    covariance = solve_continuous_are(extended.T, measured.T, process, measurement)
-    gain = covariance @ measured.T @ np.linalg.inv(measurement)
+    measurement = np.array([noise.omegaW, noise.omegaR]) * np.sqrt(noise.sample_time)
+    # In units of the noise, both noise matrices are the identity and the equation is well scaled.
+    A = extended * process / process[:, None]
+    C = measured * process / measurement[:, None]
+    covariance = solve_continuous_are(A.T, C.T, np.eye(4), np.eye(2))
+    gain = process[:, None] * (covariance @ C.T) / measurement
     return DisturbanceGains(
         L=np.hstack([gain, np.zeros((4, 2))]),
         T_WR=noise.decay,
