@@ -5,13 +5,13 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from workbench.commands import add_fmu, add_simulate
+from workbench.commands import add_fmu, add_observability, add_simulate
 from workbench.errors import InputError
 from workbench.fmu import FMUError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0 done, 1 failed, 2 wrong input, 130 Ctrl-C."""
+    """Run the command line; returns 0 done, 1 failed, 2 wrong input, 130 interrupted."""
     options = _parser().parse_args(arguments)
     try:
         return int(options.run(options))
@@ -34,6 +34,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_simulate(commands)
+    add_observability(commands)
     add_fmu(commands)
     return parser
 

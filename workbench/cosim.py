@@ -47,7 +47,7 @@ class Run:
 
 
 def observe(case: Case, estimator: Estimator) -> Run:
-    """Feed a recording to an estimator, sample by sample. A failure is a value, not an exception."""
+    """Feed a recording to an estimator, sample by sample; a failure is a value of the run."""
     begin = time.perf_counter()
     estimate = np.full((case.time.size, len(ESTIMATE)), np.nan)
     outcome, message = Outcome.OK, ""

@@ -1,4 +1,4 @@
-"""An FMU under an observer's control, stage 2: the only file that knows FMPy.
+"""An FMU under an observer's control, stage 2: with `description` the only files that know FMPy.
 
 The extended-FMI pattern of Brembeck et al. (2014): set and read continuous states, evaluate
 derivatives, linearise, step, save and roll back. Standard Model Exchange offers all of it except
@@ -7,49 +7,48 @@ constants from milliseconds at speed to microseconds at standstill.
 """
 
 import ctypes
-import hashlib
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import fmpy
 import numpy as np
 from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
+from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
 from workbench.errors import InputError
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 _FUNCTIONS = {
-    "2.0": {
-        "time": "fmi2SetTime",
-        "set_states": "fmi2SetContinuousStates",
-        "get_states": "fmi2GetContinuousStates",
-        "derivatives": "fmi2GetDerivatives",
-        "set": "fmi2SetReal",
-        "get": "fmi2GetReal",
-        "directional": "fmi2GetDirectionalDerivative",
-        "save": "fmi2GetFMUstate",
-        "restore": "fmi2SetFMUstate",
-        "release": "fmi2FreeFMUstate",
-    },
-    "3.0": {
-        "time": "fmi3SetTime",
-        "set_states": "fmi3SetContinuousStates",
-        "get_states": "fmi3GetContinuousStates",
-        "derivatives": "fmi3GetContinuousStateDerivatives",
-        "set": "fmi3SetFloat64",
-        "get": "fmi3GetFloat64",
-        "directional": "fmi3GetDirectionalDerivative",
-        "save": "fmi3GetFMUState",
-        "restore": "fmi3SetFMUState",
-        "release": "fmi3FreeFMUState",
-    },
+    "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
+    "set_states": {"2.0": "fmi2SetContinuousStates", "3.0": "fmi3SetContinuousStates"},
+    "get_states": {"2.0": "fmi2GetContinuousStates", "3.0": "fmi3GetContinuousStates"},
+    "derivatives": {"2.0": "fmi2GetDerivatives", "3.0": "fmi3GetContinuousStateDerivatives"},
+    "set": {"2.0": "fmi2SetReal", "3.0": "fmi3SetFloat64"},
+    "get": {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"},
+    "directional": {"2.0": "fmi2GetDirectionalDerivative", "3.0": "fmi3GetDirectionalDerivative"},
+    "do_step": {"2.0": "fmi2DoStep", "3.0": "fmi3DoStep"},
+    "save": {"2.0": "fmi2GetFMUstate", "3.0": "fmi3GetFMUState"},
+    "restore": {"2.0": "fmi2SetFMUstate", "3.0": "fmi3SetFMUState"},
+    "release": {"2.0": "fmi2FreeFMUstate", "3.0": "fmi3FreeFMUState"},
+    "size": {"2.0": "fmi2SerializedFMUstateSize", "3.0": "fmi3SerializedFMUStateSize"},
+    "serialise": {"2.0": "fmi2SerializeFMUstate", "3.0": "fmi3SerializeFMUState"},
+    "deserialise": {"2.0": "fmi2DeSerializeFMUstate", "3.0": "fmi3DeserializeFMUState"},
+}
+
+_CLASSES = {
+    (MODEL_EXCHANGE, "2.0"): fmi2.FMU2Model,
+    (MODEL_EXCHANGE, "3.0"): fmi3.FMU3Model,
+    (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
+    (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
 }
 
 
@@ -71,7 +70,7 @@ class Variables:
 
 @dataclass(frozen=True)
 class Linearisation:
-    """dx/dt ~ A dx + B du, dy ~ C dx + D du about a point; shapes (n, n), (n, m), (l, n), (l, m)."""
+    """dx/dt ~ A dx + B du, dy ~ C dx + D du; shapes (n, n), (n, m), (l, n), (l, m)."""
 
     A: Matrix
     B: Matrix
@@ -101,79 +100,73 @@ class FMU:
         If the FMU refuses to be instantiated.
     """
 
+    interface = MODEL_EXCHANGE
+
     def __init__(self, path: Path) -> None:
         self.path = path
-        description = _read(path)
-        self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-        self.version: str = description.fmiVersion
-        self.name: str = description.modelName
-        by_causality = {
-            kind: tuple(v.name for v in description.modelVariables if v.causality == kind)
-            for kind in ("input", "output", "parameter")
-        }
-        self.inputs, self.outputs = by_causality["input"], by_causality["output"]
-        self.parameters = by_causality["parameter"]
-        self.units = {v.name: v.unit for v in description.modelVariables if v.unit}
-        self._references = {v.name: v.valueReference for v in description.modelVariables}
-        rates = [
-            v
-            for v in description.modelVariables
-            if v.derivative is not None and _is_state_derivative(v, description)
-        ]
-        self.states = tuple(v.derivative.name for v in rates)
-        self._rates = np.array([v.valueReference for v in rates], np.uint32)
+        self.description = read_description(path)
+        offered = self.description.require(self.interface)
+        self.sha256 = self.description.sha256
+        self.version = self.description.version
+        self.name = self.description.name
+        self.states = self.description.states
+        self.inputs = self.description.names("input")
+        self.outputs = self.description.names("output")
+        self.parameters = self.description.names("parameter")
+        self.units = {v.name: v.unit for v in self.description.variables if v.unit}
         self.defaults = {
             v.name: float(v.start)
-            for v in description.modelVariables
-            if v.start is not None and v.type in ("Real", "Float64")
+            for v in self.description.variables
+            if v.real and v.start is not None
         }
-        exchange = description.modelExchange
-        self.has_directional_derivatives = bool(exchange.providesDirectionalDerivative)
-        self.has_fmu_state = bool(exchange.canGetAndSetFMUstate)
-        self._log: list[str] = []
-        self._folder = tempfile.mkdtemp(prefix="fmu-")
-        fmpy.extract(str(path), self._folder)
-        self._instance = self._instantiate(description)
-        self._component = ctypes.c_void_p(_address(self._instance.component))
-        dll = self._instance.dll
-        # A fresh pointer per function: FMPy's own carry argument types that cost conversions.
-        self._call = {use: dll[name] for use, name in _FUNCTIONS[self.version].items()}
-        self._call["time"].argtypes = [ctypes.c_void_p, ctypes.c_double]
+        self._references = {v.name: v.reference for v in self.description.variables}
+        self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
+        self.has_directional_derivatives = offered.directional_derivatives
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._state_variables = self.variables(self.states)
-        self._initialised = False
+        self._log: list[str] = []
+        self._folder = tempfile.mkdtemp(prefix="fmu-")
+        fmpy.extract(str(path), self._folder)
+        self._load(offered.identifier)
 
-    def _instantiate(self, description: "fmpy.model_description.ModelDescription") -> "fmpy.fmi1._FMU":
-        arguments = {
-            "guid": description.guid,
-            "unzipDirectory": self._folder,
-            "modelIdentifier": description.modelExchange.modelIdentifier,
-            "instanceName": description.modelExchange.modelIdentifier,
-        }
+    def _load(self, identifier: str) -> None:
+        """Load the library and make an instance."""
+        self._instance = _CLASSES[self.interface, self.version](
+            guid=self.description.token,
+            unzipDirectory=self._folder,
+            modelIdentifier=identifier,
+            instanceName=identifier,
+        )
+        dll = self._instance.dll
+        # A fresh pointer per function: FMPy's own carry argument types that cost conversions.
+        names = {use: function[self.version] for use, function in _FUNCTIONS.items()}
+        self._call = {use: dll[name] for use, name in names.items() if hasattr(dll, name)}
+        if "time" in self._call:
+            self._call["time"].argtypes = [ctypes.c_void_p, ctypes.c_double]
+        self._instantiate()
+
+    def _instantiate(self) -> None:
         log = self._log
 
-        def log3(environment: object, status: int, category: bytes, message: bytes) -> None:
-            log.append((message or b"").decode(errors="replace"))
+        def note(*arguments: bytes | None) -> None:
+            log.append((arguments[-1] or b"").decode(errors="replace"))
 
-        def log2(
-            environment: object, instance: bytes, status: int, category: bytes, message: bytes
-        ) -> None:
-            log.append((message or b"").decode(errors="replace"))
+        try:
+            if self.version == "3.0":
+                self._instance.instantiate(logMessage=note)
+            else:
+                callbacks = fmi2.fmi2CallbackFunctions()
+                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
+                callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+                callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+                self._instance.instantiate(callbacks=callbacks)
+        except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
+            raise FMUError(f"{self.path.name}: {error}: {self._logged()}") from None
+        self._component = ctypes.c_void_p(self._instance.component)
+        self._used = False
 
-        if self.version == "3.0":
-            instance = fmi3.FMU3Model(**arguments)
-            instance.instantiate(logMessage=log3)
-            return instance
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log2)
-        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
-        instance = fmi2.FMU2Model(**arguments)
-        instance.instantiate(callbacks=callbacks)
-        return instance
-
-    def __enter__(self) -> "FMU":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -188,6 +181,16 @@ class FMU:
         """Free the instance and the unpacked files."""
         self._instance.freeInstance()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+    def renew(self, *, reload: bool) -> None:
+        """Free the instance and make a new one; with `reload` of a library loaded anew."""
+        if reload:
+            self._instance.freeInstance()
+            self._load(self._instance.modelIdentifier)
+            return
+        free = "fmi3FreeInstance" if self.version == "3.0" else "fmi2FreeInstance"
+        getattr(self._instance, free)(self._instance.component)
+        self._instantiate()
 
     # --- variables ---
 
@@ -237,11 +240,16 @@ class FMU:
     def _checked(self, use: str, *arguments: object) -> None:
         status = self._call[use](self._component, *arguments)
         if status > 1:
-            names = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
-            logged = "; ".join(self._log[-3:]) or "the FMU logged nothing"
-            self._log.clear()
-            function = _FUNCTIONS[self.version][use]
-            raise FMUError(f"{self.path.name}: {function} returned {names.get(status)}: {logged}")
+            raise self._refusal(_FUNCTIONS[use][self.version], status)
+
+    def _refusal(self, function: str, status: int) -> FMUError:
+        name = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}.get(status, status)
+        return FMUError(f"{self.path.name}: {function} returned {name}: {self._logged()}")
+
+    def _logged(self) -> str:
+        text = "; ".join(self._log[-3:]) or "the FMU logged nothing"
+        self._log.clear()
+        return text
 
     # --- the extended-FMI pattern ---
 
@@ -255,23 +263,28 @@ class FMU:
         states : start values of states, in the FMU's units; others keep their defaults.
         parameters : values of parameters; others keep their defaults.
         """
-        instance = self._instance
-        if self._initialised:
-            instance.reset()
         given = {**(parameters or {}), **states}
         variables = self.variables(list(given))
-        if self.version == "3.0":
+        try:
+            if self._used:
+                self._instance.reset()
+            self._used = True
+            if self.version == "2.0":
+                self._instance.setupExperiment()
             self.set(variables, np.array(list(given.values())))
-            instance.enterInitializationMode()
-            instance.exitInitializationMode()
+            self._instance.enterInitializationMode()
+            self._instance.exitInitializationMode()
+            self._begin()
+        except FMICallException as error:
+            raise self._refusal(error.function, error.status) from None
+
+    def _begin(self) -> None:
+        """Go from initialisation to the mode in which states are set and read."""
+        if self.version == "2.0":
+            self._instance.newDiscreteStates()
         else:
-            instance.setupExperiment()
-            self.set(variables, np.array(list(given.values())))
-            instance.enterInitializationMode()
-            instance.exitInitializationMode()
-            instance.newDiscreteStates()
-        instance.enterContinuousTimeMode()
-        self._initialised = True
+            self._instance.updateDiscreteStates()
+        self._instance.enterContinuousTimeMode()
 
     def set_time(self, t: float) -> None:
         """Set the time [s]."""
@@ -307,16 +320,12 @@ class FMU:
         if not self.has_directional_derivatives:
             return self._difference(unknowns, knowns)
         seed = np.ones(1)
-        tail: tuple[object, ...] = ()
         for j in range(columns):
             known = ctypes.c_void_p(knowns.references[j:].ctypes.data)
             unknown = ctypes.c_void_p(unknowns.ctypes.data)
             size, one = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
             seeds, out = ctypes.c_void_p(seed.ctypes.data), ctypes.c_void_p(result[j].ctypes.data)
-            if self.version == "3.0":
-                tail = (seeds, one, out, size)
-            else:
-                tail = (seeds, out)
+            tail = (seeds, one, out, size) if self.version == "3.0" else (seeds, out)
             self._checked("directional", unknown, size, known, one, *tail)
         return result.T
 
@@ -366,8 +375,8 @@ class FMU:
     def step(self, h: float) -> Vector:
         """Advance the states by h [s] with inputs as they are; returns the new states, (n,).
 
-        Linearly implicit Euler, x + (I - h A)^-1 h f(x): L-stable, no iteration, and its result lies
-        on the linearised slow manifold, so that a stiff slip mode does not disturb the force.
+        Linearly implicit Euler, x + (I - h A)^-1 h f(x): L-stable, no iteration, and its result
+        lies on the linearised slow manifold, so that a stiff slip mode does not disturb the force.
         Source: Hairer and Wanner (1996), Solving Ordinary Differential Equations II, IV.7.
         """
         x = self.get_states()
@@ -390,55 +399,48 @@ class FMU:
         """Free a saved state."""
         self._checked("release", ctypes.byref(saved))
 
+    def serialise(self, saved: ctypes.c_void_p) -> bytes:
+        """Turn a saved state into bytes, which outlive the instance."""
+        size = ctypes.c_size_t()
+        self._checked("size", saved, ctypes.byref(size))
+        buffer = ctypes.create_string_buffer(size.value)
+        self._checked("serialise", saved, buffer, size)
+        return buffer.raw
 
-def _read(path: Path) -> "fmpy.model_description.ModelDescription":
-    """Read and check the model description."""
-    if not path.is_file():
-        raise InputError(
-            where=str(path),
-            found="no such file",
-            expected="an FMU",
-            remedy="build the FMUs with 'make fmus' or give the path of one with --fmu",
+    def deserialise(self, data: bytes) -> ctypes.c_void_p:
+        """Turn bytes from any instance of this FMU back into a saved state."""
+        saved = ctypes.c_void_p()
+        self._checked("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
+        return saved
+
+
+class CoSimulation(FMU):
+    """One instance of a Co-Simulation FMU, which brings its own integrator.
+
+    Everything that works on states needs an FMU that offers it in Co-Simulation too, which the
+    standard does not ask for; values, steps and saved states are standard.
+    """
+
+    interface = CO_SIMULATION
+
+    def _begin(self) -> None:
+        self._t = 0.0
+
+    def set_time(self, t: float) -> None:
+        """Say where the next step begins [s], after `restore`."""
+        self._t = t
+
+    def step(self, h: float) -> Vector:
+        """Advance by h [s] with inputs held; returns the new states, (n,)."""
+        tail: tuple[object, ...] = ()
+        if self.version == "3.0":
+            tail = (
+                *(ctypes.byref(ctypes.c_bool()) for _ in range(3)),
+                ctypes.byref(ctypes.c_double()),
+            )
+        # The zero: the state may be rolled back to before this point.
+        self._checked(
+            "do_step", ctypes.c_double(self._t), ctypes.c_double(h), ctypes.c_int(0), *tail
         )
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
-        raise InputError(
-            where=str(path),
-            found=f"a file that is no FMU ({error})",
-            expected="an FMU of FMI 2.0 or 3.0",
-            remedy="export the model again",
-        ) from None
-    if description.fmiVersion not in _FUNCTIONS or description.modelExchange is None:
-        kinds = "Co-Simulation only" if description.modelExchange is None else "Model Exchange"
-        raise InputError(
-            where=str(path),
-            found=f"FMI {description.fmiVersion}, {kinds}",
-            expected="Model Exchange of FMI 2.0 or 3.0, whose states an observer can set",
-            remedy="export the model for Model Exchange",
-        )
-    if fmpy.platform_tuple not in fmpy.supported_platforms(str(path)) and (
-        fmpy.platform not in fmpy.supported_platforms(str(path))
-    ):
-        raise InputError(
-            where=str(path),
-            found=f"binaries for {', '.join(fmpy.supported_platforms(str(path))) or 'no platform'}",
-            expected=f"a binary for this machine ({fmpy.platform_tuple})",
-            remedy="compile the FMU's sources, for instance with 'fmpy compile'",
-        )
-    return description
-
-
-def _is_state_derivative(
-    variable: "fmpy.model_description.ModelVariable",
-    description: "fmpy.model_description.ModelDescription",
-) -> bool:
-    return any(unknown.variable is variable for unknown in description.derivatives)
-
-
-def _address(component: object) -> int:
-    """Plain address of an instance pointer."""
-    value = getattr(component, "value", component)
-    if not isinstance(value, int):
-        raise FMUError("the FMU was not instantiated")
-    return value
+        self._t += h
+        return self.get(self._state_variables).copy()

@@ -25,17 +25,19 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.Velocity slip "Slip velocity";
 
   replaceable Brakes.LinearActuation actuation(pB=pB)
-    constrainedby Brakes.PartialActuation "Brake actuation";
+    constrainedby Brakes.PartialActuation(pB=pB) "Brake actuation";
   replaceable Brakes.ConstantPadFriction padFriction(
     level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW)
-    constrainedby Brakes.PartialPadFriction "Pad friction";
+    constrainedby Brakes.PartialPadFriction(
+    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW) "Pad friction";
   replaceable Contact.ConstantAdhesion adhesion(
     level=muWR + dmuWR, w=slip, v=rR*omegaR, Fx=Fx/2.0)
-    constrainedby Contact.PartialAdhesion "Contact friction";
-  replaceable Losses.QuadraticLoss wheelsetLoss(c0=25.0, c1=0.6, c2=0.004, omega=omegaW)
-    constrainedby Losses.PartialLoss "Bearings and discs of the wheelset";
-  replaceable Losses.QuadraticLoss rollerLoss(c0=40.0, c1=1.0, c2=0.02, omega=omegaR)
-    constrainedby Losses.PartialLoss "Bearings and windage of the roller";
+    constrainedby Contact.PartialAdhesion(
+    level=muWR + dmuWR, w=slip, v=rR*omegaR, Fx=Fx/2.0) "Contact friction";
+  replaceable Losses.WheelsetLoss wheelsetLoss(omega=omegaW)
+    constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
+  replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
+    constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
 
 protected
   parameter Units.Force K = Contact.kalkerStiffness(Fz) "Creep force per creepage at zero slip";

@@ -1,10 +1,15 @@
-"""`workbench fmu`: build FMUs from Modelica."""
+"""`workbench fmu`: build FMUs from Modelica, describe them, check whether they are fit."""
 
 import argparse
+import json
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from workbench.commands.arguments import Commands
+from workbench.commands.arguments import Commands, positive
+from workbench.description import Description, read_description
 from workbench.errors import InputError
+from workbench.fitness import Finding, check, is_fit
 
 _FMUS = Path("fmus")
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
@@ -12,8 +17,14 @@ _PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 def add_fmu(commands: Commands) -> None:
     """Add the command and its jobs to the parser."""
-    fmu = commands.add_parser("fmu", help="build FMUs from Modelica")
+    fmu = commands.add_parser("fmu", help="build, describe and check FMUs")
     jobs = fmu.add_subparsers(required=True, metavar="JOB")
+    _add_build(jobs)
+    _add_info(jobs)
+    _add_check(jobs)
+
+
+def _add_build(jobs: Commands) -> None:
     build = jobs.add_parser(
         "build",
         help="compile Modelica models to FMUs",
@@ -34,6 +45,42 @@ def add_fmu(commands: Commands) -> None:
     build.add_argument("--all", action="store_true", help="everything that fmus/ holds")
     build.add_argument("--check", action="store_true", help="with --all: compare, write nothing")
     build.set_defaults(run=_build)
+
+
+def _add_info(jobs: Commands) -> None:
+    info = jobs.add_parser(
+        "info",
+        help="say what an FMU is and offers",
+        description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
+        epilog="example:\n  python -m workbench fmu info fmus/fmi2/MinimalObserver.fmu",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
+    info.add_argument("--json", type=Path, metavar="FILE", help="write it to a JSON file, too")
+    info.set_defaults(run=_info)
+
+
+def _add_check(jobs: Commands) -> None:
+    checking = jobs.add_parser(
+        "check",
+        help="say whether an FMU is fit for observers",
+        description="Try what an observer needs: replay after reset, states set from outside, "
+        "rollback, derivatives, Co-Simulation against Model Exchange, many instances, memory, "
+        "time per call. A crash of the FMU is a finding. Exit status: 0 fit, 1 not fit, 2 no FMU "
+        "to check.",
+        epilog="example:\n  python -m workbench fmu check my_model.fmu --json fitness.json",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    checking.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
+    checking.add_argument("--json", type=Path, metavar="FILE", help="write findings to a JSON file")
+    checking.add_argument(
+        "--instantiations",
+        type=positive,
+        default=2000,
+        metavar="N",
+        help="instances to make, one after the other (default: %(default)s)",
+    )
+    checking.set_defaults(run=_check)
 
 
 def _build(options: argparse.Namespace) -> int:
@@ -65,3 +112,74 @@ def _build(options: argparse.Namespace) -> int:
     built = compiler.build(options.package, options.model, out, fmi=options.fmi)
     print(f"{built.path}  {built.sha256}")
     return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    description = read_description(options.fmu)
+    print(_format_description(description))
+    if options.json:
+        _write_json(asdict(description) | {"path": description.path.name}, options.json)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    description = read_description(options.fmu)
+    findings = check(options.fmu, options.instantiations)
+    fit = is_fit(findings)
+    print(_format_findings(findings))
+    verdict = "fit for observers" if fit else "not fit for observers"
+    print(f"{options.fmu.name} ({description.name}): {verdict}")
+    if options.json:
+        identity = {
+            "file": description.path.name,
+            "model": description.name,
+            "fmi": description.version,
+            "sha256": description.sha256,
+        }
+        listed = [asdict(finding) for finding in findings]
+        _write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
+    return 0 if fit else 1
+
+
+def _format_description(description: Description) -> str:
+    lines = [
+        f"model        {description.name}: {description.text}",
+        f"FMI          {description.version}, made by {description.tool or 'an unnamed tool'}",
+        f"token        {description.token}",
+        f"sha256       {description.sha256}",
+        f"platforms    {', '.join(description.platforms) or 'none, sources only'}",
+        f"states       {', '.join(description.states) or 'none'}",
+    ]
+    for name, interface in description.interfaces.items():
+        capabilities = [
+            key.replace("_", " ") for key, value in asdict(interface).items() if value is True
+        ]
+        lines.append(f"{name}: {', '.join(capabilities) or 'no capabilities'}")
+    width = max((len(v.name) for v in description.variables), default=0)
+    lines.append(f"\n{'variable':<{width}}  {'causality':<11} {'start':>12}  {'unit':<14} meaning")
+    for v in description.variables:
+        start, unit = v.start if v.start is not None else "", v.unit or ""
+        lines.append(
+            f"{v.name:<{width}}  {v.causality:<11} {start:>12}  {unit:<14} {v.text}".rstrip()
+        )
+    return "\n".join(lines)
+
+
+def _format_findings(findings: list[Finding]) -> str:
+    lines = [f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit"]
+    for f in findings:
+        value, limit = (f"{n:.4g}" if n is not None else "" for n in (f.value, f.limit))
+        if f.passed is None:
+            lines.append(f"{f.name:<38} -       {f.reason}")
+            continue
+        lines.append(
+            f"{f.name:<38} {'passed' if f.passed else 'FAILED':<7} {value:>9} {limit:>9}  {f.unit}"
+        )
+        if f.reason:
+            lines.append(f"    {f.reason}")
+    return "\n".join(lines)
+
+
+def _write_json(content: dict[str, Any], path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=2) + "\n")

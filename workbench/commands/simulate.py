@@ -109,7 +109,9 @@ def _simulate(options: argparse.Namespace) -> int:
     if results:
         write_summary(results, weights, provenance, options.out / "summary.json")
         print(format_table(results))
-        print(f"{len(results)} of {len(cases)} cases; figures, CSV and summary.json in {options.out}")
+        print(
+            f"{len(results)} of {len(cases)} cases; figures, CSV and summary.json in {options.out}"
+        )
     return 130 if interrupted else 0
 
 

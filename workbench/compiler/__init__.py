@@ -32,8 +32,8 @@ from workbench.errors import InputError
 __all__ = ["BuiltFMU", "build", "build_all", "differences", "source_hash"]
 
 # What `fmus/` holds: every model in both versions of FMI.
-MODELS = ("MinimalObserver",)
-FMI_VERSIONS = (2,)
+MODELS = ("Reference", "FullObserver", "MinimalObserver")
+FMI_VERSIONS = (2, 3)
 
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
@@ -99,7 +99,11 @@ def build(
     draft = generate(state_space, "")
     runtime = [p.read_bytes() for p in sorted(RUNTIME.iterdir()) if p.suffix in (".c", ".h")]
     digits = digest([draft.header, draft.source, *runtime, str(fmi)])
-    token = "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
+    token = (
+        "{"
+        + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32]))
+        + "}"
+    )
     code = generate(state_space, token)
     tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
     with tempfile.TemporaryDirectory() as scratch:
@@ -139,7 +143,9 @@ def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
     library = package.parent.name
     with tempfile.TemporaryDirectory() as scratch:
         built = [
-            build(package, f"{library}.{model}", Path(scratch) / f"fmi{fmi}" / f"{model}.fmu", fmi=fmi)
+            build(
+                package, f"{library}.{model}", Path(scratch) / f"fmi{fmi}" / f"{model}.fmu", fmi=fmi
+            )
             for fmi in FMI_VERSIONS
             for model in MODELS
         ]
@@ -167,14 +173,17 @@ def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
 
 
 def differences(package: Path, folder: Path) -> list[str]:
-    """Build everything anew and compare with what `folder` holds; returns what differs, in words."""
+    """Build everything anew and compare with what `folder` holds; returns the differences."""
     with tempfile.TemporaryDirectory() as scratch:
         build_all(package, Path(scratch))
         fresh = {p.relative_to(scratch): digest_file(p) for p in _files(Path(scratch))}
         held = {p.relative_to(folder): digest_file(p) for p in _files(folder)}
     return [
         *(f"{folder / name} is missing" for name in sorted(fresh.keys() - held.keys())),
-        *(f"{folder / name} is not built from anything" for name in sorted(held.keys() - fresh.keys())),
+        *(
+            f"{folder / name} is not built from anything"
+            for name in sorted(held.keys() - fresh.keys())
+        ),
         *(
             f"{folder / name} does not match its sources"
             for name in sorted(fresh.keys() & held.keys())

@@ -100,6 +100,7 @@ def pack(folder: Path, fmu: Path) -> None:
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, file.read_bytes())
+        Path(name).chmod(0o644)
         Path(name).replace(fmu)
     except BaseException:
         Path(name).unlink(missing_ok=True)

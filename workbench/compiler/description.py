@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import pint
@@ -13,7 +14,7 @@ from workbench.compiler.explicit import StateSpace
 from workbench.compiler.flat import Variable
 from workbench.errors import InputError
 
-_REGISTRY = pint.UnitRegistry()
+_REGISTRY: "pint.UnitRegistry[float]" = pint.UnitRegistry()
 _BASE_UNITS = {
     "kilogram": "kg",
     "meter": "m",
@@ -68,7 +69,13 @@ def describe(
         ("logStatusError", "Errors and discarded steps"),
     ):
         ET.SubElement(categories, "Category", name=name, description=text)
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="40", tolerance="1e-6")
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=repr(model.experiment.get("StopTime", 1.0)),
+        tolerance=repr(model.experiment.get("Tolerance", 1e-6)),
+    )
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     if fmi == 2:
@@ -201,8 +208,7 @@ def base_units(unit: str) -> tuple[dict[str, int], float]:
     """
     spelled = re.sub(r"([A-Za-z])(-?\d+)", r"\1**\2", unit).replace(".", "*")
     try:
-        quantity = _REGISTRY.parse_expression(spelled)
-        quantity = _REGISTRY.Quantity(quantity).to_base_units()
+        quantity: Any = _REGISTRY.Quantity(spelled).to_base_units()
     except (pint.errors.PintError, AttributeError, TypeError) as error:
         raise InputError(
             where=f"unit '{unit}'",
@@ -281,9 +287,7 @@ def _variable2(parent: ET.Element, entry: _Entry) -> None:
 
 
 def _variable3(parent: ET.Element, entry: _Entry) -> None:
-    element = ET.SubElement(
-        parent, "Float64", {**_attributes(entry), **_real_attributes(entry)}
-    )
+    element = ET.SubElement(parent, "Float64", {**_attributes(entry), **_real_attributes(entry)})
     if entry.derivative_of is not None:
         element.set("derivative", str(entry.derivative_of))
 

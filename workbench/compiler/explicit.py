@@ -11,12 +11,16 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.compiler.flat import FlatModel, Variable
 from workbench.errors import InputError
 
 # Share of the largest coefficient of its column below which an expression is no pivot.
 _PIVOT = 1e-3
+
+
+Incidence = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -31,10 +35,12 @@ class StateSpace:
     assertions : (a,) conditions, 1 where they hold.
     states, inputs, parameters, outputs : the variables behind x, u, p, w.
     state_outputs : names of the states that the model declares as outputs.
+    experiment : numbers of the model's experiment annotation.
     """
 
     name: str
     description: str
+    experiment: dict[str, float]
     t: ca.SX
     x: ca.SX
     u: ca.SX
@@ -77,7 +83,7 @@ def make_explicit(model: FlatModel) -> StateSpace:
         # What the states alone determine (positions, then velocities) gives its own derivative.
         solver.solve_determined(unknowns)
         expressions = solver.resolve(dependent)
-        free = _incidence(expressions, ca.vertcat(unknowns, u)).any(axis=1)
+        free = [bool(row.any()) for row in _incidence(expressions, ca.vertcat(unknowns, u))]
         ready = [i for i in pending if not free[i]]
         if not ready:
             names = [model.dependent[i].name for i in pending]
@@ -95,6 +101,7 @@ def make_explicit(model: FlatModel) -> StateSpace:
     return StateSpace(
         name=model.name,
         description=model.description,
+        experiment=model.experiment,
         t=model.time,
         x=x,
         u=u,
@@ -116,9 +123,9 @@ def _column(entries: Sequence[ca.SX]) -> ca.SX:
     return ca.vertcat(ca.SX(0, 1), *entries)
 
 
-def _incidence(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
+def _incidence(expression: ca.SX, symbols: ca.SX) -> Incidence:
     """(rows, symbols) True where a row depends on a symbol."""
-    return np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1).full() != 0).reshape(
+    return np.asarray(ca.DM(ca.jacobian_sparsity(expression, symbols), 1).full() != 0).reshape(
         expression.numel(), symbols.numel()
     )
 
@@ -186,7 +193,7 @@ class _Solver:
     def _unsolved(self, unknowns: ca.SX) -> ca.SX:
         return _column([s for s in ca.vertsplit(unknowns) if s.name() not in self.solution])
 
-    def _structurally_singular(self, incidence: np.ndarray, unknowns: ca.SX) -> InputError:
+    def _structurally_singular(self, incidence: Incidence, unknowns: ca.SX) -> InputError:
         unused = [unknowns[j].name() for j in range(unknowns.numel()) if not incidence[:, j].any()]
         names = unused or [symbol.name() for symbol in ca.vertsplit(unknowns)]
         rows, columns = incidence.shape
@@ -204,7 +211,10 @@ class _Solver:
         """Solve the diagonal blocks inside `window`; CasADi lists them in order of evaluation."""
         used: list[int] = []
         blocks = [
-            (rows[row_blocks[b] : row_blocks[b + 1]], columns[column_blocks[b] : column_blocks[b + 1]])
+            (
+                rows[row_blocks[b] : row_blocks[b + 1]],
+                columns[column_blocks[b] : column_blocks[b + 1]],
+            )
             for b in range(len(row_blocks) - 1)
             if window.start <= row_blocks[b] < window.stop
         ]
@@ -241,7 +251,7 @@ class _Solver:
         return np.array(function([values.get(s.name(), 0.0) for s in symbols]).full())
 
 
-def _pattern(incidence: np.ndarray) -> ca.Sparsity:
+def _pattern(incidence: Incidence) -> ca.Sparsity:
     rows, columns = np.nonzero(incidence)
     return ca.Sparsity.triplet(*incidence.shape, [int(r) for r in rows], [int(c) for c in columns])
 

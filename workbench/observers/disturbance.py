@@ -62,8 +62,8 @@ class NoiseLevels:
 
     Attributes
     ----------
-    omegaW, omegaR : standard deviation of one sample [rad/s]; a pole wheel has 0.03 % + 0.002 rad/s,
-        taken at 160 km/h.
+    omegaW, omegaR : standard deviation of one sample [rad/s]; that of a pole wheel is 0.03 % +
+        0.002 rad/s, taken at 160 km/h.
     sample_time : of the recording [s].
     model : unmodelled acceleration of wheelset and roller, random walk [rad/s / sqrt(s)].
     muWR, muDC : random walk of the frictions [1/sqrt(s)]: a drying disc or a patch of rail changes

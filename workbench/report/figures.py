@@ -1,6 +1,7 @@
-"""Figures like Figs. 8 and 9 of Schwarz et al. (2018): inputs above, creep force below, residual."""
+"""Figures like Figs. 8 and 9 of Schwarz et al. (2018): inputs, creep force, residual."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -14,7 +15,7 @@ _COLOURS = {
     "direct_inversion": "#E69F00",
     "disturbance_observer": "#0072B2",
 }
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,

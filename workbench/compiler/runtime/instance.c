@@ -276,7 +276,7 @@ static Status check_settable(const Instance *i, unsigned reference) {
     switch (group_of(reference)) {
     case GROUP_X:
         what = "a continuous state";
-        phases = before_start | STEP; /* STEP is an extension, see fmi2.c */
+        phases = before_start | EVENT | CONTINUOUS | STEP; /* an extension, see fmi2.c */
         break;
     case GROUP_XDOT:
         what = "a derivative, which the model computes";
@@ -288,7 +288,7 @@ static Status check_settable(const Instance *i, unsigned reference) {
     case GROUP_P:
         if (model_tunable[reference - REFERENCE_P]) {
             what = "a tunable parameter";
-            phases = before_start | EVENT | STEP;
+            phases = before_start | EVENT | CONTINUOUS | STEP;
         } else {
             what = "a fixed parameter";
             phases = before_start;

@@ -5,7 +5,7 @@
  *
  *     der(x) = f(t, x, u, p),    w = g(t, x, u, p)
  *
- * with continuous states x, inputs u, parameters p and outputs and local variables w, all in SI units.
+ * with continuous states x, inputs u, parameters p, outputs and local variables w, in SI units.
  *
  * Value references:  x 0..NX-1 | der(x) NX..2*NX-1 | u (NU) | p (NP) | w (NW) | time (one)
  *

@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "dense"
+#define MODEL_TOKEN "{dense}"
+#define NX 8
+#define NU 0
+#define NP 0
+#define NW 0
+#define NA 0
+#define NNZ_XU 64
+#define NNZ_P 0

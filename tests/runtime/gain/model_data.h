@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "gain"
+#define MODEL_TOKEN "{gain}"
+#define NX 0
+#define NU 1
+#define NP 0
+#define NW 1
+#define NA 0
+#define NNZ_XU 1
+#define NNZ_P 0

@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "oscillator"
+#define MODEL_TOKEN "{oscillator}"
+#define NX 2
+#define NU 1
+#define NP 2
+#define NW 2
+#define NA 0
+#define NNZ_XU 9
+#define NNZ_P 5

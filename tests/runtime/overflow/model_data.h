@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "overflow"
+#define MODEL_TOKEN "{overflow}"
+#define NX 1
+#define NU 0
+#define NP 0
+#define NW 1
+#define NA 0
+#define NNZ_XU 2
+#define NNZ_P 0

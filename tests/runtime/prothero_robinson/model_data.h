@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "prothero_robinson"
+#define MODEL_TOKEN "{prothero_robinson}"
+#define NX 1
+#define NU 0
+#define NP 2
+#define NW 0
+#define NA 0
+#define NNZ_XU 1
+#define NNZ_P 2

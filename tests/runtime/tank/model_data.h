@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "tank"
+#define MODEL_TOKEN "{tank}"
+#define NX 1
+#define NU 1
+#define NP 0
+#define NW 0
+#define NA 1
+#define NNZ_XU 1
+#define NNZ_P 0

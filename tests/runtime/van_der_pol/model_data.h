@@ -1,0 +1,9 @@
+#define MODEL_IDENTIFIER "van_der_pol"
+#define MODEL_TOKEN "{van_der_pol}"
+#define NX 2
+#define NU 0
+#define NP 1
+#define NW 0
+#define NA 0
+#define NNZ_XU 3
+#define NNZ_P 1

@@ -1,0 +1,275 @@
+"""Modelica to FMU: what is computed, what is refused and how, and that nothing is left behind."""
+
+import itertools
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from numpy.testing import assert_allclose
+
+from workbench.errors import InputError
+from workbench.fmu import FMU
+
+casadi = pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench import compiler  # noqa: E402  (needs the extra)
+from workbench.compiler.description import base_units  # noqa: E402
+from workbench.compiler.explicit import StateSpace, make_explicit  # noqa: E402
+from workbench.compiler.flat import flatten  # noqa: E402
+
+
+def library(folder: Path, text: str) -> Path:
+    """Write a library `Lib` and return its package.mo."""
+    path = folder / "Lib" / "package.mo"
+    path.parent.mkdir()
+    path.write_text(f"package Lib\n{text}\nend Lib;\n")
+    return path
+
+
+def state_space(folder: Path, text: str, model: str = "Lib.M") -> StateSpace:
+    return make_explicit(flatten(library(folder, text), model))
+
+
+def evaluate(
+    model: StateSpace, x: list[float], u: list[float], t: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives and outputs at default parameters."""
+    p = [v.start for v in model.parameters]
+    function = casadi.Function("f", [model.t, model.x, model.u, model.p], [model.f, model.w])
+    f, w = function(t, x, u, p)
+    return np.array(f).ravel(), np.array(w).ravel()
+
+
+def test_expressions_mean_what_modelica_says(tmp_path: Path) -> None:
+    """Reference: numpy, for arrays, matrices, functions with branches and loops, and builtins."""
+    model = state_space(
+        tmp_path,
+        """
+  function branchy
+    input Real e[3]; input Real k; output Real f[3]; output Real n;
+  protected
+    Real s;
+  algorithm
+    s := 0.0;
+    for i in 1:3 loop s := s + e[i]^2; end for;
+    n := sqrt(s);
+    if k > 1.0 then f := k*e/n; elseif k < -1.0 then f := -e; else f := e; end if;
+  end branchy;
+  model M
+    final parameter Integer n = 3;
+    parameter Real k = 2.0;
+    parameter Real twice = 2*k;
+    input Real u;
+    Real r[3](start={1.0, 2.0, 3.0}*k, each fixed=true);
+    Real A[3,3] = identity(3)*1.0 + [1.0,2.0,3.0; 4.0,5.0,6.0; 7.0,8.0,9.0];
+    Real z[3]; Real length;
+    output Real y1 = A[1,:]*r + sum(r[2:n]) + time + r*r;
+    output Real y2 = min(r) + max(r[1], u) + twice + atan2(r[1], 2.0) + noEvent(abs(u));
+    output Real y3[3] = cross(r, {1.0, 0.0, u}) + transpose(A)*r
+      + (if noEvent(u > 0) then r else -r);
+    output Real y4 = z[2] + length;
+  equation
+    (z, length) = branchy(r, k);
+    for i in 1:3 loop der(r[i]) = -i*r[i] + u; end for;
+  end M;""",
+    )
+    assert [v.start for v in model.states] == [2.0, 4.0, 6.0]
+    r, u, t = np.array([1.5, -2.0, 0.5]), -0.7, 3.0
+    f, w = evaluate(model, list(r), [u], t)
+    A = np.eye(3) + np.arange(1.0, 10.0).reshape(3, 3)
+    length = np.linalg.norm(r)
+    assert_allclose(f, -np.array([1, 2, 3]) * r + u)
+    expected = [
+        A[0] @ r + r[1] + r[2] + t + r @ r,
+        r.min() + max(r[0], u) + 4.0 + np.arctan2(r[0], 2.0) + abs(u),
+        *(np.cross(r, [1.0, 0.0, u]) + A.T @ r - r),
+        2.0 * r[1] / length + length,
+    ]
+    assert_allclose(w, expected, rtol=1e-14)
+
+
+CHAIN = """
+  connector Flange
+    Real s(unit="m"); flow Real f(unit="N");
+  end Flange;
+  model Mass
+    Flange flange; parameter Real m = 2.0;
+    Real s(start=0.1, fixed=true, unit="m"); Real v(start=0.0, fixed=true, unit="m/s");
+  equation
+    flange.s = s; der(s) = v; m*der(v) = flange.f;
+  end Mass;
+  model Damper
+    Flange a; Flange b; parameter Real k = 50.0; parameter Real c = 3.0;
+    Real e; Real de;
+  equation
+    e = b.s - a.s; de = der(e); b.f = k*e + c*de; a.f = -b.f;
+  end Damper;
+  model Wall
+    Flange flange;
+  equation
+    flange.s = 0.0;
+  end Wall;
+  model M
+    Wall wall; Damper d[2](k={50.0, 70.0}); Mass m[2](m={2.0, 5.0});
+    output Real force = d[1].b.f;
+  equation
+    connect(wall.flange, d[1].a); connect(d[1].b, m[1].flange);
+    connect(m[1].flange, d[2].a); connect(d[2].b, m[2].flange);
+  end M;"""
+
+
+def test_spring_dampers_between_connectors_become_an_explicit_ode(tmp_path: Path) -> None:
+    """Reference: equations of motion of two masses in a chain, written by hand."""
+    model = state_space(tmp_path, CHAIN)
+    assert [v.name for v in model.states] == ["m[1].s", "m[1].v", "m[2].s", "m[2].v"]
+    s1, v1, s2, v2 = x = [0.3, -1.0, 0.7, 2.0]
+    f, w = evaluate(model, x, [])
+    first, second = 50 * s1 + 3 * v1, 70 * (s2 - s1) + 3 * (v2 - v1)
+    assert_allclose(f, [v1, (second - first) / 2.0, v2, -second / 5.0], rtol=1e-14)
+    assert_allclose(w, [first], rtol=1e-14)
+
+
+def test_linear_loops_are_solved(tmp_path: Path) -> None:
+    model = state_space(
+        tmp_path,
+        "model M Real x(start=1.0, fixed=true); Real a; output Real b; equation "
+        "2*a + 3*b = x; a - b = 1.0; der(x) = a; end M;",
+    )
+    f, w = evaluate(model, [4.0], [])
+    assert_allclose([f[0], w[0]], [7 / 5, 2 / 5], rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("model M Real x; equation der(x) = y; end M;", "unresolved component reference: 'y'"),
+        ("model M Real x; equation der(x) = 1.0 end M;", r"package.mo:2.*unexpected"),
+        ("model M Real x; Real y; equation der(x) = 1.0; end M;", "1 equations, 2 unknowns"),
+        (
+            "model M Real x(start=0.0, fixed=true); Real a; "
+            "equation a^3 + a = x; der(x) = -a; end M;",
+            "nonlinear loop",
+        ),
+        (
+            "model M Real x(start=0.0, fixed=true); "
+            "equation der(x) = if x > 1 then 1.0 else 2.0; end M;",
+            r"package.mo:2: found an expression that causes events",
+        ),
+        (
+            'function g input Real x; output Real y; external "C"; end g; '
+            "model M Real x(start=0.0, fixed=true); equation der(x) = g(x); end M;",
+            "external",
+        ),
+    ],
+)
+def test_what_cannot_be_compiled_is_refused_with_place_and_reason(
+    tmp_path: Path, text: str, match: str
+) -> None:
+    target = tmp_path / "out" / "M.fmu"
+    with pytest.raises(InputError, match=match):
+        compiler.build(library(tmp_path, text), "Lib.M", target, platforms=["linux-x86_64"])
+    assert not target.parent.exists()
+
+
+def test_a_failed_build_leaves_the_old_fmu_alone(tmp_path: Path) -> None:
+    target = tmp_path / "M.fmu"
+    target.write_text("old")
+    package = library(tmp_path, "model M Real x; equation der(x) = y; end M;")
+    with pytest.raises(InputError):
+        compiler.build(package, "Lib.M", target)
+    assert target.read_text() == "old"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["Lib", "M.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "exponents", "factor"),
+    [
+        ("N.m", {"kg": 1, "m": 2, "s": -2}, 1.0),
+        ("kg.m2", {"kg": 1, "m": 2}, 1.0),
+        ("N.m.s2/rad2", {"kg": 1, "m": 2, "rad": -2}, 1.0),
+        ("bar", {"kg": 1, "m": -1, "s": -2}, 1e5),
+        ("1", {}, 1.0),
+    ],
+)
+def test_units_are_reduced_to_base_units(
+    unit: str, exponents: dict[str, int], factor: float
+) -> None:
+    assert base_units(unit) == (exponents, factor)
+
+
+def test_an_unknown_unit_is_refused() -> None:
+    with pytest.raises(InputError, match="unit 'wombats'"):
+        base_units("wombats")
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def chain(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, int]:
+    folder = tmp_path_factory.mktemp("chain")
+    path = folder / "M.fmu"
+    package = library(folder, CHAIN)
+    compiler.build(package, "Lib.M", path, fmi=request.param, platforms=["linux-x86_64"])
+    return path, request.param
+
+
+def test_a_built_fmu_validates(chain: tuple[Path, int]) -> None:
+    path, fmi = chain
+    assert validate_fmu(str(path)) == []
+    assert fmpy.read_model_description(str(path)).fmiVersion == f"{fmi}.0"
+
+
+def test_a_built_fmu_computes_what_the_equations_say(chain: tuple[Path, int]) -> None:
+    path, _ = chain
+    with FMU(path) as fmu:
+        fmu.start({"m[1].s": 0.3, "m[1].v": -1.0}, {"m[1].m": 4.0})
+        fmu.set_states(np.array([0.3, -1.0, 0.7, 2.0]))
+        first, second = 50 * 0.3 - 3.0, 70 * 0.4 + 9.0
+        assert_allclose(fmu.derivatives(), [-1.0, (second - first) / 4.0, 2.0, -second / 5.0])
+        A = fmu.state_jacobian()
+        assert_allclose(A[1], [-(50 + 70) / 4, -6 / 4, 70 / 4, 3 / 4], rtol=1e-14)
+
+
+def test_dependencies_are_those_of_the_equations(chain: tuple[Path, int]) -> None:
+    path, _ = chain
+    description = fmpy.read_model_description(str(path))
+    found = {
+        u.variable.name: sorted(d.name for d in u.dependencies)
+        for u in [*description.derivatives, *description.outputs]
+    }
+    assert found == {
+        "der(m[1].s)": ["m[1].v"],
+        "der(m[1].v)": ["m[1].s", "m[1].v", "m[2].s", "m[2].v"],
+        "der(m[2].s)": ["m[2].v"],
+        "der(m[2].v)": ["m[1].s", "m[1].v", "m[2].s", "m[2].v"],
+        "force": ["m[1].s", "m[1].v"],
+    }
+
+
+def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
+    package = library(tmp_path, CHAIN)
+    paths = [tmp_path / name / "M.fmu" for name in ("a", "b")]
+    for path in paths:
+        compiler.build(package, "Lib.M", path, platforms=["linux-x86_64", "macos-aarch64"])
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_every_variable_of_the_minimal_observer_has_unit_and_description(
+    minimal_path: Path,
+) -> None:
+    description = fmpy.read_model_description(str(minimal_path))
+    assert validate_fmu(str(minimal_path)) == []
+    bare = [v.name for v in description.modelVariables if not v.unit or not v.description]
+    assert bare == ([] if description.fmiVersion == "2.0" else ["time"])
+
+
+def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_path: Path) -> None:
+    with zipfile.ZipFile(minimal_path) as archive:
+        names = archive.namelist()
+        assert "sources/model.c" in names
+        for name, trace in itertools.product(names, (b"/home/", b"/tmp/", b"/root/", b"/work/")):
+            assert trace not in archive.read(name), f"{trace!r} in {name}"

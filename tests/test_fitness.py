@@ -1,0 +1,333 @@
+"""The check of FMUs: our own is fit, and each deliberate fault is named by its own finding."""
+
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.fitness import Finding, check, is_fit
+from workbench.fmu import FMU, CoSimulation
+
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
+NAME = "MinimalObserver"
+
+# Enough for a fault that comes with the 40th instance.
+FEW = 60
+
+CRASH = "*(volatile int *)0 = 1;"
+
+# The finding that names a fault; a line of the FMU's sources/instance.c; what stands there instead.
+FAULTS = {
+    "reset keeps values": (
+        "reset and replay",
+        "memcpy(s->value, model_start, (NX + NU + NP) * sizeof *s->value);",
+        "if (s->value[NX + NU] == 0.0) "
+        "memcpy(s->value, model_start, (NX + NU + NP) * sizeof *s->value);",
+    ),
+    "set states are ignored": ("state injection", "i->state.value[k] = x[k];", ""),
+    "rollback forgets a state": (
+        "rollback",
+        "    i->state = *s;",
+        "    const double kept = i->state.value[1];\n    i->state = *s;\n"
+        "    if (s->kind == MODEL_EXCHANGE) i->state.value[1] = kept;",
+    ),
+    "rollback forgets the integrator's step": (
+        "rollback in Co-Simulation",
+        "    i->state = *s;",
+        "    i->state = *s;\n    if (s->kind == CO_SIMULATION) i->state.step = 0.0;",
+    ),
+    "serialised bytes forget an input": (
+        "serialised rollback",
+        "    return store(i, &state, saved);",
+        "    state.value[NX + 1] = 0.0;\n    return store(i, &state, saved);",
+    ),
+    "directional derivative has the wrong sign": (
+        "directional derivatives",
+        "sensitivity[k] = i->work[place];",
+        "sensitivity[k] = -i->work[place];",
+    ),
+    "Co-Simulation drifts": (
+        "Co-Simulation against Model Exchange",
+        "case OUTCOME_REACHED:",
+        "case OUTCOME_REACHED: s->value[1] *= 1.001;",
+    ),
+    "40th instance crashes": (
+        "instantiations",
+        "    instance_reset(i);\n    return i;",
+        f"    static int count;\n    if (++count == 40) {CRASH}\n"
+        "    instance_reset(i);\n    return i;",
+    ),
+    "40th load crashes": (
+        "loads of the library",
+        '#include "instance.h"',
+        '#include "instance.h"\n#include <stdlib.h>\n#include <stdio.h>\n'
+        "__attribute__((constructor)) static void count_loads(void) {\n"
+        '    char text[16];\n    const char *const before = getenv("LOADS_OF_FAULTY_FMU");\n'
+        "    const int loads = before ? atoi(before) + 1 : 1;\n"
+        f"    if (loads == 40) {CRASH}\n"
+        '    snprintf(text, sizeof text, "%d", loads);\n'
+        '    setenv("LOADS_OF_FAULTY_FMU", text, 1);\n}',
+    ),
+    "instances cannot be freed": ("start", "        i->importer.release(i);", CRASH),
+    "directional derivative takes 6 ms": (
+        "time of states and step",
+        "    memset(i->work, 0, sizeof i->work);\n    for (size_t k = 0; k < knowns; k++) {\n"
+        "        const int number",
+        "    usleep(6000);\n    memset(i->work, 0, sizeof i->work);\n"
+        "    for (size_t k = 0; k < knowns; k++) {\n        const int number",
+    ),
+}
+HANGS = (
+    "    const double *const source = status == STATUS_OK ? derivatives(i) : NULL;",
+    "    const double *const source = NULL;\n    for (;;) {}",
+)
+LEAKS = (
+    "    i->importer = *importer;",
+    "    i->importer = *importer;\n    memset(importer->allocate(1, 20000), 1, 20000);",
+)
+
+
+def variant(original: Path, path: Path, change: Callable[[Path], None]) -> Path:
+    """Copy of an FMU, changed in its unpacked folder."""
+    folder = path.with_suffix("")
+    with zipfile.ZipFile(original) as archive:
+        archive.extractall(folder)
+    change(folder)
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in folder.rglob("*"):
+            archive.write(file, file.relative_to(folder))
+    return path
+
+
+def faulty(original: Path, path: Path, old: str, new: str) -> Path:
+    """Copy of an FMU with a fault in its runtime."""
+
+    def change(folder: Path) -> None:
+        source = folder / "sources" / "instance.c"
+        text = source.read_text()
+        # The adjoint begins as the directional derivative does, but comes after it.
+        assert old in text
+        source.write_text("#include <unistd.h>\n" + text.replace(old, new, 1))
+        library = folder / "binaries" / fmpy.platform / f"{NAME}{fmpy.sharedLibraryExtension}"
+        files = [folder / "sources" / name for name in ("model.c", "integrator.c", "fmi2.c")]
+        command = [COMPILER, "-std=gnu99", "-shared", "-fPIC", "-fvisibility=hidden", "-w"]
+        subprocess.run([*command, source, *files, "-o", library, "-lm"], check=True)
+
+    return variant(original, path, change)
+
+
+def failed(findings: Iterable[Finding]) -> list[str]:
+    return [finding.name for finding in findings if finding.passed is False]
+
+
+def by_name(findings: Iterable[Finding], name: str) -> Finding:
+    return next(finding for finding in findings if finding.name == name)
+
+
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+def test_own_fmu_is_fit_in_every_respect(root: Path, version: str) -> None:
+    path = root / "fmus" / version / f"{NAME}.fmu"
+    if not path.exists():
+        pytest.skip(f"no {path.name} of {version}")
+    findings = check(path, 500)
+    assert [(f.name, f.reason) for f in findings if not f.passed] == []
+    assert is_fit(findings)
+    assert by_name(findings, "instantiations").value == 500
+    assert by_name(findings, "loads of the library").value == 500
+
+
+@needs_compiler
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_named_by_its_own_finding(fault: str, minimal_path: Path, tmp_path: Path) -> None:
+    name, old, new = FAULTS[fault]
+    findings = check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), FEW)
+    assert failed(findings) == [name]
+    assert not is_fit(findings)
+    assert len(by_name(findings, name).reason.split()) > 3
+
+
+@needs_compiler
+def test_crash_is_named_by_its_signal_and_the_instances_before_and_leaves_no_files(
+    minimal_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, old, new = FAULTS["40th instance crashes"]
+    path = faulty(minimal_path, tmp_path / "faulty.fmu", old, new)
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    findings = check(path, FEW)
+    assert list(scratch.iterdir()) == []
+    finding = by_name(findings, "instantiations")
+    # The first instance is made before the counting starts.
+    assert finding.value == 38
+    assert finding.reason == "the FMU crashed with SIGSEGV after 38 instances"
+    assert "not measured" in by_name(findings, "memory growth").reason
+
+
+@needs_compiler
+def test_wrong_derivative_is_named_with_both_values(minimal_path: Path, tmp_path: Path) -> None:
+    name, old, new = FAULTS["directional derivative has the wrong sign"]
+    reason = by_name(check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), 1), name).reason
+    found = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
+    assert found is not None
+    # Six digits are printed.
+    assert float(found[1]) == pytest.approx(-float(found[2]), rel=1e-4)
+
+
+@needs_compiler
+def test_leak_is_named_by_memory_growth(minimal_path: Path, tmp_path: Path) -> None:
+    findings = check(faulty(minimal_path, tmp_path / "faulty.fmu", *LEAKS), 500)
+    assert failed(findings) == ["memory growth"]
+    # 20 kB each: 20 MB in 1000, and whole pages.
+    assert by_name(findings, "memory growth").value == pytest.approx(20.0, rel=0.2)
+
+
+@needs_compiler
+def test_call_that_hangs_is_stopped(minimal_path: Path, tmp_path: Path) -> None:
+    path = faulty(minimal_path, tmp_path / "faulty.fmu", *HANGS)
+    findings = check(path, FEW, timeout=3.0)
+    assert failed(findings) == ["start"]
+    assert by_name(findings, "start").reason == "the FMU did not return within 3 s"
+    assert by_name(findings, "rollback").reason == "not tried: needs 'start'"
+
+
+def test_what_an_fmu_does_not_offer_is_not_applicable(minimal_path: Path, tmp_path: Path) -> None:
+    def restrict(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        text = re.sub(r"<CoSimulation.*</CoSimulation>", "", file.read_text(), flags=re.DOTALL)
+        for flag in ("canSerializeFMUstate", "providesDirectionalDerivative"):
+            text = text.replace(f'{flag}="true"', "")
+        file.write_text(text)
+
+    findings = check(variant(minimal_path, tmp_path / "bare.fmu", restrict), FEW)
+    reasons = {f.name: f.reason for f in findings if f.passed is None}
+    assert is_fit(findings)
+    assert reasons == {
+        "serialised rollback": "not tried: the FMU does not serialise its state "
+        "(canSerializeFMUState)",
+        "rollback in Co-Simulation": "not tried: the FMU has no Co-Simulation",
+        "directional derivatives": "not tried: the FMU offers none; Jacobians are differences, "
+        "which take more calls",
+        "Co-Simulation against Model Exchange": "not tried: the FMU has no Co-Simulation",
+        "memory growth": "not tried: shows from 500 instantiations on",
+    }
+
+
+@pytest.fixture
+def co_simulation_only(minimal_path: Path, tmp_path: Path) -> Path:
+    def restrict(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        text = file.read_text()
+        file.write_text(re.sub(r"<ModelExchange.*</ModelExchange>", "", text, flags=re.DOTALL))
+
+    return variant(minimal_path, tmp_path / "slave.fmu", restrict)
+
+
+def test_fmu_without_model_exchange_is_refused(co_simulation_only: Path) -> None:
+    with pytest.raises(InputError, match=r"Co-Simulation only; expected Model Exchange"):
+        check(co_simulation_only)
+
+
+def test_command_describes_an_fmu_without_model_exchange(
+    co_simulation_only: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fmu", "info", str(co_simulation_only)]) == 0
+    printed = capsys.readouterr().out
+    assert "Co-Simulation: saves state" in printed
+    assert "Model Exchange" not in printed
+    assert re.search(r"^pB +input +0\.0 +Pa +Brake cylinder pressure$", printed, re.MULTILINE)
+
+
+def test_command_writes_what_it_describes(minimal_path: Path, tmp_path: Path) -> None:
+    file = tmp_path / "info.json"
+    assert main(["fmu", "info", str(minimal_path), "--json", str(file)]) == 0
+    written = json.loads(file.read_text())
+    with FMU(minimal_path) as fmu:
+        assert written["sha256"] == fmu.sha256
+        assert written["states"] == list(fmu.states)
+        assert {v["name"]: v["unit"] for v in written["variables"]} == fmu.units
+
+
+def test_command_writes_findings_and_ends_with_0_for_a_fit_fmu(
+    minimal_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "new" / "fitness.json"
+    arguments = ["fmu", "check", str(minimal_path), "--json", str(file), "--instantiations", "5"]
+    assert main(arguments) == 0
+    written = json.loads(file.read_text())
+    assert written["fit"] is True
+    assert written["fmu"]["fmi"] == "2.0"
+    printed = capsys.readouterr().out
+    assert all(finding["name"] in printed for finding in written["findings"])
+
+
+@needs_compiler
+def test_command_gives_the_reason_and_ends_with_1_for_an_unfit_fmu(
+    minimal_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, old, new = FAULTS["set states are ignored"]
+    path = faulty(minimal_path, tmp_path / "faulty.fmu", old, new)
+    assert main(["fmu", "check", str(path), "--instantiations", "5"]) == 1
+    printed = capsys.readouterr().out
+    assert "'omegaW' was set, but the FMU returns another state" in printed
+    assert "not fit" in printed
+
+
+def test_command_ends_with_2_for_a_wrong_file(
+    co_simulation_only: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fmu", "check", str(co_simulation_only)]) == 2
+    assert main(["fmu", "check", __file__]) == 2
+    assert "no FMU" in capsys.readouterr().err
+
+
+def test_co_simulation_rolls_back_to_identical_bits(minimal_path: Path) -> None:
+    with CoSimulation(minimal_path) as simulation:
+        inputs = simulation.variables(["pB", "tauR"])
+        simulation.start({"omegaW": 60.0, "omegaR": 39.5})
+        simulation.set(inputs, np.array([3.6e5, 4e3]))
+        simulation.step(0.1)
+        saved = simulation.save()
+        first = [simulation.step(0.01) for _ in range(20)]
+        simulation.restore(saved)
+        simulation.set_time(0.1)
+        second = [simulation.step(0.01) for _ in range(20)]
+        simulation.release(saved)
+    assert_array_equal(first, second)
+    assert first[0][0] > first[-1][0] + 1.0  # it brakes
+
+
+def test_state_serialised_by_one_instance_continues_in_another(minimal_path: Path) -> None:
+    with FMU(minimal_path) as one, FMU(minimal_path) as other:
+        one.start({"omegaW": 60.0, "omegaR": 39.5})
+        one.set(one.variables(["pB"]), np.array([3.6e5]))
+        saved = one.save()
+        data = one.serialise(saved)
+        one.release(saved)
+        other.start({})
+        restored = other.deserialise(data)
+        other.restore(restored)
+        other.release(restored)
+        assert_array_equal(other.step(0.01), one.step(0.01))
+        assert other.get_states()[0] < 60.0
+
+
+@pytest.mark.parametrize("reload", [False, True])
+def test_renewed_instance_starts_as_the_first_did(minimal: FMU, reload: bool) -> None:
+    minimal.start({"omegaW": 60.0, "omegaR": 39.5})
+    first = minimal.step(0.01)
+    minimal.renew(reload=reload)
+    minimal.start({"omegaW": 60.0, "omegaR": 39.5})
+    assert_array_equal(minimal.step(0.01), first)

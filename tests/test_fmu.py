@@ -1,0 +1,238 @@
+"""The extended-FMI pattern on the built FMU, against independent evaluations."""
+
+import itertools
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+
+from workbench.errors import InputError
+from workbench.fmu import FMU, FMUError
+
+INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
+
+
+def rig_equations(x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
+    """Nominal plant written out by hand: der(omegaW), der(omegaR) and Fx, in SI units."""
+    omegaW, omegaR = x
+    pB, tauR, dmuWR, dmuDC, correctionW, correctionR = u
+    w, v = 0.70 * omegaR - 0.46 * omegaW, np.hypot(0.70 * omegaR, 0.1)
+    mu = (0.15 + dmuWR) * (0.6 * np.exp(-0.6 * abs(w)) + 0.4)
+    eps = np.pi * 9.68e6 * abs(w) / (4 * 80e3 * mu * v)
+    Fx = 2 * 2 * 80e3 * mu / np.pi * (eps / (1 + eps**2) + np.arctan(0.4 * eps)) * np.sign(w)
+    sign_W, sign_R = np.tanh(omegaW / 0.05), np.tanh(omegaR / 0.05)
+    brake = 3 * (0.30 + dmuDC) * 10.86e3 * max(0.0, pB / 1e5 - 0.25) * 0.300 * sign_W
+    loss_W = (25 + 0.6 * abs(omegaW) + 0.004 * omegaW**2) * sign_W
+    loss_R = (40 + 1.0 * abs(omegaR) + 0.02 * omegaR**2) * sign_R
+    rates = [
+        (0.46 * Fx - brake - loss_W) / 110 + correctionW,
+        (tauR - 0.70 * Fx - loss_R) / 1500 + correctionR,
+    ]
+    return np.array(rates), Fx
+
+
+points = st.tuples(
+    st.tuples(st.floats(-100, 100), st.floats(-65, 65)),
+    st.tuples(
+        st.floats(0, 5e5),
+        st.floats(-2e4, 2e4),
+        st.floats(-0.1, 0.25),
+        st.floats(-0.2, 0.15),
+        st.floats(-5, 5),
+        st.floats(-5, 5),
+    ),
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(points)
+def test_derivatives_equal_an_independent_evaluation(
+    minimal_path: Path, point: tuple[tuple[float, ...], tuple[float, ...]]
+) -> None:
+    x, u = map(np.array, point)
+    with FMU(minimal_path) as fmu:
+        fmu.start({})
+        fmu.set(fmu.variables(INPUTS), u)
+        fmu.set_states(x)
+        rates = fmu.derivatives()
+        (force,) = fmu.get(fmu.variables(["Fx"]))
+    expected, expected_force = rig_equations(x, u)
+    # Rounding of the slip (1e-14 m/s) times the steepest force (1.4e8 N/(m/s)), over JW/rW.
+    assert_allclose(rates, expected, rtol=1e-9, atol=1e-7)
+    assert_allclose(force, expected_force, rtol=1e-9, atol=1e-5)
+
+
+@pytest.mark.parametrize("omegaR", [1.0, 20.0, 63.0, -40.0])
+def test_jacobians_equal_differences(minimal: FMU, omegaR: float) -> None:
+    minimal.start({})
+    inputs, outputs = (
+        minimal.variables(INPUTS),
+        minimal.variables(["omegaW", "omegaR", "Fx", "slip"]),
+    )
+    u = np.array([2.7e5, 5e3, 0.1, -0.05, 0.0, 0.0])
+    x = np.array([(0.70 * omegaR - np.sign(omegaR) * 0.02) / 0.46, omegaR])
+    minimal.set(inputs, u)
+    minimal.set_states(x)
+    exact = minimal.linearise(inputs, outputs)
+    minimal.has_directional_derivatives = False
+    differences = minimal.linearise(inputs, outputs)
+    for name in "ABCD":
+        a, b = getattr(exact, name), getattr(differences, name)
+        # Central differences: truncation and rounding are of order eps^(2/3) = 4e-11, times the
+        # curvature of the slip law at 1 m/s.
+        assert_allclose(a, b, rtol=2e-5, atol=2e-5 * np.abs(a).max())
+    assert np.abs(exact.A).max() > 1.0
+
+
+def test_save_run_restore_run_gives_identical_bits(minimal: FMU) -> None:
+    minimal.start({"omegaW": 60.0, "omegaR": 39.5})
+    minimal.set(minimal.variables(["pB", "tauR"]), np.array([3.6e5, 4e3]))
+    for _ in range(10):
+        minimal.step(0.005)
+    saved = minimal.save()
+    first = [minimal.step(0.005) for _ in range(50)]
+    minimal.restore(saved)
+    second = [minimal.step(0.005) for _ in range(50)]
+    minimal.release(saved)
+    assert_array_equal(first, second)
+    assert not np.array_equal(first[0], first[-1])
+
+
+def test_restart_repeats_bit_for_bit(minimal: FMU) -> None:
+    runs = []
+    for _ in range(2):
+        minimal.start({"omegaW": 60.0, "omegaR": 39.5})
+        minimal.set(minimal.variables(["pB"]), np.array([3.6e5]))
+        runs.append([minimal.step(0.005) for _ in range(20)])
+    assert_array_equal(runs[0], runs[1])
+
+
+def brake_input(t: np.ndarray | float) -> np.ndarray | float:
+    """Pressure of a stop [Pa]: a smooth rise to 2 bar from 0.5 s on."""
+    return 2e5 * (1 - np.exp(-np.maximum(0.0, np.asarray(t) - 0.5)))
+
+
+@pytest.fixture(scope="module")
+def held_pressure_stop(minimal_path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Reference trajectory: Radau at 1e-10 on the FMU's derivatives, inputs held per 10 ms."""
+    times = np.arange(0.0, 4.0, 0.01)
+    states = [np.array([80.0, 80.0 * 0.46 / 0.70])]
+    with FMU(minimal_path) as fmu:
+        fmu.start({})
+        pressure = fmu.variables(["pB"])
+
+        def rates(t: float, x: np.ndarray) -> np.ndarray:
+            fmu.set_states(x)
+            return fmu.derivatives()
+
+        for begin, end in itertools.pairwise(times):
+            fmu.set(pressure, np.array([brake_input(begin)]))
+            solution = solve_ivp(
+                rates, (begin, end), states[-1], method="Radau", rtol=1e-10, atol=1e-10
+            )
+            states.append(solution.y[:, -1])
+    return times, np.array(states)
+
+
+def test_co_simulation_equals_model_exchange(
+    minimal_path: Path, held_pressure_stop: tuple[np.ndarray, np.ndarray]
+) -> None:
+    times, states = held_pressure_stop
+    signal = np.array(
+        [(t, p) for t, p in zip(times, brake_input(times), strict=True)],
+        dtype=[("time", float), ("pB", float)],
+    )
+    result = fmpy.simulate_fmu(
+        str(minimal_path),
+        fmi_type="CoSimulation",
+        start_time=0.0,
+        stop_time=float(times[-1]),
+        output_interval=0.01,
+        relative_tolerance=1e-8,
+        start_values={"omegaW": states[0, 0], "omegaR": states[0, 1]},
+        input=signal,
+        output=["omegaW", "omegaR"],
+    )
+    simulated = np.column_stack([result["omegaW"], result["omegaR"]])
+    # Tolerance 1e-8 of about 80 rad/s per step, accumulated over 400 steps; FMPy holds the input
+    # of the beginning of each interval, as the reference does.
+    assert_allclose(simulated, states, rtol=1e-6, atol=1e-6)
+
+
+def test_implicit_step_converges_with_order_one(
+    minimal_path: Path, held_pressure_stop: tuple[np.ndarray, np.ndarray]
+) -> None:
+    """Halving the step of linearly implicit Euler halves the error (Hairer and Wanner 1996)."""
+    times, states = held_pressure_stop
+    errors = []
+    for parts in (1, 2, 4):
+        with FMU(minimal_path) as fmu:
+            fmu.start({"omegaW": states[0, 0], "omegaR": states[0, 1]})
+            pressure = fmu.variables(["pB"])
+            x = states[0]
+            for begin in times[:-1]:
+                fmu.set(pressure, np.array([brake_input(begin)]))
+                for _ in range(parts):
+                    x = fmu.step(0.01 / parts)
+            errors.append(abs(x[1] - states[-1, 1]))
+    # 1.8..2.2: the next term of the expansion still shows at 10 ms.
+    assert 1.8 < errors[0] / errors[1] < 2.2
+    assert 1.8 < errors[1] / errors[2] < 2.2
+    assert errors[0] < 0.01
+
+
+def test_an_independent_client_computes_the_same_trajectory(
+    minimal_path: Path, held_pressure_stop: tuple[np.ndarray, np.ndarray]
+) -> None:
+    """CasADi's DaeBuilder loads the FMU by its own FMI import; its CVODES integrates."""
+    casadi = pytest.importorskip("casadi")
+    times, states = held_pressure_stop
+    builder = casadi.DaeBuilder("rig", str(minimal_path))
+    names = [str(name) for name in builder.u()]
+    assert sorted(names) == sorted(INPUTS)
+    rates = builder.create("rates", ["x", "u"], ["ode"])
+    x, u = casadi.MX.sym("x", 2), casadi.MX.sym("u", len(names))
+    integrator = casadi.integrator(
+        "stop",
+        "cvodes",
+        {"x": x, "u": u, "ode": rates(x, u)},
+        0.0,
+        times[1] - times[0],
+        {"reltol": 1e-9, "abstol": 1e-9},
+    )
+    order = [str(name) for name in builder.x()]
+    state = states[0][[["omegaW", "omegaR"].index(name) for name in order]]
+    for begin in times[:-1]:
+        held = [float(brake_input(begin)) if name == "pB" else 0.0 for name in names]
+        state = np.array(integrator(x0=state, u=held)["xf"]).ravel()
+    final = [state[order.index(name)] for name in ("omegaW", "omegaR")]
+    # Relative tolerance 1e-9 per step of both integrators, accumulated over 400 steps.
+    assert_allclose(final, states[-1], rtol=1e-6)
+
+
+def test_missing_variable_is_named(minimal: FMU) -> None:
+    with pytest.raises(InputError, match=r"no variable 'omegaX'.*omegaW, omegaR"):
+        minimal.variables(["omegaX"])
+
+
+def test_nan_is_refused_with_a_reason_and_nothing_changes(minimal: FMU) -> None:
+    minimal.start({"omegaW": 60.0, "omegaR": 39.5})
+    inputs = minimal.variables(["pB", "tauR"])
+    before = minimal.derivatives()
+    with pytest.raises(FMUError, match="nan"):
+        minimal.set(inputs, np.array([np.nan, 0.0]))
+    assert_array_equal(minimal.derivatives(), before)
+
+
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.fmu"
+    wrong.write_text("no archive")
+    with pytest.raises(InputError, match="no FMU"):
+        FMU(wrong)
+    with pytest.raises(InputError, match="no such file"):
+        FMU(tmp_path / "absent.fmu")

@@ -1,0 +1,153 @@
+"""`workbench observability`: what the measured speeds can tell about states and frictions."""
+
+import argparse
+import os
+import platform
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case, read_cases
+from workbench.commands.arguments import MINIMAL_OBSERVER, Commands, positive
+from workbench.cosim import Outcome, observe
+from workbench.fmu import FMU, FMUError
+from workbench.objective import braking_window
+from workbench.observability import LinearTest, StopObservability, linear_test, window_test
+from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
+from workbench.report.observability import (
+    draw_observability,
+    format_observability,
+    write_observability,
+    write_windows,
+)
+
+_FULL_OBSERVER = Path("fmus/fmi2/FullObserver.fmu")
+
+
+def add_observability(commands: Commands) -> None:
+    """Add the command to the parser."""
+    observability = commands.add_parser(
+        "observability",
+        help="show when states and frictions can be observed",
+        description="Show what the measured speeds can tell: a linear test of both observer "
+        "models, and for each recorded stop how well half a second of samples can know the "
+        "frictions dmuWR and dmuDC (Cramer-Rao bound). Writes windows (CSV), observability.json "
+        "and figures.",
+        epilog="examples:\n"
+        "  python -m workbench observability\n"
+        "  python -m workbench observability cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        "  python -m workbench observability my_cases --full my_full_model.fmu",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    observability.add_argument(
+        "cases",
+        nargs="*",
+        type=Path,
+        default=[Path("cases")],
+        metavar="CASE",
+        help="case folder, or folder of case folders (default: cases)",
+    )
+    observability.add_argument(
+        "--out",
+        type=Path,
+        default=Path("results/observability"),
+        metavar="DIR",
+        help="where to write (default: %(default)s)",
+    )
+    observability.add_argument(
+        "--fmu",
+        type=Path,
+        default=MINIMAL_OBSERVER,
+        metavar="FILE",
+        help="minimal observer model (default: %(default)s)",
+    )
+    observability.add_argument(
+        "--full",
+        type=Path,
+        default=_FULL_OBSERVER,
+        metavar="FILE",
+        help="full observer model (default: %(default)s)",
+    )
+    observability.add_argument(
+        "--workers",
+        type=positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: one per processor, %(default)s)",
+    )
+    observability.set_defaults(run=_observability)
+
+
+def _observability(options: argparse.Namespace) -> int:
+    cases = read_cases(options.cases)
+    options.out.mkdir(parents=True, exist_ok=True)
+    models = (options.fmu, options.full)
+    linear: list[LinearTest] = []
+    files = []
+    for path in models:
+        with FMU(path) as fmu:
+            linear.append(linear_test(fmu))
+            files.append({"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256})
+    with FMU(options.fmu) as fmu:
+        gains = stationary_gains(fmu)
+    provenance = {
+        "workbench": version("wheelset-workbench"),
+        "python": platform.python_version(),
+        "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy")},
+        "fmus": files,
+    }
+    stops: list[StopObservability] = []
+    begin = time.perf_counter()
+    interrupted = False
+    with ProcessPoolExecutor(min(options.workers, len(cases))) as pool:
+        tasks = [pool.submit(_run_case, c, models, linear, gains, options.out) for c in cases]
+        try:
+            for task in as_completed(tasks):
+                stops.append(task.result())
+                elapsed = time.perf_counter() - begin
+                left = elapsed / len(stops) * (len(cases) - len(stops))
+                print(
+                    f"[{len(stops):>3}/{len(cases)}] {stops[-1].case.name:<28} {elapsed:5.1f} s, "
+                    f"about {left:.0f} s left",
+                    flush=True,
+                )
+        except KeyboardInterrupt:
+            interrupted = True
+            pool.shutdown(cancel_futures=True)
+    stops.sort(key=lambda stop: stop.case.name)
+    if stops:
+        write_observability(linear, stops, provenance, options.out / "observability.json")
+        print(format_observability(linear, stops))
+        print(f"{len(stops)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
+    return 130 if interrupted else 0
+
+
+def _run_case(
+    case: Case,
+    models: tuple[Path, ...],
+    linear: list[LinearTest],
+    gains: DisturbanceGains,
+    out: Path,
+) -> StopObservability:
+    """Test all models on one case, in a process of its own; writes its CSV and figure.
+
+    The trajectory is the estimate of the disturbance observer on the first model.
+    """
+    with FMU(models[0]) as fmu:
+        run = observe(case, DisturbanceObserver(fmu, gains))
+        roller_radius = float(fmu.get(fmu.variables(["rR"]))[0])
+    if run.outcome is not Outcome.OK:
+        raise FMUError(f"{case.name}: {run.outcome.value} {run.message}".strip())
+    tests = []
+    for path, test in zip(models, linear, strict=True):
+        with FMU(path) as fmu:
+            tests.append(window_test(fmu, case, run, test.scale))
+    window = braking_window(case, roller_radius)
+    braking = np.isin(tests[0].time, case.time[window])
+    stop = StopObservability(case, run, braking, tuple(tests))
+    write_windows(stop, out / f"{case.name}.csv")
+    draw_observability(stop, out / f"{case.name}.png")
+    return stop

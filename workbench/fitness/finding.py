@@ -1,0 +1,54 @@
+"""What is asked of an FMU, and how the answer looks."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one check found.
+
+    Attributes
+    ----------
+    passed : None if the check was not made, for the reason given.
+    value, limit : measured, and the largest (of instances: the smallest) that passes, in `unit`.
+    reason : of a failure or of what was not checked, for whom has to act on it.
+    """
+
+    name: str
+    passed: bool | None = None
+    value: float | None = None
+    limit: float | None = None
+    unit: str = "1"
+    reason: str = ""
+
+
+def is_fit(findings: Iterable[Finding]) -> bool:
+    """Say whether no check failed."""
+    return all(finding.passed is not False for finding in findings)
+
+
+# One sample of a recording at 200 Hz: what takes longer cannot keep up with the rig.
+SAMPLE = 5000.0
+
+# The questions: findings without an answer. Bits are either the same or not, hence limits of 0.
+START = Finding("start", limit=1, unit="instances")
+# The step of an observer takes the model for smooth: it would pass over a jump.
+EVENTS = Finding("smoothness", limit=0, unit="event indicators")
+RESET = Finding("reset and replay", limit=0.0)
+INJECTION = Finding("state injection", limit=0.0)
+ROLLBACK = Finding("rollback", limit=0.0)
+SERIALISATION = Finding("serialised rollback", limit=0.0)
+ROLLBACK_CS = Finding("rollback in Co-Simulation", limit=0.0)
+# Of an entry. Differences at the best of several steps agree to 1e-7; a wrong term is far above.
+DERIVATIVES = Finding("directional derivatives", limit=1e-4)
+# Of the range of a state: above any sensible tolerance, below what a sensor of speed resolves.
+INTERFACES = Finding("Co-Simulation against Model Exchange", limit=1e-3)
+INSTANCES = Finding("instantiations", unit="instances")
+LOADS = Finding("loads of the library", unit="instances")
+# Tuning starts a model 1e5 times: 1 MB in 1000 would fill 100 MB of each worker.
+MEMORY = Finding("memory growth", limit=1.0, unit="MB per 1000")
+TIME_GET = Finding("time of states and outputs", limit=SAMPLE, unit="us")
+TIME_SET = Finding("time of inputs", limit=SAMPLE, unit="us")
+TIME_DERIVATIVES = Finding("time of states and derivatives", limit=SAMPLE, unit="us")
+TIME_STEP = Finding("time of states and step", limit=SAMPLE, unit="us")
