@@ -17,6 +17,7 @@ from workbench.observability import (
     SampledModel,
     SensorNoise,
     bounds,
+    exponentials,
     gramians,
     linear_test,
     linearise_along,
@@ -122,6 +123,17 @@ def test_gramian_of_a_stable_system_solves_lyapunov_equations():
     # The sum is a rectangle rule for the integral: off by h/2 of its first value, h/2 * C'C.
     continuous = solve_continuous_lyapunov(A.T, -C.T @ C)
     assert_allclose(h * gramian - 0.5 * h * C.T @ C, continuous, atol=1e-4)
+
+
+@pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1500.0])
+def test_exponentials_are_those_of_scipy(stiffness):
+    """From a slow mode to the slip mode at walking pace, whose rate times the step is 1500."""
+    rng = np.random.default_rng(2)
+    slow, basis = np.diag([0.0, -0.1, -1.0]), rng.normal(size=(3, 3))
+    stack = np.array([basis @ (stiffness * slow) @ np.linalg.inv(basis), slow])
+    # Each of up to 15 squarings may double the rounding error: 2^15 * 2e-16, relative to entries of
+    # order one.
+    assert_allclose(exponentials(stack), [expm(m) for m in stack], atol=1e-10)
 
 
 # --- models ---

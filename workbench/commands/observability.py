@@ -15,9 +15,10 @@ from workbench.commands.arguments import MINIMAL_OBSERVER, Commands, positive
 from workbench.cosim import Outcome, observe
 from workbench.fmu import FMU, FMUError
 from workbench.objective import braking_window
-from workbench.observability import LinearTest, StopObservability, linear_test, window_test
+from workbench.observability import LinearTest, linear_test, window_test
 from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
 from workbench.report.observability import (
+    StopObservability,
     draw_observability,
     format_observability,
     write_observability,

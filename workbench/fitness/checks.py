@@ -1,9 +1,6 @@
 """The checks: each tries one thing that an observer needs."""
 
 import functools
-import gc
-import os
-import timeit
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -13,6 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, Description, read_description
+from workbench.fitness.cost import endure, time_calls
 from workbench.fitness.excitation import (
     COMMUNICATION_STEPS,
     Excitation,
@@ -34,7 +32,6 @@ from workbench.fitness.finding import (
     RESET,
     ROLLBACK,
     ROLLBACK_CS,
-    SAMPLE,
     SERIALISATION,
     START,
     TIME_DERIVATIVES,
@@ -45,9 +42,6 @@ from workbench.fitness.finding import (
 )
 from workbench.fitness.isolation import isolated
 from workbench.fmu import FMU, CoSimulation, FMUError, Matrix, Vector
-
-# A tenth of these leaks 0.05 MB at the limit, some pages of memory.
-_MEMORY_SHOWS = 500
 
 
 def check(path: Path, instantiations: int = 2000, timeout: float = 120.0) -> list[Finding]:
@@ -238,15 +232,11 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[Finding]:
         # step confirms it.
         for share in (1e-3, 1e-5, 1e-7):
             steps = share * size
-            sides = [
-                np.column_stack([evaluate(centre + side) for side in sign * np.diag(steps)])
-                for sign in (1.0, -1.0)
-            ]
-            measured = (sides[0] - sides[1]) / (2 * steps)
+            measured = _central_differences(evaluate, centre, steps)
             entry = np.maximum(np.abs(jacobian), np.abs(measured))
             # Below these, an entry is rounding of the differences, or nothing beside others.
             rounding = 1e6 * np.finfo(float).eps * scale / steps
-            nothing = 1e-8 * np.maximum(typical, np.max(entry * size, axis=1))[:, None] / size
+            nothing = 1e-6 * np.maximum(typical, np.max(entry * size, axis=1))[:, None] / size
             entry = np.maximum(entry, np.maximum(rounding, nothing))
             gap = np.abs(jacobian - measured)
             relative = np.divide(gap, entry, out=np.zeros_like(gap), where=entry > 0.0)
@@ -256,10 +246,16 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[Finding]:
     passed = bool(error[i, j] <= (DERIVATIVES.limit or 0.0))
     known = [*fmu.states, *excitation.inputs.names][j]
     reason = (
-        f"d {unknowns[i]} / d {known} is {jacobian[i, j]:.6g} by the FMU, {differences[i, j]:.6g} by "
-        "differences; switch directional derivatives off in the export"
+        f"d {unknowns[i]} / d {known} is {jacobian[i, j]:.6g} by the FMU, {differences[i, j]:.6g} "
+        "by differences; switch directional derivatives off in the export"
     )
     yield replace(DERIVATIVES, passed=passed, value=error[i, j], reason="" if passed else reason)
+
+
+def _central_differences(evaluate: Callable[[Vector], Vector], x: Vector, steps: Vector) -> Matrix:
+    """Jacobian of `evaluate` at x; steps (n,) of the n columns."""
+    sides = (np.column_stack([evaluate(x + d) for d in s * np.diag(steps)]) for s in (1.0, -1.0))
+    return (next(sides) - next(sides)) / (2 * steps)
 
 
 def _compare_interfaces(path: Path, instantiations: int) -> Iterator[Finding]:
@@ -291,6 +287,11 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
         fmu.set_states(x)
         return fmu.derivatives()
 
+    def jacobian(t: float, x: Vector) -> Matrix:
+        # Not SciPy's: its steps grow without bound for states that no derivative depends on.
+        steps = 1e-6 * np.maximum(np.abs(x), excitation.nominal)
+        return _central_differences(lambda x: rates(t, x), x, steps)
+
     rows = start[None, :]
     times = np.linspace(0.0, end, COMMUNICATION_STEPS + 1)
     jump = COMMUNICATION_STEPS // 2
@@ -304,6 +305,7 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
             (part[0], part[-1]),
             rows[-1],
             method="Radau",
+            jac=jacobian,
             t_eval=part,
             rtol=1e-8,  # far below the limit of the comparison
             atol=1e-10 * excitation.nominal,
@@ -312,76 +314,6 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
             raise FMUError(f"Model Exchange cannot be integrated: {solution.message}")
         rows = np.vstack([rows, solution.y.T[1:]])
     return rows
-
-
-def _endure(path: Path, instantiations: int) -> Iterator[int | Finding]:
-    growth = []
-    lot = max(instantiations // 10, 1)
-    with FMU(path) as fmu:
-        for question, reload in ((INSTANCES, False), (LOADS, True)):
-            memory = []
-            for n in range(1, instantiations + 1):
-                fmu.renew(reload=reload)
-                fmu.start({})
-                fmu.derivatives()
-                yield n
-                if n % lot == 0:
-                    memory.append(_resident_memory())
-            # A leak grows in every lot, while allocators take a megabyte once in a while.
-            growth.append(float(np.median(np.diff(memory[-7:]))) * 1000 / lot)
-            yield replace(question, passed=True, value=instantiations, limit=instantiations)
-    if instantiations < _MEMORY_SHOWS:
-        yield replace(MEMORY, reason=f"not tried: shows from {_MEMORY_SHOWS} instantiations on")
-        return
-    if np.isnan(growth).any():
-        yield replace(MEMORY, reason="not tried: this system does not tell a process's memory")
-        return
-    passed = max(growth) <= (MEMORY.limit or 0.0)
-    reason = "freed instances leave memory behind; reset one instance instead of making new ones"
-    yield replace(MEMORY, passed=passed, value=max(growth), reason="" if passed else reason)
-
-
-def _resident_memory() -> float:
-    """Resident memory of this process [MB]; NaN where the system has no /proc."""
-    gc.collect()
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except FileNotFoundError:
-        return float("nan")
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def _time(path: Path, instantiations: int) -> Iterator[Finding]:
-    with FMU(path) as fmu:
-        excitation = excite(fmu)
-        outputs = real_variables(fmu, fmu.outputs)
-        # New values at each call, because FMUs keep the results of the last ones.
-        points = (excitation.states, excitation.states + 1e-6 * excitation.nominal)
-        levels = (excitation.first, excitation.second)
-
-        def at_points(read: Callable[[], object]) -> None:
-            for point in points:
-                fmu.set_states(point)
-                read()
-
-        def at_levels() -> None:
-            for level in levels:
-                fmu.set(excitation.inputs, level)
-
-        tasks: tuple[tuple[Finding, Callable[[], None]], ...] = (
-            (TIME_GET, lambda: at_points(lambda: fmu.get(outputs))),
-            (TIME_SET, at_levels),
-            (TIME_DERIVATIVES, lambda: at_points(fmu.derivatives)),
-            (TIME_STEP, lambda: at_points(lambda: fmu.step(1e-9))),
-        )
-        for question, task in tasks:
-            timer = timeit.Timer(task)
-            number = 1 + int(0.02 / max(timer.timeit(3) / 3, 1e-6))  # 20 ms
-            # The least of several: other load on the machine only adds.
-            time = min(timer.repeat(5, number)) / number / len(points) * 1e6
-            passed = time <= SAMPLE
-            reason = "" if passed else "slower than samples come in at 200 Hz; simplify the model"
-            yield replace(question, passed=passed, value=time, reason=reason)
 
 
 _Attempt = Callable[[Path, int], Iterator[int | Finding]]
@@ -395,6 +327,6 @@ _CHECKS: tuple[tuple[_Attempt, tuple[Finding, ...], tuple[Finding, ...]], ...] =
     (_roll_back_co_simulation, (ROLLBACK_CS,), (START,)),
     (_differentiate, (DERIVATIVES,), (START, INJECTION)),
     (_compare_interfaces, (INTERFACES,), (START, INJECTION)),
-    (_endure, (INSTANCES, LOADS, MEMORY), (START,)),
-    (_time, (TIME_GET, TIME_SET, TIME_DERIVATIVES, TIME_STEP), (START,)),
+    (endure, (INSTANCES, LOADS, MEMORY), (START,)),
+    (time_calls, (TIME_GET, TIME_SET, TIME_DERIVATIVES, TIME_STEP), (START,)),
 )

@@ -38,9 +38,12 @@ def excite(fmu: FMU) -> Excitation:
     fmu.start({})
     states = origin = fmu.get_states()
     rest = fmu.get(inputs).copy()
-    for share in (0.1, 0.01, 0.001):  # the furthest that the model bears
-        if _bears(fmu, origin + share * nominal):
-            states = origin + share * nominal
+    for share in (0.1, 0.01, 0.001):
+        rates = _rates_at(fmu, origin + share * nominal)
+        if rates is None:
+            continue
+        states = origin + share * nominal
+        if np.all(np.abs(rates) < 100.0 * nominal):  # farther out, it flies off within 10 ms
             break
     fmu.set_states(states)
     levels = np.array([_level(fmu, inputs, rest, j, nominal) for j in range(rest.size)])
@@ -49,12 +52,14 @@ def excite(fmu: FMU) -> Excitation:
     return excitation
 
 
-def _bears(fmu: FMU, states: Vector) -> bool:
+def _rates_at(fmu: FMU, states: Vector) -> Vector | None:
+    """Derivatives, (n,); None if the model does not bear these states."""
     try:
         fmu.set_states(states)
-        return bool(np.isfinite(fmu.derivatives()).all())
+        rates = fmu.derivatives()
     except FMUError:
-        return False
+        return None
+    return rates if np.isfinite(rates).all() else None
 
 
 def _level(fmu: FMU, inputs: Variables, rest: Vector, j: int, nominal: Vector) -> float:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,10 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from workbench.case import Case
+from workbench.cosim import Run
 from workbench.observability import (
     FRICTION_PRIOR,
     FRICTIONS,
@@ -20,7 +23,6 @@ from workbench.observability import (
     BrakingPoint,
     LinearTest,
     SensorNoise,
-    StopObservability,
     WindowTest,
 )
 from workbench.report.figures import _STYLE
@@ -28,6 +30,24 @@ from workbench.report.results import _write
 
 _COLOURS = ("#0072B2", "#D55E00")
 _LINES = ("-", "--")
+
+
+@dataclass(frozen=True)
+class StopObservability:
+    """Tests of several models along one recorded stop.
+
+    Attributes
+    ----------
+    case : the recording.
+    run : the estimate that makes the trajectory.
+    braking : (m,) windows that end while braking.
+    tests : one per model, with the same windows.
+    """
+
+    case: Case
+    run: Run
+    braking: NDArray[np.bool_]
+    tests: tuple[WindowTest, ...]
 
 
 def draw_observability(stop: StopObservability, path: Path) -> None:
@@ -117,6 +137,7 @@ def write_observability(
             stop.case.name: {
                 "title": stop.case.title,
                 "braking_windows": int(stop.braking.sum()),
+                "median_muWR": _median_adhesion(stop),
                 "models": {test.model: _shares(test, stop) for test in stop.tests},
             }
             for stop in stops
@@ -139,6 +160,12 @@ def _linear(test: LinearTest) -> dict[str, Any]:
         "unobservable": test.unobservable,
         "invisible": test.invisible,
     }
+
+
+def _median_adhesion(stop: StopObservability) -> float | None:
+    """Friction wheel-rail of the trajectory, on which the bound of dmuWR depends most."""
+    at = np.searchsorted(stop.case.time, stop.tests[0].time[stop.braking])
+    return float(np.median(stop.run.signal("muWR")[at])) if at.size else None
 
 
 def _shares(test: WindowTest, stop: StopObservability) -> dict[str, Any]:
@@ -172,7 +199,7 @@ def format_observability(linear: Sequence[LinearTest], stops: Sequence[StopObser
             remark = f"  {strength}" if name in test.unobservable else ""
             lines.append(f"  {name:<10} scale {scale:8.3g}   left {100 * left:6.2f} %{remark}")
     width = max([len("case"), *(len(stop.case.name) for stop in stops)])
-    header = f"{'case':<{width}}" + "".join(
+    header = f"{'case':<{width}}{'muWR':>7}" + "".join(
         f"{f'{name} < {USEFUL[name]:g}':>16}{'median':>10}" for name in FRICTIONS
     )
     hidden = [n for n in stops[0].tests[-1].states if n not in stops[0].tests[0].states]
@@ -190,10 +217,14 @@ def format_observability(linear: Sequence[LinearTest], stops: Sequence[StopObser
         if frictions["useful"] is None:
             lines.append(f"{row}  no braking")
             continue
+        row += f"{_median_adhesion(stop):>7.2f}"
         for name in FRICTIONS:
             row += f"{100 * frictions['useful'][name]:>14.0f} %"
             row += f"{frictions['median_bound'][name]:>10.2g}"
         row += "".join(f"{100 * states['states_observable'][name]:>9.0f} %" for name in hidden)
         lines.append(row)
-    lines.append("Bounds hold for a right model and constant friction within the window.")
+    lines.append(
+        "Bounds are floors, for a right model at the estimated muWR (median) and friction that is "
+        "constant within\nthe window. An estimate may err by far more where the contact differs."
+    )
     return "\n".join(lines)
