@@ -36,7 +36,8 @@ def run_of(case: Case, **signals: np.ndarray) -> Run:
     estimate = np.full((case.time.size, len(ESTIMATE)), np.nan)
     for name, values in signals.items():
         estimate[:, list(ESTIMATE).index(name)] = values
-    return Run("stop", "test", case.time, estimate, Outcome.OK, "", 0.0)
+    nothing = np.full_like(estimate, np.nan)
+    return Run("stop", "test", case.time, estimate, nothing, nothing[:, 0], Outcome.OK, "", 0.0)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from workbench.commands import add_fmu, add_observability, add_simulate
+from workbench.commands import add_fmu, add_observability, add_rig, add_simulate
 from workbench.errors import InputError
 from workbench.fmu import FMUError
 
@@ -35,6 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_simulate(commands)
     add_observability(commands)
+    add_rig(commands)
     add_fmu(commands)
     return parser
 

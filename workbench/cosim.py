@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.fmu import FMUError, Matrix, Vector
-from workbench.observers import ESTIMATE, Estimator
+from workbench.observers import ESTIMATE, Estimate, Estimator
 
 
 class Outcome(enum.Enum):
@@ -27,7 +27,9 @@ class Run:
     ----------
     case, estimator : names.
     time : (n,) [s].
-    estimate : (n, 6) columns as in ESTIMATE, NaN where not estimated, and after a failure.
+    estimate : (n, 8) columns as in ESTIMATE, NaN where not estimated, and after a failure.
+    sigma : (n, 8) standard deviations, NaN where the method has none.
+    nis : (n,) normalised innovation squared, NaN where the method has none.
     outcome : how it ended.
     message : what the FMU said, empty if nothing.
     seconds : wall time.
@@ -37,6 +39,8 @@ class Run:
     estimator: str
     time: Vector
     estimate: Matrix
+    sigma: Matrix
+    nis: Vector
     outcome: Outcome
     message: str
     seconds: float
@@ -49,25 +53,24 @@ class Run:
 def observe(case: Case, estimator: Estimator) -> Run:
     """Feed a recording to an estimator, sample by sample; a failure is a value of the run."""
     begin = time.perf_counter()
-    estimate = np.full((case.time.size, len(ESTIMATE)), np.nan)
+    blank = np.full((case.time.size, len(ESTIMATE)), np.nan)
+    estimate = Estimate(blank, blank, blank[:, 0])
     outcome, message = Outcome.OK, ""
-    u, y = case.u, case.y
-    force = list(ESTIMATE).index("Fx")
     try:
-        estimate[0] = estimator.init(case.time[0], u[0], y[0])
-        for k in range(1, case.time.size):
-            estimate[k] = estimator.step(case.time[k], u[k], y[k])
-            if not np.isfinite(estimate[k, force]):
-                outcome = Outcome.NOT_FINITE
-                message = f"at t = {case.time[k]:.3f} s"
-                break
-    except (FMUError, np.linalg.LinAlgError) as error:
+        estimate = estimator.run(case.time, case.u, case.y)
+        force = estimate.values[:, list(ESTIMATE).index("Fx")]
+        if (lost := np.flatnonzero(~np.isfinite(force))).size:
+            outcome = Outcome.NOT_FINITE
+            message = f"at t = {case.time[lost[0]]:.3f} s"
+    except FMUError as error:
         outcome, message = Outcome.FMU_FAILED, str(error)
     return Run(
         case=case.name,
         estimator=estimator.name,
         time=case.time,
-        estimate=estimate,
+        estimate=estimate.values,
+        sigma=estimate.sigma,
+        nis=np.asarray(estimate.nis),
         outcome=outcome,
         message=message,
         seconds=time.perf_counter() - begin,

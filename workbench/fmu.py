@@ -240,9 +240,25 @@ class FMU:
     def _checked(self, use: str, *arguments: object) -> None:
         status = self._call[use](self._component, *arguments)
         if status > 1:
-            raise self._refusal(_FUNCTIONS[use][self.version], status)
+            raise self.refusal(_FUNCTIONS[use][self.version], status)
 
-    def _refusal(self, function: str, status: int) -> FMUError:
+    @property
+    def rate_references(self) -> NDArray[np.uint32]:
+        """Value references of the derivatives of the states, (n,)."""
+        return self._rates
+
+    @property
+    def instance_address(self) -> int:
+        """Address of the instance, for compiled loops that call the FMU's functions."""
+        return int(self._component.value or 0)
+
+    def function_address(self, use: str) -> int:
+        """Address of the FMU's function for a use such as "get"; 0 if it has none."""
+        call = self._call.get(use)
+        return int(ctypes.cast(call, ctypes.c_void_p).value or 0) if call else 0
+
+    def refusal(self, function: str, status: int) -> FMUError:
+        """The error for a call that returned `status`, with what the FMU logged."""
         name = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}.get(status, status)
         return FMUError(f"{self.path.name}: {function} returned {name}: {self._logged()}")
 
@@ -276,7 +292,7 @@ class FMU:
             self._instance.exitInitializationMode()
             self._begin()
         except FMICallException as error:
-            raise self._refusal(error.function, error.status) from None
+            raise self.refusal(error.function, error.status) from None
 
     def _begin(self) -> None:
         """Go from initialisation to the mode in which states are set and read."""

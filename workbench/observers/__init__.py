@@ -1,7 +1,7 @@
 """Estimators, stage 3: each turns measured inputs and outputs into an estimate, step by step."""
 
 from workbench.observers.baselines import DirectInversion, OpenLoop
-from workbench.observers.contract import ESTIMATE, Estimator
+from workbench.observers.contract import ESTIMATE, Estimate, Estimator
 from workbench.observers.disturbance import (
     DisturbanceGains,
     DisturbanceObserver,
@@ -9,15 +9,28 @@ from workbench.observers.disturbance import (
     OperatingPoint,
     stationary_gains,
 )
+from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
+from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
+from workbench.observers.suite import Settings, all_estimators, reasoned_settings
 
 __all__ = [
     "ESTIMATE",
     "DirectInversion",
     "DisturbanceGains",
     "DisturbanceObserver",
+    "Estimate",
     "Estimator",
+    "ExtendedKalmanFilter",
+    "FilterNoise",
     "NoiseLevels",
     "OpenLoop",
     "OperatingPoint",
+    "ParameterEstimator",
+    "ParameterGains",
+    "Settings",
+    "UnscentedKalmanFilter",
+    "all_estimators",
+    "pole_placed_gains",
+    "reasoned_settings",
     "stationary_gains",
 ]

@@ -1,32 +1,169 @@
-"""What every estimator does."""
+"""What every estimator does, and what they share."""
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from workbench.fmu import Vector
+import numpy as np
+from numba import njit
+
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.kernel import checked, plant, read, set_inputs, set_states
 
 # Columns of an estimate, with units; NaN where a method does not estimate the quantity.
 ESTIMATE = {
     "omegaW": "rad/s",
     "omegaR": "rad/s",
+    "dmuWR": "1",
+    "dmuDC": "1",
     "muWR": "1",
     "muDC": "1",
     "Fx": "N",
     "slip": "m/s",
 }
+WIDTH = len(ESTIMATE)
+
+INPUTS = ("pB", "tauR", "dmuWR", "dmuDC")
+OUTPUTS = ("Fx", "slip")
+FRICTIONS = ("muWR", "muDC")
+
+# Wheel-rail from very low to dry adhesion (Polach 2005), disc-pad as in Schwarz et al. (2018).
+FRICTION_RANGE = np.array([[0.03, 0.55], [0.10, 0.45]])
+
+# Rolling velocity [m/s] at which feedback is down to half: noise of 0.003 rad/s in omegaR is then
+# a creepage of 0.4 %, as much as a braked wheel has.
+FADING_SPEED = 0.5
 
 
-class Estimator(Protocol):
-    """Feeds on u = [pB, tauR] (Pa, N.m) and y = [omegaW, omegaR] (rad/s), sample by sample."""
+@dataclass(frozen=True)
+class Estimate:
+    """Estimates at one time, (8,), or at all times, (n, 8).
 
-    @property
-    def name(self) -> str:
-        """Key in tables and results."""
-        ...
+    Attributes
+    ----------
+    values : columns as in ESTIMATE.
+    sigma : standard deviations, NaN where the method has none.
+    nis : normalised innovation squared, () or (n,), NaN where the method has none.
+    """
 
-    def init(self, t: float, u: Vector, y: Vector) -> Vector:
-        """Start at time t [s] with the first sample; returns the estimate, (6,) as in ESTIMATE."""
-        ...
+    values: Vector | Matrix
+    sigma: Vector | Matrix
+    nis: Vector | float
 
-    def step(self, t: float, u: Vector, y: Vector) -> Vector:
-        """Advance to time t [s] with the sample taken there; returns the estimate, (6,)."""
-        ...
+
+class Estimator(ABC):
+    """Feeds on u = [pB, tauR] (Pa, N.m) and y = [omegaW, omegaR] (rad/s), sample by sample.
+
+    A method provides `_begin`, which fills its memory, and two compiled functions: `_law` advances
+    by one sample, `_loop` runs the law over a recording.
+
+    Parameters
+    ----------
+    fmu : model with states omegaW, omegaR, inputs as in INPUTS and outputs as in OUTPUTS.
+    """
+
+    name: ClassVar[str]
+    _law: ClassVar[Any]
+    _loop: ClassVar[Any]
+
+    def __init__(self, fmu: FMU) -> None:
+        self.fmu = fmu
+        self._plant = plant(fmu, INPUTS, OUTPUTS)
+        self._order = np.array([fmu.states.index("omegaW"), fmu.states.index("omegaR")])
+        self._nominal = np.array([fmu.defaults[name] for name in FRICTIONS])
+        self._radius = fmu.defaults["rR"]
+        self._t = 0.0
+        self._row = np.empty(2 * WIDTH + 1)
+
+    @abstractmethod
+    def _begin(self, u: Vector, y: Vector) -> None:
+        """Set the memory to the first sample."""
+
+    @abstractmethod
+    def _arguments(self) -> tuple[Any, Any]:
+        """Settings and memory of the law."""
+
+    def _reset(self, u: Vector, y: Vector) -> None:
+        """Start FMU and memory from the first sample."""
+        self.fmu.start({"omegaW": y[0], "omegaR": y[1]})
+        self._plant.u[:] = 0.0
+        self._begin(u, y)
+
+    def init(self, t: float, u: Vector, y: Vector) -> Estimate:
+        """Start at time t [s] with the first sample: measured speeds, nominal friction."""
+        self._t = t
+        self._reset(u, y)
+        settings, memory = self._arguments()
+        self._row[:] = np.nan
+        checked(self._law(self._plant, settings, memory, 0.0, u, y, self._row), self.fmu)
+        return _split(self._row.copy())
+
+    def step(self, t: float, u: Vector, y: Vector) -> Estimate:
+        """Advance to time t [s] with the sample taken there."""
+        settings, memory = self._arguments()
+        h, self._t = t - self._t, t
+        self._row[:] = np.nan
+        checked(self._law(self._plant, settings, memory, h, u, y, self._row), self.fmu)
+        return _split(self._row.copy())
+
+    def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
+        """The same as `init` and `step` over a whole recording, in one compiled loop.
+
+        Parameters
+        ----------
+        time : (n,) [s].
+        u, y : (n, 2) measured inputs and outputs.
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses a call.
+        """
+        rows = np.full((time.size, 2 * WIDTH + 1), np.nan)
+        self._reset(u[0], y[0])
+        settings, memory = self._arguments()
+        inputs, outputs = np.ascontiguousarray(u), np.ascontiguousarray(y)
+        steps = np.diff(time, prepend=time[0])
+        checked(self._loop(self._plant, settings, memory, steps, inputs, outputs, rows), self.fmu)
+        return _split(rows)
+
+
+def _split(rows: Any) -> Estimate:
+    return Estimate(rows[..., :WIDTH], rows[..., WIDTH : 2 * WIDTH], rows[..., -1])
+
+
+@njit(cache=True, inline="always")
+def fading(speed):  # type: ignore[no-untyped-def]
+    """Share of the feedback at a rolling velocity [m/s]: none at rest, all of it at speed."""
+    return speed * speed / (speed * speed + FADING_SPEED**2)
+
+
+@njit(cache=True, inline="always")
+def clip(value, low, high):  # type: ignore[no-untyped-def]
+    """Limit to low..high; a NaN stays."""
+    return min(max(value, low), high)
+
+
+@njit(cache=True, inline="always")
+def measure(plant, u):  # type: ignore[no-untyped-def]
+    """Set the measured inputs, u = [pB, tauR]; returns a status."""
+    plant.u[0], plant.u[1] = u[0], u[1]
+    return set_inputs(plant, 0, 2)
+
+
+@njit(cache=True, inline="always")
+def correct(plant, dmuWR, dmuDC):  # type: ignore[no-untyped-def]
+    """Set the states plant.x and the friction deviations; returns a status."""
+    plant.u[2], plant.u[3] = dmuWR, dmuDC
+    return set_inputs(plant, 2, 2) or set_states(plant)
+
+
+@njit(cache=True, inline="always")
+def report(plant, order, nominal, row):  # type: ignore[no-untyped-def]
+    """Write the estimate that the FMU is at into a row; returns a status."""
+    status = read(plant)
+    row[0], row[1] = plant.x[order[0]], plant.x[order[1]]
+    row[2], row[3] = plant.u[2], plant.u[3]
+    row[4], row[5] = nominal[0] + plant.u[2], nominal[1] + plant.u[3]
+    row[6], row[7] = plant.y[0], plant.y[1]
+    return status

@@ -9,19 +9,25 @@ pace, measured slip is noise).
 """
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
 from workbench.fmu import FMU, Matrix, Vector
-
-# Wheel-rail from very low to dry adhesion (Polach 2005), disc-pad as in Schwarz et al. (2018).
-FRICTION_RANGE = np.array([[0.03, 0.55], [0.10, 0.45]])
-
-# Rolling velocity [m/s] at which feedback is down to half: noise of 0.003 rad/s in omegaR is then
-# a creepage of 0.4 %, as much as a braked wheel has.
-FADING_SPEED = 0.5
+from workbench.kernel import evaluate, linearise, solve
+from workbench.observers.contract import (
+    FRICTION_RANGE,
+    Estimator,
+    clip,
+    correct,
+    fading,
+    measure,
+    report,
+)
 
 
 @dataclass(frozen=True)
@@ -97,7 +103,7 @@ def stationary_gains(
     point = point or OperatingPoint()
     noise = noise or NoiseLevels()
     corrections = fmu.variables(["dmuWR", "dmuDC"])
-    _hold_in_equilibrium(fmu, point)
+    hold_in_equilibrium(fmu, point)
     extended = np.zeros((4, 4))
     order = [fmu.states.index(name) for name in ("omegaW", "omegaR")]
     extended[:2, :2] = fmu.state_jacobian()[np.ix_(order, order)]
@@ -120,7 +126,7 @@ def stationary_gains(
     )
 
 
-def _hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
+def hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
     """Put the FMU where the creep force carries the brake torque at the given speed."""
     radii = fmu.variables(["rW", "rR"])
     inputs = fmu.variables(["pB", "tauR", "dmuWR", "dmuDC"])
@@ -130,7 +136,7 @@ def _hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
     fmu.set(inputs, np.array([point.pressure, 0.0, 0.0, 0.0]))
 
     def acceleration(slip: float) -> float:
-        x = np.empty(2)
+        x = np.zeros(len(fmu.states))
         x[wheelset], x[roller] = (point.speed - slip) / rW, point.speed / rR
         fmu.set_states(x)
         return float(fmu.derivatives()[wheelset])
@@ -139,7 +145,76 @@ def _hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
     acceleration(float(brentq(acceleration, 0.0, 0.2, xtol=1e-9)))
 
 
-class DisturbanceObserver:
+class _Settings(NamedTuple):
+    order: NDArray[np.intp]
+    nominal: Vector
+    low: Vector
+    high: Vector
+    L: Matrix
+    decay: Vector
+    effect: Vector
+    radius: float
+
+
+class _Memory(NamedTuple):
+    z: Vector  # omegaW, omegaR, dmuWR, dmuDC
+    integral: Vector  # of dy
+    system: Matrix
+    change: Matrix
+
+
+@njit(cache=True, inline="always")
+def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """One linearly implicit Euler step of equation (9)."""
+    z, integral, order = memory.z, memory.integral, settings.order
+    system, change = memory.system, memory.change
+    status = measure(plant, u)
+    if h > 0.0:
+        status = status or evaluate(plant)
+        for i in range(2):
+            change[i, 0] = h * plant.dx[order[i]]
+            change[2 + i, 0] = h * settings.decay[i] * z[2 + i]
+        status = status or linearise(plant)
+        fade = fading(settings.radius * y[1])
+        for i in range(4):
+            share = fade
+            if i >= 2:
+                # Authority has the sign of the rotation and vanishes without pressure or slip.
+                effect = plant.jacobian[i, order[0]] / settings.effect[i - 2]
+                share *= clip(effect, -1.0, 1.0)
+            for j in range(2):
+                # The integral at the end of the step is part of the implicit equation.
+                direct, integrated = share * settings.L[i, j], share * settings.L[i, 2 + j]
+                gain = direct + h * integrated
+                change[i, 0] += h * (gain * (y[j] - z[j]) + integrated * integral[j])
+                system[i, j] = h * gain
+                system[i, 2 + j] = 0.0
+                if i < 2:
+                    system[i, j] -= h * plant.jacobian[order[j], order[i]]
+                    system[i, 2 + j] -= h * plant.jacobian[2 + j, order[i]]
+            system[i, i] += 1.0 if i < 2 else 1.0 - h * settings.decay[i - 2]
+        status = status or solve(system, change)
+        if status:
+            return status
+        for i in range(2):
+            z[i] += change[i, 0]
+            integral[i] += h * (y[i] - z[i])
+            z[2 + i] = clip(z[2 + i] + change[2 + i, 0], settings.low[i], settings.high[i])
+        plant.x[order[0]], plant.x[order[1]] = z[0], z[1]
+        status = correct(plant, z[2], z[3])
+    return status or report(plant, order, settings.nominal, row)
+
+
+@njit(cache=True)
+def _loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = _law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class DisturbanceObserver(Estimator):
     """Minimal model with friction deviations as states, corrected by measured speeds.
 
     A row of L that acts on a friction is multiplied by that friction's authority: its effect on
@@ -152,80 +227,34 @@ class DisturbanceObserver:
 
     Parameters
     ----------
-    fmu : model with states omegaW, omegaR, inputs pB, tauR, dmuWR, dmuDC and outputs Fx, slip.
+    fmu : minimal model, with two states.
     gains : see DisturbanceGains.
     """
 
     name = "disturbance_observer"
+    _law = staticmethod(_law)
+    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, gains: DisturbanceGains) -> None:
-        self._fmu = fmu
-        self._gains = gains
-        self._inputs = fmu.variables(["pB", "tauR", "dmuWR", "dmuDC"])
-        self._corrections = fmu.variables(["dmuWR", "dmuDC"])
-        self._outputs = fmu.variables(["Fx", "slip"])
-        self._order = [fmu.states.index(name) for name in ("omegaW", "omegaR")]
-        self._nominal = np.zeros(2)
-        self._roller_radius = fmu.defaults["rR"]
-        self._t = 0.0
-        # omegaW, omegaR, dmuWR, dmuDC, then the integrals of dy.
-        self._z = np.zeros(6)
-
-    def init(self, t: float, u: Vector, y: Vector) -> Vector:
-        """Start from measured speeds and nominal friction."""
-        self._fmu.start({"omegaW": y[0], "omegaR": y[1]})
-        self._nominal = self._fmu.get(self._fmu.variables(["muWR", "muDC"])).copy()
-        self._t = t
-        self._z[:] = 0.0
-        self._z[:2] = y
-        return self._estimate(u)
-
-    def step(self, t: float, u: Vector, y: Vector) -> Vector:
-        """One linearly implicit Euler step of equation (9) to time t."""
-        h = t - self._t
-        self._t = t
-        z = self._z
-        decay = np.array([self._gains.T_WR, self._gains.T_DC])
-        innovation = y - z[:2]
-
-        self._inject(u)
-        A = self._fmu.state_jacobian()[np.ix_(self._order, self._order)]
-        B = self._fmu.input_jacobian(self._corrections)[self._order]
-        L = self._scaled_gains(B[0], self._roller_radius * y[1])
-
-        rates = np.empty(6)
-        rates[:2] = self._fmu.derivatives()[self._order]
-        rates[2:4] = decay * z[2:4]
-        rates[:4] += L @ np.concatenate([innovation, z[4:]])
-        rates[4:] = innovation
-
-        jacobian = np.zeros((6, 6))
-        jacobian[:2, :2] = A
-        jacobian[:2, 2:4] = B
-        jacobian[[2, 3], [2, 3]] = decay
-        jacobian[:4, :2] -= L[:, :2]
-        jacobian[:4, 4:] = L[:, 2:]
-        jacobian[[4, 5], [0, 1]] = -1.0
-
-        z += np.linalg.solve(np.eye(6) - h * jacobian, h * rates)
+        super().__init__(fmu)
         low, high = (FRICTION_RANGE - self._nominal[:, None]).T
-        z[2:4] = np.clip(z[2:4], low, high)
-        return self._estimate(u)
+        decay = np.array([gains.T_WR, gains.T_DC])
+        self._settings = _Settings(
+            order=self._order,
+            nominal=self._nominal,
+            low=np.ascontiguousarray(low),
+            high=np.ascontiguousarray(high),
+            L=np.ascontiguousarray(gains.L),
+            decay=decay,
+            effect=np.ascontiguousarray(gains.effect),
+            radius=self._radius,
+        )
+        self._memory = _Memory(np.zeros(4), np.zeros(2), np.zeros((4, 4)), np.zeros((4, 1)))
 
-    def _scaled_gains(self, effect: Vector, speed: float) -> Matrix:
-        """L with the authority of the frictions, faded out towards standstill; (4, 4)."""
-        authority = np.clip(effect / self._gains.effect, -1.0, 1.0)
-        fading = speed**2 / (speed**2 + FADING_SPEED**2)
-        return self._gains.L * (fading * np.array([1.0, 1.0, *authority]))[:, None]
+    def _arguments(self) -> tuple[Any, Any]:
+        return self._settings, self._memory
 
-    def _inject(self, u: Vector) -> None:
-        """Set states, measured inputs and friction deviations of the FMU."""
-        x = np.empty(2)
-        x[self._order] = self._z[:2]
-        self._fmu.set_states(x)
-        self._fmu.set(self._inputs, np.concatenate([u, self._z[2:4]]))
-
-    def _estimate(self, u: Vector) -> Vector:
-        self._inject(u)
-        friction = self._nominal + self._z[2:4]
-        return np.concatenate([self._z[:2], friction, self._fmu.get(self._outputs)])
+    def _begin(self, u: Vector, y: Vector) -> None:
+        self._memory.z[:] = [y[0], y[1], 0.0, 0.0]
+        self._memory.integral[:] = 0.0
+        self._plant.x[self._order] = y

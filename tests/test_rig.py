@@ -1,0 +1,442 @@
+"""The virtual rig: stops, physics, sensors and files, against balances and the data sheet."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from workbench.__main__ import main
+from workbench.case import read_case, read_cases
+from workbench.errors import InputError
+from workbench.rig import (
+    CONSTANT_PADS,
+    ORDINARY_PADS,
+    SCENARIOS,
+    STANDARD,
+    Effects,
+    Stop,
+    check_files,
+    measure,
+    plant,
+    select,
+    simulate,
+)
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
+SEED = 1
+TRAIN_INERTIA, ROLLER_INERTIA, WHEELSET_INERTIA = 7840.0, 1500.0, 110.0  # kg.m2, data sheet
+ROLLER_RADIUS, BRAKE_RADIUS = 0.70, 0.30  # m, data sheet
+
+
+@cache
+def make(name: str, effects: Effects = ORDINARY_PADS) -> Stop:
+    return simulate(SCENARIOS[name], SEED, effects, REFERENCE)
+
+
+def braking_time(stop: Stop) -> float:
+    return stop.standstill - stop.drawn.coasting
+
+
+def normal_force(stop: Stop) -> np.ndarray:
+    """Of one brake unit [N], data sheet."""
+    return 0.1086 * np.maximum(0.0, stop.truth["pads"] - 25e3)
+
+
+def friction_power(stop: Stop, disc: int) -> np.ndarray:
+    """Of one disc [W], from the law of the data sheet."""
+    force = stop.truth[f"muDC{disc}"] * normal_force(stop)
+    return force * BRAKE_RADIUS * abs(stop.truth["omegaW"])
+
+
+# --- stops ---
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"),
+    [
+        ("01_dry_80_1.5", 40.0),
+        ("02_dry_100_2.7", 27.6),
+        ("03_dry_120_3.6", 25.5),
+        ("04_dry_160_4.2", 30.9),
+        ("05_dry_120_2.7_rev", 33.9),
+        ("06_dry_160_3.6_rev", 35.9),
+        ("07_wet_80_1.5", 48.2),
+        ("08_wet_120_3.6", 27.3),
+        ("09_wet_160_4.2_wsp", 32.5),
+        ("10_wet_100_2.7_rev", 30.8),
+        ("11_brakewet_120_2.7_rev", 36.4),
+        ("12_brakewet_160_4.2", 31.9),
+        ("13_onedisc_100_2.7", 28.7),
+        ("14_twodiscs_160_3.6_rev", 36.7),
+    ],
+)
+def test_standard_stop_takes_the_time_of_a_two_mass_calculation(name: str, seconds: float) -> None:
+    """Reference: independent calculation with the same laws of brake and pads, no tolerances.
+
+    The pads' level is drawn for each stop (2 %); time after filling (1.1 s) goes with its inverse.
+    5 % is what the multibody model may differ by.
+    """
+    stop = make(name)
+    nominal = 1.1 + (braking_time(stop) - 1.1) * stop.drawn.muDC
+    assert nominal == pytest.approx(seconds, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["04_dry_160_4.2", "07_wet_80_1.5", "09_wet_160_4.2_wsp"])
+def test_kinetic_energy_of_the_train_becomes_heat(name: str) -> None:
+    """Discs, contact and bearings take all; the drive gives back what the roller loses."""
+    stop = make(name)
+    stopping = (stop.time >= 0.0) & (stop.time <= stop.standstill)
+    truth = {signal: values[stopping] for signal, values in stop.truth.items()}
+    discs = sum(friction_power(stop, disc)[stopping] for disc in (1, 2, 3))
+    contact = truth["Fx"] * truth["slip"]
+    omega = abs(truth["omegaW"])
+    bearings = (25.0 + 0.6 * omega + 0.004 * omega**2) * omega
+    heat = np.trapezoid(discs + contact + bearings, dx=1e-3)
+    # The drive takes the roller for nominal: what its inertia has more, the train has more.
+    train = TRAIN_INERTIA + ROLLER_INERTIA * (stop.drawn.JR - 1.0)
+    wheelset = WHEELSET_INERTIA * stop.drawn.JW
+    kinetic = 0.5 * (train * truth["omegaR"][0] ** 2 + wheelset * omega[0] ** 2)
+    # The drive's lag of 8 ms costs the train 30 kJ of 16 MJ while the force builds up, 2e-3;
+    # dampers and the motion of the pads take less than 1e-3.
+    assert heat == pytest.approx(kinetic, rel=3e-3)
+
+
+def test_drive_imitates_the_inertia_of_the_train() -> None:
+    """Momentum that the contact takes from the roller, from coasting to 1 m/s."""
+    stop = make("14_twodiscs_160_3.6_rev")
+    omega = stop.truth["omegaR"]
+    begin = int(np.searchsorted(stop.time, 0.0))
+    end = int(np.flatnonzero(abs(omega) * ROLLER_RADIUS > 1.0)[-1])
+    impulse = ROLLER_RADIUS * np.trapezoid(stop.truth["Fx"][begin:end], dx=1e-3)
+    # The drive's lag of 8 ms holds back 1.2e-3 of the impulse, and three sigma of the roller's
+    # inertia are 1.1e-3 of the train's.
+    assert -impulse / (omega[end] - omega[begin]) == pytest.approx(TRAIN_INERTIA, rel=2.5e-3)
+
+
+def test_patch_of_low_adhesion_makes_the_wheel_slide_and_recover() -> None:
+    stop = make("09_wet_160_4.2_wsp")
+    t = stop.time - stop.drawn.coasting
+    slip = stop.truth["slip"] / (ROLLER_RADIUS * abs(stop.truth["omegaR"]))
+    force, pressure = stop.truth["Fx"], stop.truth["pB"]
+    before = float(np.interp(7.9, t, force))
+    assert slip[t < 8.0].max() < 0.02  # Polach's wet contact carries the stop at 1 .. 1.5 % slip
+    assert slip[(t > 8.0) & (t < 9.6)].max() >= 0.08
+    assert force[(t > 8.0) & (t < 9.5)].min() < 0.5 * before  # 20 -> 9 kN in the paper's case
+    assert pressure[(t > 8.0) & (t < 10.0)].min() < 0.5 * pressure[t < 8.0].max()
+    assert slip[(t > 10.0) & (t < 12.0)].max() < 0.02
+    assert float(np.interp(12.0, t, force)) > before
+
+
+@pytest.mark.parametrize("name", [name for name in STANDARD if not name.endswith("wsp")])
+def test_protection_leaves_a_wheel_alone_that_does_not_slide(name: str) -> None:
+    """Without intervention the pressure only rises until standstill."""
+    stop = make(name)
+    assert (np.diff(stop.truth["pB"][stop.time < stop.standstill]) >= 0.0).all()
+
+
+def test_wheel_locks_and_stays_locked_without_protection() -> None:
+    stop = make("15_locked_wheel")
+    t = stop.time - stop.drawn.coasting
+    locked = (t > 3.0) & (abs(stop.truth["omegaR"]) * ROLLER_RADIUS > 1.0)
+    # 0.05 rad/s is where the model smooths the friction of a standing disc.
+    assert abs(stop.truth["omegaW"][locked]).max() < 0.05
+    assert stop.truth["omegaR"][locked].max() * ROLLER_RADIUS > 20.0
+    assert braking_time(stop) > 40.0  # a full brake with grip takes 19 s
+
+
+def test_wet_disc_dries_with_energy_not_with_time() -> None:
+    low, high = make("07_wet_80_1.5"), make("08_wet_120_3.6")
+    grid = np.linspace(0.05e6, 1.0e6, 50)  # J on disc 2
+    films = []
+    for stop in (low, high):
+        energy = np.cumsum(friction_power(stop, 2)) * 1e-3
+        films.append(np.interp(grid, energy, stop.truth["film2"]))
+    # The model's pads move with the frame, this calculation's do not: some 1e-3 of the energy.
+    assert films[0] == pytest.approx(films[1], abs=2e-3)
+    assert films[0] == pytest.approx(np.exp(-grid / 0.45e6), abs=2e-3)
+    later = [
+        float(np.interp(s.drawn.coasting + 6.0, s.time, s.truth["film2"])) for s in (low, high)
+    ]
+    assert later[0] > 2.0 * later[1]
+
+
+def test_only_the_wet_disc_has_less_friction_and_stays_cooler() -> None:
+    stop = make("13_onedisc_100_2.7")
+    early = np.searchsorted(stop.time, stop.drawn.coasting + 1.5)
+    assert stop.truth["muDC2"][early] < 0.6 * stop.truth["muDC1"][early]
+    assert stop.truth["temperature2"][-1] < stop.truth["temperature1"][-1] - 5.0
+
+
+# --- effects ---
+
+
+def test_constant_pads_have_the_nominal_friction() -> None:
+    stop = make("02_dry_100_2.7", CONSTANT_PADS)
+    assert stop.truth["muDC2"] == pytest.approx(0.30 * stop.drawn.muDC, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("effect", "gain", "channels"),
+    [
+        ("torque_gain", 0.02, {"tauR"}),
+        ("fx_gain", 0.015, {"Fx"}),
+        ("fx_offset", 120.0, {"Fx"}),
+        ("speed_delay", 0.008, {"omegaW"}),
+        ("pole_ring", 0.002, {"omegaW"}),
+        ("time_skew", 0.020, {"omegaW", "omegaR"}),
+        ("pressure_offset", 2000.0, {"pB"}),
+    ],
+)
+def test_effect_of_a_sensor_shows_in_its_channels_alone(
+    effect: str, gain: float, channels: set[str]
+) -> None:
+    stop = make("02_dry_100_2.7")
+    time = stop.time[stop.time >= 0.0][::5]
+    without = measure(stop, ORDINARY_PADS, time)
+    planted = measure(stop, plant(ORDINARY_PADS, [f"{effect}={gain}"]), time)
+    changed = {name for name in without if not np.array_equal(without[name], planted[name])}
+    assert changed == channels
+
+
+@pytest.mark.parametrize(
+    ("effect", "gain"),
+    [
+        ("speed_friction", 0.1),
+        ("fade", 3e-4),
+        ("pressure_exponent", 0.03),
+        ("bedding_in", 0.08),
+        ("cylinder_lag", 0.03),
+        ("return_spring", 7e3),
+        ("wheel_radius", -0.0015),
+        ("wheel_load", 0.1),
+        ("wheelset_losses", 1.0),
+        ("roller_losses", 1.0),
+        ("wheel_inertia", 0.3),
+    ],
+)
+def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -> None:
+    nominal = make("03_dry_120_3.6", CONSTANT_PADS)
+    planted = simulate(
+        SCENARIOS["03_dry_120_3.6"], SEED, plant(CONSTANT_PADS, [f"{effect}={gain}"]), REFERENCE
+    )
+    assert planted.drawn == nominal.drawn
+    n = int(np.searchsorted(nominal.time, nominal.drawn.coasting + 5.0))
+    # The simulation repeats to the bit, so any difference is the effect's.
+    assert not np.array_equal(planted.truth["slip"][:n], nominal.truth["slip"][:n])
+
+
+def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
+    stop = make("04_dry_160_4.2")
+    time = stop.time[stop.time >= 0.0][::5]
+    measured = measure(stop, plant(ORDINARY_PADS, ["fx_gain=0.015"]), time)["Fx"]
+    cell = stop.at(time, "Fcell")
+    slope = cell @ measured / (cell @ cell)
+    # Four sigma of the noise of 80 N over the record: 2e-4.
+    assert slope == pytest.approx(1.015, abs=4.0 * 80.0 / np.sqrt(cell @ cell))
+
+
+def test_wheel_radius_shows_as_the_ratio_of_speeds_in_coasting() -> None:
+    stop = make("03_dry_120_3.6", plant(ORDINARY_PADS, ["wheel_radius=-0.0015"]))
+    coasting = (stop.time > 0.0) & (stop.time < stop.drawn.coasting)
+    ratio = stop.truth["omegaW"][coasting] / stop.truth["omegaR"][coasting]
+    # The drag of 260 N takes 2e-5 of slip.
+    assert ratio == pytest.approx(ROLLER_RADIUS / 0.4585, rel=3e-5)
+
+
+def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back() -> None:
+    """The drive knows the nominal losses: the other half slows the train."""
+    stop = make("04_dry_160_4.2", plant(ORDINARY_PADS, ["roller_losses=1"]))
+    coasting = (stop.time > 0.5) & (stop.time < stop.drawn.coasting)
+    omega, time = stop.truth["omegaR"][coasting], stop.time[coasting]
+    deceleration = -(omega[-1] - omega[0]) / (time[-1] - time[0])
+    mean = omega.mean()
+    loss = 40.0 + mean + 0.02 * mean**2
+    drag = ROLLER_RADIUS * stop.truth["Fx"][coasting].mean()
+    # JR's tolerance is 1e-3 of the train; the ripple of 1.6 N.m makes 5e-3 of 360 N.m.
+    assert TRAIN_INERTIA * deceleration == pytest.approx(loss + drag, rel=1e-2)
+
+
+# --- sensors ---
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "noise", "relative", "resolution"),
+    [
+        ("pB", "pB", 500.0, 0.0, 240.0),
+        ("tauR", "tauR", 40.0, 0.0, 5.0),
+        ("omegaW", "omegaW", 0.002, 3e-4, 1e-4),
+        ("omegaR", "omegaR", 0.003, 0.0, 1e-3),
+        ("Fx", "Fcell", 80.0, 0.0, 10.0),
+    ],
+)
+def test_sensor_has_the_white_noise_of_the_data_sheet(
+    name: str, signal: str, noise: float, relative: float, resolution: float
+) -> None:
+    stop = make("04_dry_160_4.2")
+    time = stop.time[stop.time >= 0.0][::5]
+    truth = stop.at(time, signal)
+    error = measure(stop, ORDINARY_PADS, time)[name] - truth
+    # Rounding adds a variance of resolution^2/12.
+    scaled = error / np.hypot(noise + relative * abs(truth), resolution / np.sqrt(12.0))
+    n = scaled.size
+    # Four sigma of the estimates, by the law of large numbers: 1 in 16000 draws falls outside.
+    assert scaled.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
+    assert scaled.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * n))
+    assert scaled[1:] @ scaled[:-1] / n == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
+
+
+def test_load_cell_rings_with_the_structure_when_the_patch_begins() -> None:
+    """Between contact force and load cell lies the longitudinal mode of 21.6 Hz."""
+    stop = make("09_wet_160_4.2_wsp")
+    begin = int(np.searchsorted(stop.time, stop.drawn.coasting + 8.0))
+    ringing = (stop.truth["Fcell"] - stop.truth["Fx"])[begin : begin + 500]
+    spectrum = abs(np.fft.rfft(ringing * np.hanning(500), 8192))
+    frequency = np.fft.rfftfreq(8192, 1e-3)[spectrum.argmax()]
+    # Half a second resolves 2 Hz; the braked wheelset shifts the mode by as much.
+    assert frequency == pytest.approx(21.6, abs=4.0)
+    assert np.ptp(ringing) > 1e3
+
+
+# --- files and command line ---
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("rig")
+    assert main(arguments(out, "--workers", "2")) == 0
+    return out
+
+
+def arguments(out: Path, *more: str) -> list[str]:
+    cases = ["--case", "03_dry_120_3.6", "--case", "10_wet_100_2.7_rev"]
+    return ["rig", *cases, "--fmu", str(REFERENCE), "--out", str(out), *more]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_same_seed_gives_the_same_bytes_with_any_number_of_workers(
+    recordings: Path, tmp_path: Path
+) -> None:
+    assert main(arguments(tmp_path, "--workers", "1")) == 0
+    assert len(files(tmp_path)) == 8
+    assert files(tmp_path) == files(recordings)
+
+
+def test_a_case_does_not_depend_on_which_others_are_made(recordings: Path, tmp_path: Path) -> None:
+    alone = ["rig", "--case", "10_wet_100_2.7_rev", "--fmu", str(REFERENCE)]
+    assert main([*alone, "--out", str(tmp_path)]) == 0
+    name = "10_wet_100_2.7_rev/measured.csv"
+    assert files(tmp_path)[name] == files(recordings)[name]
+
+
+def test_another_seed_gives_another_stop() -> None:
+    name = "03_dry_120_3.6"
+    stops = [make(name), simulate(SCENARIOS[name], SEED + 1, ORDINARY_PADS, REFERENCE)]
+    assert stops[0].drawn.muDC != stops[1].drawn.muDC
+    noise = [measure(s, ORDINARY_PADS, s.time[1000:1100])["pB"] for s in stops]
+    assert not np.array_equal(noise[0], noise[1])
+
+
+def test_recordings_are_cases_with_their_conditions(recordings: Path) -> None:
+    for case in read_cases([recordings]):
+        wanted = SCENARIOS[case.name].conditions
+        assert case.title == SCENARIOS[case.name].title
+        # Speed and pressure are written in km/h and bar; rounding is 1e-16.
+        assert case.conditions.initial_speed == pytest.approx(wanted.initial_speed, rel=1e-12)
+        assert case.conditions.brake_pressure == pytest.approx(wanted.brake_pressure, rel=1e-12)
+        assert case.conditions.wheel_rail == wanted.wheel_rail
+        assert case.conditions.discs == wanted.discs
+        made = json.loads((recordings / case.name / "truth.json").read_text())
+        assert np.diff(case.time) == pytest.approx(0.005)
+        assert 3.0 <= made["demand"] <= 5.0
+        # Two seconds of standstill, to a sample.
+        assert case.time[-1] - made["standstill"] == pytest.approx(2.0, abs=0.006)
+        # Five sigma of the relative noise, and what drag takes in coasting and running in.
+        speed = abs(case.omegaR[0]) * ROLLER_RADIUS
+        assert speed == pytest.approx(case.conditions.initial_speed, rel=2e-3)
+        assert np.sign(case.omegaW[0]) == case.conditions.direction == wanted.direction
+        assert case.Fx is not None
+
+
+def test_truth_stands_in_files_of_its_own(recordings: Path) -> None:
+    folder = recordings / "10_wet_100_2.7_rev"
+    truth = pd.read_csv(folder / "truth.csv")
+    case = read_case(folder)
+    assert np.array_equal(truth["time [s]"], case.time)
+    assert truth["film2 [1]"].iloc[0] == 1.0
+    assert truth["film2 [1]"].iloc[-1] < 0.1
+    made = json.loads((folder / "truth.json").read_text())
+    assert made["seed"] == 1
+    assert made["effects"] == {"speed_friction": 0.2, "fade": 4e-4, "pressure_exponent": 0.04}
+    assert set(made["drawn"]) == {"JW", "JR", "Fz", "muDC", "muWR", "coasting"}
+
+
+def test_scenarios_are_named_with_or_without_number() -> None:
+    assert [s.name for s in select([])] == list(STANDARD)
+    assert [s.name for s in select(["locked_wheel"])] == ["15_locked_wheel"]
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        (["--case", "locked_weel"], r"closest: '15_locked_wheel'"),
+        (["--effect", "fade_=1"], r"closest: 'fade'"),
+        (["--effect", "fade"], r"found ''"),
+        (["--effect", "fade=nan"], r"a number in \[1/K\]"),
+        (["--effect", "cylinder_lag=-1"], r"0 or more"),
+        (["--effect", "fade=1", "--effect", "fade=2"], r"second gain"),
+        (["--rate", "300"], r"divisor of 1000"),
+        (["--fmu", "missing.fmu"], r"missing\.fmu"),
+        (["--fmu", str(ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu")], r"no variable"),
+    ],
+)
+def test_a_users_mistake_gives_status_2_and_a_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], match: str
+) -> None:
+    command = ["rig", "--fmu", str(REFERENCE), "--out", str(tmp_path / "out"), *options]
+    assert main(command) == 2
+    message = capsys.readouterr().err
+    assert re.search(match, message), message
+    assert "expected" in message
+
+
+def test_a_measured_recording_is_never_overwritten(tmp_path: Path) -> None:
+    folder = tmp_path / "01_dry_80_1.5"
+    folder.mkdir()
+    (folder / "measured.csv").write_text("measured")
+    with pytest.raises(InputError, match="did not make"):
+        check_files([folder], 200)
+
+
+def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "workbench", "rig", "--workers", "1", "--out", str(tmp_path)]
+    process = subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    first = process.stdout.readline()
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
+    rest, errors = process.communicate(timeout=30)
+    assert first.startswith("[  1/14]")
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    kept = read_cases([tmp_path])
+    assert 1 <= len(kept) < 14
+    assert f"{len(kept)} of 14 cases" in rest
+    assert not list(tmp_path.rglob("*.part"))

@@ -1,0 +1,171 @@
+"""`workbench rig`: recordings from the virtual rig."""
+
+import argparse
+import dataclasses
+import os
+import signal
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+from workbench.commands.arguments import Commands, positive
+from workbench.fmu import CoSimulation
+from workbench.rig import (
+    CONSTANT_PADS,
+    ORDINARY_PADS,
+    SCENARIOS,
+    STANDARD,
+    Effects,
+    Scenario,
+    check_files,
+    plant,
+    select,
+    simulate,
+    write_recording,
+)
+
+_REFERENCE = Path("fmus/fmi2/Reference.fmu")
+
+
+def add_rig(commands: Commands) -> None:
+    """Add the command to the parser."""
+    rig = commands.add_parser(
+        "rig",
+        help="make recordings on a virtual rig",
+        description="Make recordings by co-simulation of the multibody model with drive, brake, "
+        "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
+        "truth.json, which no estimator reads. The same seed gives the same bytes.",
+        epilog=_epilog(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    rig.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="where to write the case folders"
+    )
+    rig.add_argument(
+        "--case",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="scenario, may be repeated (default: the fourteen standard ones)",
+    )
+    rig.add_argument(
+        "--seed",
+        type=_seed,
+        default=1,
+        metavar="N",
+        help="of tolerances and noise (default: %(default)s)",
+    )
+    rig.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="plant an effect, or change one of the pads; may be repeated",
+    )
+    rig.add_argument(
+        "--pads",
+        choices=("ordinary", "constant"),
+        default="ordinary",
+        help="friction of dry pads: with speed, temperature and force, or constant as in the "
+        "nominal model (default: %(default)s)",
+    )
+    rig.add_argument(
+        "--rate",
+        type=positive,
+        default=200,
+        metavar="HZ",
+        help="of the recording, a divisor of 1000 (default: %(default)s)",
+    )
+    rig.add_argument(
+        "--fmu",
+        type=Path,
+        default=_REFERENCE,
+        metavar="FILE",
+        help="multibody model, with Co-Simulation (default: %(default)s)",
+    )
+    rig.add_argument(
+        "--workers",
+        type=positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: one per processor, %(default)s)",
+    )
+    rig.set_defaults(run=_rig)
+
+
+def _epilog() -> str:
+    effects = "\n".join(
+        f"  {field.name:<17} [{field.metadata['unit']}]".ljust(27) + field.metadata["text"]
+        for field in dataclasses.fields(Effects)
+    )
+    pads = ", ".join(
+        f"{name}={gain:g}" for name, gain in dataclasses.asdict(ORDINARY_PADS).items() if gain
+    )
+    scenarios = "\n".join(f"  {name:<26} {scenario.title}" for name, scenario in SCENARIOS.items())
+    return f"""\
+examples:
+  python -m workbench rig --out /tmp/rig
+  python -m workbench rig --case locked_wheel --out /tmp/rig
+  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig
+
+scenarios, of which the first {len(STANDARD)} are standard:
+{scenarios}
+
+effects, zero if not given:
+{effects}
+  Ordinary pads have {pads}."""
+
+
+def _seed(text: str) -> int:
+    """Type of an argument that is a whole number of 0 or more."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{value} is below 0")
+    return value
+
+
+def _rig(options: argparse.Namespace) -> int:
+    scenarios = select(options.case)
+    pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
+    effects = plant(pads, options.effect)
+    folders = {scenario.name: options.out / scenario.name for scenario in scenarios}
+    check_files(folders.values(), options.rate)
+    with CoSimulation(options.fmu):
+        pass  # a file that is no FMU is refused here, once
+    begin = time.perf_counter()
+    done = 0
+    interrupted = False
+    # Workers leave Ctrl-C to this process: a stop that is under way is finished and kept.
+    ignore = (signal.SIGINT, signal.SIG_IGN)
+    workers = min(options.workers, len(scenarios))
+    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignore) as pool:
+        tasks = [
+            pool.submit(_make, s, effects, options.seed, options.rate, options.fmu, folders[s.name])
+            for s in scenarios
+        ]
+        try:
+            for task in as_completed(tasks):
+                line = task.result()
+                done += 1
+                elapsed = time.perf_counter() - begin
+                left = elapsed / done * (len(tasks) - done)
+                print(
+                    f"[{done:>3}/{len(tasks)}] {line}  {elapsed:5.1f} s, about {left:.0f} s left",
+                    flush=True,
+                )
+        except KeyboardInterrupt:
+            interrupted = True
+            pool.shutdown(cancel_futures=True)
+    kept = sum(task.done() and not task.cancelled() for task in tasks)
+    print(f"{kept} of {len(tasks)} cases in {options.out}")
+    return 130 if interrupted else 0
+
+
+def _make(
+    scenario: Scenario, effects: Effects, seed: int, rate: int, fmu: Path, folder: Path
+) -> str:
+    """Make and write one case, in a process of its own; returns a line for people."""
+    stop = simulate(scenario, seed, effects, fmu)
+    write_recording(stop, effects, rate, folder)
+    seconds = stop.standstill - stop.drawn.coasting
+    return f"{scenario.name:<26} stopped in {seconds:5.1f} s"

@@ -1,0 +1,292 @@
+"""The hot loop's view of an FMU: its own C functions, called from compiled Python.
+
+numba compiles the laws of the observers once; which FMU they run on is an argument, a `Plant` with
+the addresses of the FMU's functions, so that another FMU needs no compilation. Everything here may
+also be called from ordinary Python.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import platformdirs
+from numba import njit, types
+from numba.core.types import WrapperAddressProtocol
+from numba.experimental import function_type as _first_class_functions  # noqa: F401  registers them
+from numpy.typing import NDArray
+
+from workbench.fmu import FMU, FMUError, Matrix, Vector
+
+
+def _cache_folder() -> str:
+    """Folder of compiled code, one for each state of the sources.
+
+    numba renews a compiled function when its own file changes, not when one that it calls does.
+    """
+    here = Path(__file__).parent
+    sources = [Path(__file__), *sorted((here / "observers").glob("*.py"))]
+    digest = hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
+    return str(Path(platformdirs.user_cache_dir("wheelset-workbench")) / digest[:16])
+
+
+numba.config.CACHE_DIR = _cache_folder()
+
+_WORD = types.intp
+_ARRAY_CALL = types.int32(_WORD, _WORD, _WORD)
+_REAL_CALL = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD)
+_DIRECTIONAL_2 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
+_DIRECTIONAL_3 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
+
+OK, REFUSED, SINGULAR = 0, 1, 2
+
+
+class _Function(WrapperAddressProtocol):  # type: ignore[misc]
+    """A C function as numba takes it: address and signature."""
+
+    def __init__(self, address: int, signature: Any) -> None:
+        self._address = address
+        self._signature = signature
+
+    def __wrapper_address__(self) -> int:
+        return self._address
+
+    def signature(self) -> Any:
+        return self._signature
+
+
+class Plant(NamedTuple):
+    """One FMU instance, its functions and the buffers they read and write.
+
+    Attributes
+    ----------
+    instance : address of the FMU instance.
+    set_states, derivatives, set_real, get_real : functions of the FMU. FMI 2.0 takes no length of
+        values in set_real and get_real; the register it would be in is not read.
+    directional_2, directional_3 : directional derivatives; only that of `fmi` is called.
+    fmi : 2 or 3 with directional derivatives, 0 for differences.
+    x, dx : (n,) states and their derivatives.
+    u, y : (m,) inputs, (l,) outputs.
+    jacobian : (n + 2, n + l) derivatives of [dx; y] (columns) by [x; last two inputs] (rows).
+    seed : (1,) one.
+    *_at : addresses of the buffers and of the value references.
+    keep : what must live as long as the addresses.
+    """
+
+    instance: int
+    set_states: Any
+    derivatives: Any
+    set_real: Any
+    get_real: Any
+    directional_2: Any
+    directional_3: Any
+    fmi: int
+    x: Vector
+    dx: Vector
+    u: Vector
+    y: Vector
+    jacobian: Matrix
+    seed: Vector
+    x_at: int
+    dx_at: int
+    u_at: int
+    y_at: int
+    jacobian_at: int
+    seed_at: int
+    inputs_at: int
+    outputs_at: int
+    unknowns_at: int
+    knowns_at: int
+    keep: tuple[NDArray[np.uint32], ...]
+
+
+def plant(fmu: FMU, inputs: Sequence[str], outputs: Sequence[str]) -> Plant:
+    """Prepare an FMU for compiled loops; the FMU must outlive the result.
+
+    Parameters
+    ----------
+    inputs : measured inputs, then the two friction corrections.
+    outputs : what estimates are made of.
+    """
+    n, m, k = len(fmu.states), len(inputs), len(outputs)
+    references = {
+        "inputs": fmu.variables(inputs).references,
+        "outputs": fmu.variables(outputs).references,
+        "unknowns": np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
+        "knowns": fmu.variables([*fmu.states, *inputs[-2:]]).references,
+    }
+    x, dx, u, y = np.zeros(n), np.zeros(n), np.zeros(m), np.zeros(k)
+    jacobian, seed = np.zeros((n + 2, n + k)), np.ones(1)
+    version = int(fmu.version[0]) if fmu.has_directional_derivatives else 0
+    directional = fmu.function_address("directional")
+    return Plant(
+        instance=fmu.instance_address,
+        set_states=_Function(fmu.function_address("set_states"), _ARRAY_CALL),
+        derivatives=_Function(fmu.function_address("derivatives"), _ARRAY_CALL),
+        set_real=_Function(fmu.function_address("set"), _REAL_CALL),
+        get_real=_Function(fmu.function_address("get"), _REAL_CALL),
+        directional_2=_Function(directional, _DIRECTIONAL_2),
+        directional_3=_Function(directional, _DIRECTIONAL_3),
+        fmi=version,
+        x=x,
+        dx=dx,
+        u=u,
+        y=y,
+        jacobian=jacobian,
+        seed=seed,
+        x_at=x.ctypes.data,
+        dx_at=dx.ctypes.data,
+        u_at=u.ctypes.data,
+        y_at=y.ctypes.data,
+        jacobian_at=jacobian.ctypes.data,
+        seed_at=seed.ctypes.data,
+        inputs_at=references["inputs"].ctypes.data,
+        outputs_at=references["outputs"].ctypes.data,
+        unknowns_at=references["unknowns"].ctypes.data,
+        knowns_at=references["knowns"].ctypes.data,
+        keep=tuple(references.values()),
+    )
+
+
+@njit(cache=True, inline="always")
+def set_inputs(plant, first, count):  # type: ignore[no-untyped-def]
+    """Set `count` inputs from number `first` on to plant.u; returns a status."""
+    references, values = plant.inputs_at + 4 * first, plant.u_at + 8 * first
+    status = plant.set_real(plant.instance, references, count, values, count)
+    return REFUSED if status > 1 else OK
+
+
+@njit(cache=True, inline="always")
+def set_states(plant):  # type: ignore[no-untyped-def]
+    """Set the states to plant.x; returns a status."""
+    n = plant.x.size
+    return REFUSED if n and plant.set_states(plant.instance, plant.x_at, n) > 1 else OK
+
+
+@njit(cache=True, inline="always")
+def place(plant):  # type: ignore[no-untyped-def]
+    """Put the FMU at the states plant.x and the inputs plant.u; returns a status."""
+    return set_inputs(plant, 0, plant.u.size) or set_states(plant)
+
+
+@njit(cache=True, inline="always")
+def evaluate(plant):  # type: ignore[no-untyped-def]
+    """Derivatives of the states into plant.dx; returns a status."""
+    n = plant.dx.size
+    return REFUSED if plant.derivatives(plant.instance, plant.dx_at, n) > 1 else OK
+
+
+@njit(cache=True, inline="always")
+def read(plant):  # type: ignore[no-untyped-def]
+    """Outputs into plant.y; returns a status."""
+    n = plant.y.size
+    status = plant.get_real(plant.instance, plant.outputs_at, n, plant.y_at, n)
+    return REFUSED if status > 1 else OK
+
+
+@njit(cache=True, inline="always")
+def linearise(plant):  # type: ignore[no-untyped-def]
+    """Jacobian at the present point into plant.jacobian; returns a status.
+
+    Afterwards the FMU is where it was; plant.dx and plant.y are undefined.
+    """
+    rows, columns = plant.jacobian.shape
+    if plant.fmi == 0:
+        return _differences(plant)
+    for j in range(rows):
+        known, out = plant.knowns_at + 4 * j, plant.jacobian_at + 8 * columns * j
+        if plant.fmi == 2:
+            status = plant.directional_2(
+                plant.instance, plant.unknowns_at, columns, known, 1, plant.seed_at, out
+            )
+        else:
+            status = plant.directional_3(
+                plant.instance, plant.unknowns_at, columns, known, 1, plant.seed_at, 1, out, columns
+            )
+        if status > 1:
+            return REFUSED
+    return OK
+
+
+@njit(cache=True)
+def _differences(plant):  # type: ignore[no-untyped-def]
+    """Central differences; the step balances truncation and rounding (cube root of eps)."""
+    rows, columns = plant.jacobian.shape
+    n, m = plant.x.size, plant.u.size
+    x, u = plant.x.copy(), plant.u.copy()
+    for j in range(rows):
+        centre = x[j] if j < n else u[m - 2 + j - n]
+        step = 6e-6 * max(abs(centre), 1e-3)
+        for side in (1.0, -1.0):
+            plant.x[:] = x
+            plant.u[:] = u
+            if j < n:
+                plant.x[j] += side * step
+            else:
+                plant.u[m - 2 + j - n] += side * step
+            if place(plant) or evaluate(plant) or read(plant):
+                return REFUSED
+            if side > 0:
+                plant.jacobian[j, :n] = plant.dx
+                plant.jacobian[j, n:] = plant.y
+            else:
+                plant.jacobian[j, :n] -= plant.dx
+                plant.jacobian[j, n:] -= plant.y
+        for i in range(columns):
+            plant.jacobian[j, i] /= 2 * step
+    plant.x[:] = x
+    plant.u[:] = u
+    return place(plant)
+
+
+@njit(cache=True)
+def solve(a, b):  # type: ignore[no-untyped-def]
+    """Solve a x = b in place: a (n, n) is destroyed, b (n,) or (n, k) becomes x; returns a status.
+
+    Gaussian elimination with partial pivoting; for the few unknowns of an observer it is several
+    times faster than a call into LAPACK.
+    """
+    n = a.shape[0]
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if not abs(a[pivot, k]) > 0.0:
+            return SINGULAR
+        if pivot != k:
+            for j in range(n):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+            for j in range(b.shape[1]):
+                b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
+                for j in range(b.shape[1]):
+                    b[i, j] -= factor * b[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(b.shape[1]):
+            total = b[k, j]
+            for i in range(k + 1, n):
+                total -= a[k, i] * b[i, j]
+            b[k, j] = total / a[k, k]
+    return OK
+
+
+def checked(status: int, fmu: FMU) -> None:
+    """Turn a status of a compiled loop into an exception.
+
+    Raises
+    ------
+    FMUError
+        If the FMU refused a call, with what it logged; or an implicit step had no solution.
+    """
+    if status == REFUSED:
+        raise fmu.refusal("a call of the observer's loop", 3)
+    if status == SINGULAR:
+        raise FMUError(f"{fmu.path.name}: the implicit step has no solution at this point")

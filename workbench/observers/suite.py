@@ -1,0 +1,61 @@
+"""All estimators with reasoned settings, and what they are made of."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from workbench.fmu import FMU
+from workbench.observers.baselines import DirectInversion, OpenLoop
+from workbench.observers.contract import Estimator
+from workbench.observers.disturbance import DisturbanceGains, DisturbanceObserver, stationary_gains
+from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
+from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Gains and noise levels of the estimators."""
+
+    disturbance: DisturbanceGains
+    parameter: ParameterGains
+    noise: FilterNoise
+
+    def summary(self) -> dict[str, Any]:
+        """The same as plain numbers and lists, keyed by estimator."""
+        disturbance, parameter = self.disturbance, self.parameter
+        return {
+            "disturbance_observer": {
+                "L": disturbance.L.tolist(),
+                "T_WR": disturbance.T_WR,
+                "T_DC": disturbance.T_DC,
+                "effect": disturbance.effect.tolist(),
+                "source": "stationary Kalman gain of the linearised model",
+            },
+            "parameter_estimator": {
+                "L": parameter.L.tolist(),
+                "effect": parameter.effect.tolist(),
+                "source": "pole placement in the two time scales of the linearised model",
+            },
+            "ekf, ukf": {**asdict(self.noise), "source": "noise of the sensors"},
+        }
+
+
+def reasoned_settings(minimal: FMU, full: FMU) -> Settings:
+    """Settings that follow from the linearised models and the sensors' noise; nothing is tuned.
+
+    Parameters
+    ----------
+    minimal, full : the two observer models; their states are left at an operating point.
+    """
+    return Settings(stationary_gains(minimal), pole_placed_gains(full), FilterNoise())
+
+
+def all_estimators(minimal: FMU, full: FMU, settings: Settings) -> list[Estimator]:
+    """Baselines first, then observers; they share two FMU instances, so run one at a time."""
+    return [
+        OpenLoop(minimal),
+        DirectInversion(minimal),
+        DisturbanceObserver(minimal, settings.disturbance),
+        ParameterEstimator(full, settings.parameter),
+        ExtendedKalmanFilter(minimal, settings.noise),
+        UnscentedKalmanFilter(minimal, settings.noise),
+    ]

@@ -1,0 +1,95 @@
+"""What can be planted in a recording: one effect, one name, one gain, and zero is none."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from workbench.errors import InputError, closest
+
+
+def _gain(unit: str, text: str, *, least: float = -math.inf) -> Any:
+    """Field of an effect: its unit, its meaning, and the least gain that makes sense."""
+    return dataclasses.field(default=0.0, metadata={"unit": unit, "text": text, "least": least})
+
+
+@dataclasses.dataclass(frozen=True)
+class Effects:
+    """Gains of all effects; the metadata of each field holds its unit and its meaning."""
+
+    speed_friction: float = _gain("1", "pad friction times 1 + gain*(1 - v/22 m/s)")
+    fade: float = _gain("1/K", "pad friction times 1 - gain*(T - 100 degC), T of each disc")
+    pressure_exponent: float = _gain("1", "pad friction times (normal force/35 kN)^-gain")
+    bedding_in: float = _gain("1", "pad friction times 1 - gain*exp(-t/2 s) from first contact")
+    cylinder_lag: float = _gain("s", "lag of the pads behind the measured pressure", least=0.0)
+    return_spring: float = _gain("Pa", "added to the pressure that balances the return spring")
+    wheel_radius: float = _gain("m", "added to the wheel radius", least=-0.1)
+    wheel_load: float = _gain("1", "wheel load times 1 + gain", least=-0.5)
+    wheelset_losses: float = _gain("1", "losses of the wheelset times 1 + gain", least=-1.0)
+    roller_losses: float = _gain("1", "losses of the roller times 1 + gain", least=-1.0)
+    wheel_inertia: float = _gain("1", "inertia of the wheelset times 1 + gain", least=-0.9)
+    torque_gain: float = _gain("1", "measured torque times 1 + gain")
+    fx_gain: float = _gain("1", "load cell times 1 + gain")
+    fx_offset: float = _gain("N", "added to the load cell, in either direction")
+    speed_delay: float = _gain("s", "delay of the measured wheel speed")
+    pole_ring: float = _gain("1", "measured wheel speed times 1 + gain*cos(wheel angle)")
+    time_skew: float = _gain("s", "delay of both measured speeds, of a second logger")
+    pressure_offset: float = _gain("Pa", "added to the measured pressure")
+
+
+# Organic pads: measured ranges are 0.1..0.4, 0..1e-3 /K and 0..0.10.
+ORDINARY_PADS = Effects(speed_friction=0.20, fade=4e-4, pressure_exponent=0.04)
+CONSTANT_PADS = Effects()
+
+
+def plant(base: Effects, assignments: Sequence[str]) -> Effects:
+    """Set gains by name.
+
+    Parameters
+    ----------
+    base : gains of all effects that are not named.
+    assignments : texts NAME=VALUE, with the value in the effect's SI unit.
+
+    Raises
+    ------
+    InputError
+        If a name or a value is not understood, or a name comes twice.
+
+    Examples
+    --------
+    >>> plant(CONSTANT_PADS, ["fx_gain=0.015"]).fx_gain
+    0.015
+    """
+    fields = {field.name: field for field in dataclasses.fields(Effects)}
+    gains: dict[str, float] = {}
+    for assignment in assignments:
+        name, _, text = assignment.partition("=")
+        where = f"--effect {assignment}"
+        if name not in fields:
+            raise InputError(
+                where=where,
+                found=f"unknown effect '{name}'{closest(name, fields)}",
+                expected=f"one of {', '.join(fields)}",
+                remedy="correct the name",
+            )
+        unit, least = fields[name].metadata["unit"], fields[name].metadata["least"]
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value >= least):
+            raise InputError(
+                where=where,
+                found=repr(text),
+                expected=f"a number in [{unit}]" + (f", {least:g} or more" * math.isfinite(least)),
+                remedy=f"write for instance --effect {name}=0.01",
+            )
+        if name in gains:
+            raise InputError(
+                where=where,
+                found=f"a second gain for '{name}'",
+                expected="one gain for each effect",
+                remedy="give it once",
+            )
+        gains[name] = value
+    return dataclasses.replace(base, **gains)

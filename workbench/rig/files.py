@@ -1,0 +1,122 @@
+"""Recordings of the virtual rig as files."""
+
+import dataclasses
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.fmu import Vector
+from workbench.rig.effects import Effects
+from workbench.rig.run import RATE, TRUTH, Stop
+from workbench.rig.scenarios import Scenario
+from workbench.rig.sensors import measure
+
+# Column of the recording, unit, factor from SI, digits that hold the resolution.
+_COLUMNS = {
+    "pB": ("bar", 1e-5, 4),
+    "tauR": ("N.m", 1.0, 0),
+    "omegaW": ("rad/s", 1.0, 4),
+    "omegaR": ("rad/s", 1.0, 3),
+    "Fx": ("N", 1.0, 0),
+}
+
+
+def check_files(folders: Iterable[Path], rate: int) -> None:
+    """Refuse what could not be written, or would destroy a measured recording.
+
+    Parameters
+    ----------
+    folders : of the cases to be written.
+    rate : [Hz] of the recordings.
+
+    Raises
+    ------
+    InputError
+        If the rate is no divisor of RATE, or a folder holds a recording without truth.
+    """
+    if RATE % rate:
+        raise InputError(
+            where="--rate",
+            found=f"{rate} Hz",
+            expected=f"a divisor of {RATE} Hz, the rate of the simulation",
+            remedy="choose for instance 100, 200 or 500",
+        )
+    for folder in folders:
+        if (folder / "measured.csv").exists() and not (folder / "truth.json").exists():
+            raise InputError(
+                where=str(folder),
+                found="a recording without truth.json, which this rig did not make",
+                expected="a new folder, or one with recordings of this rig",
+                remedy="choose another folder with --out",
+            )
+
+
+def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> None:
+    """Write a case for estimators and the truth for judges.
+
+    Parameters
+    ----------
+    effects : as given to `simulate`.
+    rate : [Hz] of the recording, a divisor of RATE.
+    folder : of the case: case.toml, measured.csv, truth.csv, truth.json.
+    """
+    recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
+    time = stop.time[recorded]
+    channels = measure(stop, effects, time)
+    measured = {
+        f"{name} [{unit}]": (channels[name] * factor, f"%.{digits}f")
+        for name, (unit, factor, digits) in _COLUMNS.items()
+    }
+    truth = {
+        f"{name} [{unit}]": (stop.truth[name][recorded], "%.7g") for name, unit in TRUTH.items()
+    }
+    made = {
+        "seed": stop.seed,
+        "rate": rate,
+        "fmu_sha256": stop.model,
+        "demand": stop.drawn.coasting,
+        "standstill": round(stop.standstill, 3),
+        "drawn": dataclasses.asdict(stop.drawn),
+        "effects": {name: gain for name, gain in dataclasses.asdict(effects).items() if gain},
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder / "truth.json", json.dumps(made, indent=2) + "\n")
+    _write(folder / "truth.csv", _table(time, truth))
+    _write(folder / "measured.csv", _table(time, measured))
+    _write(folder / "case.toml", _case(stop.scenario))
+
+
+def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
+    """CSV with one header line, time first."""
+    header = ",".join(["time [s]", *columns])
+    row = ",".join(["%.3f", *(text for _, text in columns.values())])
+    # Adding zero turns -0.0 into 0.0.
+    values = np.column_stack([time, *(column for column, _ in columns.values())]) + 0.0
+    return "\n".join([header, *(row % tuple(line) for line in values.tolist())]) + "\n"
+
+
+def _case(scenario: Scenario) -> str:
+    c = scenario.conditions
+    return f"""\
+title = "{scenario.title}"
+
+[conditions]
+initial_speed = "{c.initial_speed * 3.6:g} km/h"
+brake_pressure = "{c.brake_pressure / 1e5:g} bar"
+wheel_rail = "{c.wheel_rail}"
+discs = {json.dumps(c.discs)}
+direction = {c.direction}
+
+[measurement]
+file = "measured.csv"
+"""
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file that is complete whenever it is there."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)

@@ -1,0 +1,208 @@
+"""One stop on the virtual rig: the multibody model beside drive, brake and pads at 1 kHz."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.fmu import CoSimulation, Vector
+from workbench.rig.brake import DEAD_TIME, PROTECTION_PERIOD, Brake, Valve, WheelSlideProtection
+from workbench.rig.drive import Drive, Losses
+from workbench.rig.effects import Effects
+from workbench.rig.pads import FRICTION, Pads
+from workbench.rig.scenarios import Scenario
+
+RATE = 1000  # [Hz] of the co-simulation
+
+TRUTH = {
+    "Fx": "N",
+    "Fcell": "N",
+    "slip": "m/s",
+    "omegaW": "rad/s",
+    "omegaR": "rad/s",
+    "tauR": "N.m",
+    "pB": "Pa",
+    "pads": "Pa",
+    "muWR": "1",
+    **{f"muDC{i}": "1" for i in (1, 2, 3)},
+    **{f"temperature{i}": "degC" for i in (1, 2, 3)},
+    **{f"film{i}": "1" for i in (1, 2, 3)},
+    "phiW": "rad",
+}
+
+_OUTPUTS = ("Fx", "FcellL", "FcellR", "slip", *(f"discPower[{i}]" for i in (1, 2, 3)))
+_INPUTS = ("pB", "tauR", "dmuWR", *(f"muDCunit[{i}]" for i in (1, 2, 3)))
+_POLACH = {
+    "dry": {"polach.kA": 1.0, "polach.kS": 0.4, "polach.A": 0.4, "polach.B": 0.6},
+    "wet": {"polach.kA": 0.3, "polach.kS": 0.1, "polach.A": 0.4, "polach.B": 0.2},
+}
+_RUN_IN = 1.0  # [s] before the recording, in which the model settles under the wheelset's drag
+_STANDSTILL = 0.05  # [m/s]
+_REST = 2.0  # [s] recorded after standstill
+_LONGEST = 300.0  # [s]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What differs from stop to stop, within the tolerances of the rig.
+
+    Attributes
+    ----------
+    JW, JR, Fz, muDC, muWR : value over nominal.
+    coasting : [s] from the start of the recording to the brake demand.
+    """
+
+    JW: float
+    JR: float
+    Fz: float
+    muDC: float
+    muWR: float
+    coasting: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """The truth of one stop.
+
+    Attributes
+    ----------
+    scenario, seed : what was asked for.
+    drawn : deviations of this stop.
+    time : (n,) [s] in steps of 1/RATE, negative before the recording.
+    truth : (n,) each, by the names of TRUTH.
+    standstill : [s] when wheelset and roller stood.
+    model : hash of the FMU.
+    """
+
+    scenario: Scenario
+    seed: int
+    drawn: Drawn
+    time: Vector
+    truth: Mapping[str, Vector]
+    standstill: float
+    model: str
+
+    def at(self, time: Vector, name: str) -> Vector:
+        """Signal at other times, (m,)."""
+        return np.interp(time, self.time, self.truth[name])
+
+
+def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) -> Stop:
+    """Make one stop.
+
+    Parameters
+    ----------
+    seed : with the scenario's number it fixes all that is drawn, noise included.
+    effects : what is planted.
+    fmu_path : multibody model, a Co-Simulation FMU.
+
+    Raises
+    ------
+    InputError
+        If the FMU is not a model of the rig, or the wheelset does not stop in 300 s.
+    """
+    drawn = _draw(np.random.default_rng([seed, scenario.number, 0]))
+    with CoSimulation(fmu_path) as fmu:
+        rows, standstill = _brake_to_standstill(fmu, scenario, drawn, effects)
+        model = fmu.sha256
+    time = np.arange(len(rows)) / RATE - _RUN_IN
+    truth = dict(zip(TRUTH, np.array(rows).T.copy(), strict=True))
+    return Stop(scenario, seed, drawn, time, truth, standstill, model)
+
+
+def _draw(rng: np.random.Generator) -> Drawn:
+    """Draw from the tolerances of the data sheet, one sigma each."""
+    JW, JR, Fz, muDC, muWR = 1.0 + rng.normal(0.0, [0.01, 0.002, 0.003, 0.02, 0.02])
+    coasting = round(rng.uniform(3.0, 5.0), 3)
+    return Drawn(float(JW), float(JR), float(Fz), float(muDC), float(muWR), coasting)
+
+
+def _parameters(
+    nominal: Mapping[str, float], scenario: Scenario, drawn: Drawn, effects: Effects
+) -> dict[str, float]:
+    """Parameters of the FMU that are not nominal; all of them are constant during a stop."""
+    changed = {
+        "rW": nominal["rW"] + effects.wheel_radius,
+        "JW": nominal["JW"] * drawn.JW * (1.0 + effects.wheel_inertia),
+        "JR": nominal["JR"] * drawn.JR,
+        "Fz": nominal["Fz"] * drawn.Fz * (1.0 + effects.wheel_load),
+        "muWR": scenario.muWR * drawn.muWR,
+        "muDC": FRICTION,
+        "actuation.p0": nominal["actuation.p0"] + effects.return_spring,
+    }
+    for c in ("c0", "c1", "c2"):
+        changed[f"wheelsetLoss.{c}"] = nominal[f"wheelsetLoss.{c}"] * (
+            1.0 + effects.wheelset_losses
+        )
+        changed[f"rollerLoss.{c}"] = nominal[f"rollerLoss.{c}"] * (1.0 + effects.roller_losses)
+    return changed | _POLACH[scenario.conditions.wheel_rail]
+
+
+def _brake_to_standstill(
+    fmu: CoSimulation, scenario: Scenario, drawn: Drawn, effects: Effects
+) -> tuple[list[tuple[float, ...]], float]:
+    """Rows of the truth, and the time of standstill [s]."""
+    inputs, outputs = fmu.variables(_INPUTS), fmu.variables(_OUTPUTS)
+    nominal = fmu.defaults
+    parameters = _parameters(nominal, scenario, drawn, effects)
+    rW, rR = parameters["rW"], nominal["rR"]
+    kappa, p0 = nominal["actuation.kappa"], parameters["actuation.p0"]
+    conditions, patch = scenario.conditions, scenario.patch
+    velocity = conditions.initial_speed * conditions.direction
+    omegaW, omegaR, phiW = velocity / rW, velocity / rR, 0.0
+    states = [fmu.states.index(name) for name in ("omegaW", "omegaR", "wheelset.phi")]
+    fmu.start({"omegaW": omegaW, "omegaR": omegaR}, parameters)
+
+    dt = 1.0 / RATE
+    losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
+    drive = Drive(nominal["JR"], losses, omegaR, dt)
+    brake = Brake(effects.cylinder_lag, dt)
+    pads = Pads(effects, drawn.muDC, conditions.discs, dt)
+    protection = WheelSlideProtection(conditions.initial_speed)
+    valve = Valve.FILL
+    every = round(PROTECTION_PERIOD * RATE)
+    rows: list[tuple[float, ...]] = []
+    standstill = None
+    for k in range(round((_RUN_IN + _LONGEST) * RATE)):
+        t = k / RATE - _RUN_IN
+        braking = t - drawn.coasting
+        speed = abs(omegaW) * rW
+        if standstill is None and braking > 0.0 and max(speed, abs(omegaR) * rR) < _STANDSTILL:
+            standstill = t
+        if standstill is not None:
+            if t >= standstill + _REST:
+                return rows, standstill
+            valve = Valve.VENT
+        elif scenario.protected and k % every == 0:
+            valve = protection.step(abs(omegaW) * nominal["rW"])
+
+        brake.step(conditions.brake_pressure if braking >= DEAD_TIME else 0.0, valve)
+        force = kappa * max(0.0, brake.pads - p0)
+        mu = pads.friction(speed, force)
+        tauR = drive.step(omegaR, stopped=standstill is not None)
+        low = patch is not None and patch.begin <= braking < patch.end
+        muWR = (patch.muWR if patch is not None and low else scenario.muWR) * drawn.muWR
+        inputs.values[:] = (
+            brake.pads,
+            tauR,
+            muWR - parameters["muWR"],
+            *(value / FRICTION for value in mu),
+        )
+        fmu.set(inputs, inputs.values)
+        Fx, FcellL, FcellR, slip, *powers = fmu.get(outputs).tolist()
+        rows.append(
+            (
+                *(Fx, FcellL + FcellR, slip, omegaW, omegaR, tauR, brake.cylinder, brake.pads),
+                *(muWR, *mu, *pads.temperature, *pads.film, phiW),
+            )
+        )
+        pads.heat(powers, speed, force)
+        omegaW, omegaR, phiW = fmu.step(dt)[states].tolist()
+    raise InputError(
+        where=scenario.name,
+        found=f"{abs(omegaR) * rR:.1f} m/s after {_LONGEST:g} s",
+        expected="a brake that stops the train",
+        remedy="plant smaller effects",
+    )

@@ -1,0 +1,129 @@
+"""The stops that the rig can make: fourteen standard cases, and one that no rig would dare."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from workbench.case import Conditions, Surface
+from workbench.errors import InputError, closest
+
+_DRY_FRICTION, _WET_FRICTION = 0.40, 0.30  # at zero slip velocity
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A spell of low adhesion, from `begin` to `end` [s] after the brake demand."""
+
+    begin: float
+    end: float
+    muWR: float
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One stop to be made.
+
+    Attributes
+    ----------
+    name : of the case, NN_noun.
+    conditions : what is set before the stop.
+    muWR : friction of the contact at zero slip velocity.
+    patch : spell of lower friction, or None.
+    protected : whether the wheel-slide protection is switched on.
+    """
+
+    name: str
+    conditions: Conditions
+    muWR: float
+    patch: Patch | None
+    protected: bool
+
+    @property
+    def number(self) -> int:
+        """NN of the name."""
+        return int(self.name[:2])
+
+    @property
+    def title(self) -> str:
+        """One line for reports."""
+        c = self.conditions
+        wet = [str(i) for i, disc in enumerate(c.discs, start=1) if disc == "wet"]
+        some = "wet:" + "+".join(wet)
+        discs = {0: "dry", len(c.discs): "wet"}.get(len(wet), some)
+        return (
+            f"{c.initial_speed * 3.6:g} km/h, {c.brake_pressure / 1e5:g} bar, "
+            f"rail {c.wheel_rail}, discs {discs}, direction {c.direction:+d}"
+        )
+
+
+def _stop(
+    name: str,
+    speed: float,
+    pressure: float,
+    wheel_rail: Surface,
+    wet_discs: tuple[int, ...],
+    direction: Literal[1, -1],
+    *,
+    muWR: float | None = None,
+    patch: Patch | None = None,
+    protected: bool = True,
+) -> Scenario:
+    """One row of the table: speed in km/h, pressure in bar, numbers of the wet discs."""
+    discs: tuple[Surface, ...] = tuple("wet" if i in wet_discs else "dry" for i in (1, 2, 3))
+    conditions = Conditions(speed / 3.6, pressure * 1e5, wheel_rail, discs, direction)
+    usual = _WET_FRICTION if wheel_rail == "wet" else _DRY_FRICTION
+    return Scenario(name, conditions, usual if muWR is None else muWR, patch, protected)
+
+
+# Polach's wet 0.30 carries the stop at 4.2 bar; case 9 takes less, so that the patch costs grip.
+_STANDARD = (
+    #     name                      km/h  bar  rail   wet discs  direction
+    _stop("01_dry_80_1.5", 80, 1.5, "dry", (), +1),
+    _stop("02_dry_100_2.7", 100, 2.7, "dry", (), +1),
+    _stop("03_dry_120_3.6", 120, 3.6, "dry", (), +1),
+    _stop("04_dry_160_4.2", 160, 4.2, "dry", (), +1),
+    _stop("05_dry_120_2.7_rev", 120, 2.7, "dry", (), -1),
+    _stop("06_dry_160_3.6_rev", 160, 3.6, "dry", (), -1),
+    _stop("07_wet_80_1.5", 80, 1.5, "wet", (1, 2, 3), +1),
+    _stop("08_wet_120_3.6", 120, 3.6, "wet", (1, 2, 3), +1),
+    _stop(
+        "09_wet_160_4.2_wsp", 160, 4.2, "wet", (1, 2, 3), +1, muWR=0.22, patch=Patch(8.0, 9.5, 0.09)
+    ),
+    _stop("10_wet_100_2.7_rev", 100, 2.7, "wet", (1, 2, 3), -1),
+    _stop("11_brakewet_120_2.7_rev", 120, 2.7, "dry", (1, 2, 3), -1),
+    _stop("12_brakewet_160_4.2", 160, 4.2, "dry", (1, 2, 3), +1),
+    _stop("13_onedisc_100_2.7", 100, 2.7, "dry", (2,), +1),
+    _stop("14_twodiscs_160_3.6_rev", 160, 3.6, "dry", (1, 3), -1),
+)
+# Full brake on a greasy rail without protection: the wheel locks, and stays locked to the end.
+_DARING = (_stop("15_locked_wheel", 100, 4.2, "wet", (), +1, muWR=0.12, protected=False),)
+
+STANDARD = tuple(scenario.name for scenario in _STANDARD)
+SCENARIOS = {scenario.name: scenario for scenario in _STANDARD + _DARING}
+
+
+def select(names: Sequence[str]) -> list[Scenario]:
+    """Scenarios by name, with or without its number; the standard ones if none is named.
+
+    Raises
+    ------
+    InputError
+        If there is no scenario of a name.
+
+    Examples
+    --------
+    >>> [scenario.name for scenario in select(["locked_wheel", "01_dry_80_1.5"])]
+    ['01_dry_80_1.5', '15_locked_wheel']
+    """
+    chosen = set(STANDARD if not names else ())
+    for name in names:
+        matches = [full for full in SCENARIOS if name in (full, full[3:])]
+        if not matches:
+            raise InputError(
+                where=f"--case {name}",
+                found=f"no scenario of this name{closest(name, SCENARIOS)}",
+                expected=f"one of {', '.join(SCENARIOS)}",
+                remedy="correct the name",
+            )
+        chosen.update(matches)
+    return [scenario for name, scenario in SCENARIOS.items() if name in chosen]
