@@ -25,6 +25,11 @@ from workbench.observers.contract import (
 )
 
 
+# Distance of sigma points, as a share of the cubature rule's: a friction that nothing is known of
+# has a wide sigma, and points as far as that would slide where the wheel rolls.
+POINT_DISTANCE = 0.2
+
+
 @dataclass(frozen=True)
 class FilterNoise:
     """Noise levels of the Kalman filters.
@@ -32,14 +37,16 @@ class FilterNoise:
     Attributes
     ----------
     omegaW_relative, omegaW, omegaR : standard deviation of one sample: share of the speed, and
-        [rad/s] (a pole wheel on the axle, an encoder on the roller).
+        [rad/s] (a pole wheel on the axle, an encoder on the roller). A good pole wheel scatters by
+        0.03 %; 0.1 % leaves room for its eccentricity and for an error of the wheel radius, which
+        a filter that trusts the slip would take for a change of friction.
     model : unmodelled acceleration, random walk of every state [unit of the state / sqrt(s)].
     muWR, muDC : random walk of the frictions [1/sqrt(s)]: a drying disc or a patch of rail changes
         them by 0.05 within a second.
     initial_friction : what is known of the frictions at the start [1].
     """
 
-    omegaW_relative: float = 3e-4
+    omegaW_relative: float = 1e-3
     omegaW: float = 0.002
     omegaR: float = 0.003
     model: float = 0.01
@@ -264,7 +271,7 @@ def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
-    """Square-root unscented filter with 2n points of equal weight (spherical cubature)."""
+    """Square-root unscented filter with 2n points of equal weight."""
     z, root, points, stack = memory.z, memory.root, memory.points, memory.stack
     size = z.size
     if h == 0.0:
@@ -273,7 +280,7 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
             root[i, i] = np.sqrt(memory.P[i, i])
         return status or _conclude(plant, settings, memory, row)
     fade = fading(settings.radius * y[1])
-    spread = np.sqrt(1.0 * size)
+    spread = POINT_DISTANCE * np.sqrt(1.0 * size)
     if fade < 0.8:
         # Below 1 m/s the slip law bends within a fraction of sigma: only its tangent is of use.
         status = _ekf_law(plant, settings, memory, h, u, y, row)
@@ -303,7 +310,7 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
         for i in range(2 * size):
             total += points[i, j]
         z[j] = total / (2 * size)
-    share = 1.0 / np.sqrt(2.0 * size)
+    share = np.sqrt(0.5) / spread
     stack[:] = 0.0
     for i in range(2 * size):
         for j in range(size):
@@ -393,8 +400,8 @@ class ExtendedKalmanFilter(Estimator):
 class UnscentedKalmanFilter(ExtendedKalmanFilter):
     """Square-root unscented Kalman filter: no derivative of the filter, the same noise levels.
 
-    Sigma points of equal weight (kappa = 0, the spherical cubature rule), each advanced by the
-    linearly implicit step. All updates are orthogonal triangularisations, without downdates.
+    Sigma points of equal weight, each advanced by the linearly implicit step; the covariance is
+    scaled by their distance, see POINT_DISTANCE. All updates are orthogonal triangularisations, without downdates.
     Source: R. van der Merwe, E. Wan (2001), The square-root unscented Kalman filter for state and
     parameter estimation, ICASSP; I. Arasaratnam, S. Haykin (2009), Cubature Kalman filters.
 
