@@ -21,6 +21,11 @@ def minimal_path() -> Path:
     return ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
 
 
+@pytest.fixture(scope="session")
+def reference_path() -> Path:
+    return ROOT / "fmus" / "fmi2" / "Reference.fmu"
+
+
 @pytest.fixture
 def minimal(minimal_path: Path) -> Iterator[FMU]:
     with FMU(minimal_path) as fmu:

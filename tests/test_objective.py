@@ -37,7 +37,8 @@ def run_of(case: Case, **signals: np.ndarray) -> Run:
     for name, values in signals.items():
         estimate[:, list(ESTIMATE).index(name)] = values
     nothing = np.full_like(estimate, np.nan)
-    return Run("stop", "test", case.time, estimate, nothing, nothing[:, 0], Outcome.OK, "", 0.0)
+    nis, claimed = nothing[:, 0], np.zeros(case.time.size, bool)
+    return Run("stop", "test", case.time, estimate, nothing, nis, Outcome.OK, "", 0.0, claimed)
 
 
 @pytest.fixture

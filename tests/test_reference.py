@@ -14,6 +14,7 @@ import casadi as ca
 
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
+from workbench.fmu import FMU, FMUError
 
 LIBRARY = Path(__file__).parents[1] / "modelica" / "WheelsetRig" / "package.mo"
 RADIUS_WHEEL, RADIUS_ROLLER = 0.46, 0.70  # m
@@ -137,6 +138,39 @@ def test_nothing_moves_at_rest_in_other_rigs(
         values(reference, "states", {}), 0, values(reference, "parameters", change)
     )
     assert abs(np.array(rates)).max() < 1e-9 * 700.0  # as above
+
+
+@pytest.mark.parametrize("name", ["Reference", "FullObserver", "MinimalObserver"])
+def test_no_parameter_within_its_bounds_divides_by_zero(name: str) -> None:
+    """Each parameter in turn at its lower bound, or at zero where that is within bounds.
+
+    A value that the model's own assertions refuse is out of bounds.
+    """
+    model = make_explicit(flatten(LIBRARY, f"WheelsetRig.{name}"))
+    arguments = [model.t, model.x, model.u, model.p]
+    evaluate = ca.Function("f", arguments, [model.f, model.w, model.assertions])
+    # Braking: every state moves, every force acts.
+    state = dict.fromkeys((v.name for v in model.states), 1e-3) | {"omegaW": 60.0, "omegaR": 39.5}
+    x = values(model, "states", state)
+    u = [2e5 if v.name == "pB" else 0.0 for v in model.inputs]
+    broken = []
+    for parameter in model.parameters:
+        lowest = max(parameter.minimum or 0.0, 0.0)
+        p = values(model, "parameters", {parameter.name: lowest})
+        f, w, holds = evaluate(0.0, x, u, p)
+        if np.array(holds).all() and not np.isfinite(np.array(ca.vertcat(f, w))).all():
+            broken.append(parameter.name)
+    assert broken == []
+
+
+@pytest.mark.parametrize(
+    ("change", "match"), [({"lG": 0.0}, "guidance arms"), ({"Fz": 30e3}, "less than the weight")]
+)
+def test_a_rig_that_cannot_stand_is_refused_with_a_reason(
+    reference_path: Path, change: dict[str, float], match: str
+) -> None:
+    with FMU(reference_path) as fmu, pytest.raises(FMUError, match=match):
+        fmu.start({}, change)
 
 
 def modes(model: StateSpace, parameters: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """The C runtime of the FMUs, compiled with small models written by hand (tests/runtime)."""
 
 import ctypes
+import itertools
 import math
 import re
 import shutil
@@ -446,6 +447,27 @@ def test_directional_derivative_is_the_jacobian(open_fmu, version):
         found = fmu.fmi.getDirectionalDerivative(UNKNOWNS, KNOWNS, list(seed))
         assert found == list(J @ seed)  # products and sums of small integers: exact
     assert fmu.fmi.getDirectionalDerivative([DX2], [U, K], [3.0, 2.0]) == [3.0 - 4.0]
+
+
+@VERSIONS
+@pytest.mark.parametrize("known", [X1, X2, U, K, D])
+def test_a_block_of_unknowns_gives_what_single_unknowns_give(open_fmu, version, known):
+    """Unknowns that stand one after the other are treated at once; any others one by one."""
+    fmu = open_fmu("oscillator", version).start()
+    fmu.set([X1, X2], [2.0, 3.0])
+    unknowns = [X1, X2, DX1, DX2, FORCE, ENERGY]
+
+    def derivative(asked: Sequence[int]) -> list[float]:
+        return list(fmu.fmi.getDirectionalDerivative(asked, [known], [3.0]))
+
+    expected = {unknown: derivative([unknown])[0] for unknown in unknowns}
+    assert set(expected.values()) != {0.0}
+    for first, last in itertools.combinations(range(7), 2):
+        block = unknowns[first:last]
+        assert derivative(block) == [expected[unknown] for unknown in block]
+        assert derivative(block[::-1]) == [expected[unknown] for unknown in block[::-1]]
+    with fmu.refuses(ERROR, "value reference 4 is no unknown"):
+        derivative([DX1, DX2, U])
 
 
 def test_adjoint_is_the_transpose_of_directional(open_fmu):

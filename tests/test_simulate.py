@@ -12,6 +12,8 @@ from workbench.case import read_case
 from workbench.objective import low_pass
 from workbench.observers import ESTIMATE
 
+OBSERVERS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
+
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
@@ -37,30 +39,36 @@ def nrmse(results: Path) -> pd.DataFrame:
 
 def test_all_fourteen_cases_run(nrmse: pd.DataFrame) -> None:
     assert len(nrmse) == 14
-    assert list(nrmse.columns) == ["open_loop", "direct_inversion", "disturbance_observer"]
+    assert tuple(nrmse.columns) == ("open_loop", "direct_inversion", *OBSERVERS)
     assert nrmse.notna().all(axis=None)
 
 
-def test_disturbance_observer_beats_the_open_loop_on_every_case(nrmse: pd.DataFrame) -> None:
-    assert (nrmse.disturbance_observer < nrmse.open_loop).all()
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_observers_beat_the_open_loop_on_every_case(nrmse: pd.DataFrame, observer: str) -> None:
+    assert (nrmse[observer] < nrmse.open_loop).all()
 
 
-def test_disturbance_observer_beats_direct_inversion_on_most_cases(nrmse: pd.DataFrame) -> None:
-    better = nrmse.disturbance_observer < nrmse.direct_inversion
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_observers_beat_direct_inversion_on_most_cases(nrmse: pd.DataFrame, observer: str) -> None:
+    better = nrmse[observer] < nrmse.direct_inversion
     assert better.sum() >= 10, nrmse[~better]
 
 
-def test_accuracy_of_untuned_gains(nrmse: pd.DataFrame) -> None:
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_accuracy_of_untuned_gains(nrmse: pd.DataFrame, observer: str) -> None:
     """Goals for gains that nobody tuned: 2 % dry, 4 % wet and drying."""
     dry = nrmse.index.str.contains("_dry_")
-    assert nrmse.disturbance_observer[dry].max() < 0.02
-    assert nrmse.disturbance_observer[~dry].max() < 0.04
+    assert nrmse[observer][dry].max() < 0.02
+    assert nrmse[observer][~dry].max() < 0.04
 
 
-def test_the_minimum_of_the_force_in_the_slide_is_reached(results: Path, root: Path) -> None:
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_the_minimum_of_the_force_in_the_slide_is_reached(
+    results: Path, root: Path, observer: str
+) -> None:
     """The wheel-slide protection acts at about 12 s; the paper's observer misses the minimum."""
     case = read_case(root / "cases" / "09_wet_160_4.2_wsp")
-    estimate = pd.read_csv(results / "09_wet_160_4.2_wsp.csv")["disturbance_observer.Fx [N]"]
+    estimate = pd.read_csv(results / "09_wet_160_4.2_wsp.csv")[f"{observer}.Fx [N]"]
     slide = (case.time > 11.0) & (case.time < 14.0)
     assert case.Fx is not None
     measured = low_pass(case.time, case.Fx)[slide].min()

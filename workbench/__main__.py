@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from workbench.commands import add_fmu, add_observability, add_rig, add_simulate
+from workbench.commands import add_bench, add_fmu, add_observability, add_rig, add_simulate, add_tune
 from workbench.errors import InputError
 from workbench.fmu import FMUError
 
@@ -34,9 +34,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_simulate(commands)
+    add_tune(commands)
     add_observability(commands)
     add_rig(commands)
     add_fmu(commands)
+    add_bench(commands)
     return parser
 
 

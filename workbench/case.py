@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -24,6 +24,23 @@ _MIN_DURATION = 2.0  # s; a stop with coasting before it takes longer
 _MIN_SAMPLES = 20  # fewer say nothing about noise
 
 _SIGNALS = {"time": "s", "pB": "Pa", "tauR": "N.m", "omegaW": "rad/s", "omegaR": "rad/s", "Fx": "N"}
+
+# What estimators ask of a model, with units; a model with other names is mapped onto these.
+MODEL_VARIABLES = {
+    "omegaW": "rad/s",
+    "omegaR": "rad/s",
+    "pB": "Pa",
+    "tauR": "N.m",
+    "dmuWR": "1",
+    "dmuDC": "1",
+    "Fx": "N",
+    "slip": "m/s",
+    "muWR": "1",
+    "muDC": "1",
+    "rW": "m",
+    "rR": "m",
+    "JR": "kg.m2",
+}
 
 
 @dataclass(frozen=True)
@@ -61,6 +78,7 @@ class Case:
     omegaW, omegaR : (n,) rad/s, speeds of wheelset and roller.
     Fx : (n,) N, measured longitudinal force, or None.
     source : the CSV file.
+    names : the model's own name of each of MODEL_VARIABLES that it names otherwise.
     """
 
     name: str
@@ -73,6 +91,7 @@ class Case:
     omegaR: Vector
     Fx: Vector | None
     source: Path
+    names: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def u(self) -> Matrix:
@@ -121,7 +140,7 @@ def read_case(folder: Path) -> Case:
     toml = folder / "case.toml"
     document = _read_toml(toml)
     where = str(toml)
-    _refuse_unknown(document, ("title", "conditions", "measurement"), where)
+    _refuse_unknown(document, ("title", "conditions", "measurement", "model"), where)
     title = _entry(document, "title", str, where)
     conditions = _conditions(_entry(document, "conditions", dict, where), f"{where}, [conditions]")
     measurement = _entry(document, "measurement", dict, where)
@@ -129,6 +148,9 @@ def read_case(folder: Path) -> Case:
     source = folder / _entry(measurement, "file", str, f"{where}, [measurement]")
     columns = _column_names(measurement, f"{where}, [measurement]")
     signals = _read_signals(source, columns)
+    model = _entry(document, "model", dict, where) if "model" in document else {}
+    _refuse_unknown(model, ("names",), f"{where}, [model]")
+    names = _entry(model, "names", dict, f"{where}, [model]") if "names" in model else {}
     return Case(
         name=folder.resolve().name,
         title=title,
@@ -140,7 +162,26 @@ def read_case(folder: Path) -> Case:
         omegaR=signals["omegaR"],
         Fx=signals.get("Fx"),
         source=source,
+        names=check_names(names, f"{where}, [model.names]"),
     )
+
+
+def check_names(names: Mapping[str, Any], where: str) -> dict[str, str]:
+    """Check a mapping of MODEL_VARIABLES to a model's own names, as a user wrote it.
+
+    Parameters
+    ----------
+    where : place for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If a variable is none of MODEL_VARIABLES, or two have one name.
+    """
+    _refuse_unknown(names, tuple(MODEL_VARIABLES), where)
+    checked = {ours: _entry(names, ours, str, where) for ours in names}
+    _refuse_shared(checked, where, "variable")
+    return checked
 
 
 def _case_folders(path: Path) -> list[Path]:
@@ -251,20 +292,24 @@ def _column_names(measurement: dict[str, Any], where: str) -> dict[str, str]:
     columns = {signal: signal for signal in _SIGNALS}
     for signal in named:
         columns[signal] = _entry(named, signal, str, where)
-    taken: dict[str, str] = {}
-    for signal, column in columns.items():
-        if column in taken:
-            raise InputError(
-                where=f"{where} {signal}",
-                found=f"column '{column}', which is already {taken[column]}",
-                expected="a different column for each signal",
-                remedy="correct the name of one of the two columns",
-            )
-        taken[column] = signal
+    _refuse_shared(columns, where, "column")
     return columns
 
 
-def _entry(table: dict[str, Any], key: str, kind: type[_T], where: str) -> _T:
+def _refuse_shared(names: Mapping[str, str], where: str, kind: str) -> None:
+    taken: dict[str, str] = {}
+    for ours, name in names.items():
+        if name in taken:
+            raise InputError(
+                where=f"{where} {ours}",
+                found=f"{kind} '{name}', which is already {taken[name]}",
+                expected=f"a different {kind} for each",
+                remedy=f"correct the name of one of the two {kind}s",
+            )
+        taken[name] = ours
+
+
+def _entry(table: Mapping[str, Any], key: str, kind: type[_T], where: str) -> _T:
     """Return `table[key]`, which must be of this very type and no empty string."""
     names = {str: "a text", int: "a whole number", dict: "a table", list: "a list"}
     if key not in table:

@@ -5,10 +5,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.case import Case
 from workbench.fmu import FMUError, Matrix, Vector
-from workbench.observers import ESTIMATE, Estimate, Estimator
+from workbench.observers import ESTIMATE, Estimate, Estimator, PeakForce
 
 
 class Outcome(enum.Enum):
@@ -32,7 +33,9 @@ class Run:
     nis : (n,) normalised innovation squared, NaN where the method has none.
     outcome : how it ended.
     message : what the FMU said, empty if nothing.
-    seconds : wall time.
+    seconds : wall time of the estimator.
+    muWR_claimed : (n,) whether muWR is an estimate; elsewhere it is a guess that fits as well as
+        any other, see PeakForce.claims.
     """
 
     case: str
@@ -44,6 +47,7 @@ class Run:
     outcome: Outcome
     message: str
     seconds: float
+    muWR_claimed: NDArray[np.bool_]
 
     def signal(self, name: str) -> Vector:
         """One column of the estimate, (n,)."""
@@ -55,6 +59,7 @@ def observe(case: Case, estimator: Estimator) -> Run:
     begin = time.perf_counter()
     blank = np.full((case.time.size, len(ESTIMATE)), np.nan)
     estimate = Estimate(blank, blank, blank[:, 0])
+    claimed = np.zeros(case.time.size, bool)
     outcome, message = Outcome.OK, ""
     try:
         estimate = estimator.run(case.time, case.u, case.y)
@@ -62,7 +67,10 @@ def observe(case: Case, estimator: Estimator) -> Run:
         if (lost := np.flatnonzero(~np.isfinite(force))).size:
             outcome = Outcome.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
+        seconds = time.perf_counter() - begin
+        claimed = PeakForce(estimator.fmu).claims(estimate.values)
     except FMUError as error:
+        seconds = time.perf_counter() - begin
         outcome, message = Outcome.FMU_FAILED, str(error)
     return Run(
         case=case.name,
@@ -73,5 +81,6 @@ def observe(case: Case, estimator: Estimator) -> Run:
         nis=np.asarray(estimate.nis),
         outcome=outcome,
         message=message,
-        seconds=time.perf_counter() - begin,
+        seconds=seconds,
+        muWR_claimed=claimed,
     )

@@ -3,13 +3,13 @@
 import hashlib
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import fmpy
 
-from workbench.errors import InputError
+from workbench.errors import InputError, closest
 
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
@@ -84,6 +84,42 @@ class Description:
     def names(self, causality: str) -> tuple[str, ...]:
         """Names of the variables of a causality, in the order of the model description."""
         return tuple(v.name for v in self.variables if v.causality == causality)
+
+    def renamed(self, names: Mapping[str, str]) -> "Description":
+        """The same description with other names.
+
+        A variable whose own name is given to another one is called `fmu.NAME` from then on.
+
+        Parameters
+        ----------
+        names : new names and the FMU's own, such as {"pB": "brakePressure"}.
+
+        Raises
+        ------
+        InputError
+            If the FMU has no variable of a name.
+        """
+        own = {variable.name for variable in self.variables}
+        for ours, theirs in names.items():
+            if theirs not in own:
+                raise InputError(
+                    where=str(self.path),
+                    found=f"no variable '{theirs}'{closest(theirs, own)}",
+                    expected=f"the variable that is to be '{ours}'",
+                    remedy=f"correct '{ours}' in the mapping of names; 'workbench fmu info' lists "
+                    "the FMU's variables",
+                )
+        mapped = {theirs: ours for ours, theirs in names.items()}
+
+        def new(name: str) -> str:
+            return mapped.get(name, f"fmu.{name}" if name in names else name)
+
+        return replace(
+            self,
+            variables=tuple(replace(v, name=new(v.name)) for v in self.variables),
+            states=tuple(map(new, self.states)),
+            rates=tuple(map(new, self.rates)),
+        )
 
     def require(self, interface: str) -> Interface:
         """Interface of a name, with a binary for this machine.

@@ -22,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
-from workbench.errors import InputError
+from workbench.errors import InputError, closest
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -84,9 +84,11 @@ class FMU:
     Parameters
     ----------
     path : the FMU file.
+    names : names to use for variables that the FMU names otherwise, {"pB": "brakePressure"}.
 
     Attributes
     ----------
+    names : as given.
     states, inputs, outputs, parameters : names, in the order of the model description.
     units : unit of each variable that has one.
     defaults : start values of the model description, in the FMU's units.
@@ -102,9 +104,10 @@ class FMU:
 
     interface = MODEL_EXCHANGE
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, names: Mapping[str, str] | None = None) -> None:
         self.path = path
-        self.description = read_description(path)
+        self.names = dict(names or {})
+        self.description = read_description(path).renamed(self.names)
         offered = self.description.require(self.interface)
         self.sha256 = self.description.sha256
         self.version = self.description.version
@@ -206,9 +209,9 @@ class FMU:
             if name not in self._references:
                 raise InputError(
                     where=str(self.path),
-                    found=f"no variable '{name}'",
+                    found=f"no variable '{name}'{closest(name, self._references)}",
                     expected=f"one of {', '.join(self.inputs + self.outputs)}",
-                    remedy="use an FMU that has it, or map its name",
+                    remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
                 )
         references = np.array([self._references[n] for n in names], np.uint32)
         return Variables(tuple(names), references, np.zeros(len(names)))

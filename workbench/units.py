@@ -15,6 +15,7 @@ _EXAMPLES = {
     "rad/s": "rad/s, deg/s, rpm or 1/min",
     "N": "N or kN",
     "m/s": "m/s or km/h",
+    "m": "m or mm",
 }
 
 # Angles have a dimension of their own here, so that Hz and 1/s are not taken for rad/s.
@@ -54,7 +55,7 @@ def si_factor(unit: str, si: str, where: str) -> float:
     Parameters
     ----------
     unit : as a file spells it; case matters.
-    si : one of s, Pa, N.m, rad/s, N, m/s.
+    si : one of s, Pa, N.m, rad/s, N, m/s, m.
     where : place for the message of an error.
 
     Raises

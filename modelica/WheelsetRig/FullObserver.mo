@@ -3,18 +3,18 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
   parameter Units.Length rW(min=0.1) = 0.46 "Wheel radius";
   parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
   parameter Units.Length rB(min=0.1) = 0.30 "Radius at which the pads act";
-  parameter Units.Inertia JW = 110.0 "Inertia of the wheelset about its axle";
-  parameter Units.Inertia JR = 1500.0 "Inertia of the roller alone";
+  parameter Units.Inertia JW(min=1.0) = 110.0 "Inertia of the wheelset about its axle";
+  parameter Units.Inertia JR(min=1.0) = 1500.0 "Inertia of the roller alone";
   parameter Units.Force Fz0(min=1000.0) = 80000.0 "Wheel load at rest";
-  parameter Units.FrictionCoefficient muWR = 0.15 "Friction wheel-rail at zero slip velocity";
+  parameter Units.FrictionCoefficient muWR(min=0.01) = 0.15 "Friction wheel-rail at zero slip velocity";
   parameter Units.FrictionCoefficient muDC = 0.30 "Friction disc-pad";
   parameter Units.AngularVelocity omega0(min=1e-6) = 0.05 "Speed below which pad friction is smoothed";
   parameter Contact.PolachParameters polach "Law of the creep force";
-  parameter Units.Mass mF = 4000.0 "Mass of the bogie frame";
+  parameter Units.Mass mF(min=1.0) = 4000.0 "Mass of the bogie frame";
   parameter Units.Stiffness kF = 2.44e6 "Stiffness of the primary springs, both sides";
   parameter Units.Damping cF = 30000.0 "Damping of the primary springs, both sides";
   parameter Units.Mass mB = 110.0 "Mass of a brake unit";
-  parameter Units.Inertia IB = 8.0 "Inertia of a brake unit about its pivot";
+  parameter Units.Inertia IB(min=0.1) = 8.0 "Inertia of a brake unit about its pivot";
   parameter Units.Length lB = 0.35 "From the pivot to the pads";
   parameter Units.Length lC = 0.0 "From the pivot to the centre of gravity of a brake unit";
   parameter Units.RotationalStiffness kB = 0.5e6 "Stiffness of the suspension of a brake unit";
@@ -34,6 +34,9 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
   output Units.Force Fx "Longitudinal creep force of both wheels";
   output Units.Velocity slip "Slip velocity";
   output Units.Force Fz "Wheel load";
+  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
   Units.Length zF(start=0.0, fixed=true, nominal=0.01) "Bounce of the frame, from rest";
   Units.Velocity vF(start=0.0, fixed=true, nominal=0.1) "Bounce velocity of the frame";
   Units.Angle betaB(start=0.0, fixed=true, nominal=0.01) "Pitch of the brake units, pads up, from rest";
@@ -53,6 +56,12 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(F=Fx)
+    constrainedby Sensors.PartialForceSensor(F=Fx) "Force sensor of the rig";
 
 protected
   Units.Velocity vSlide "Velocity of the disc relative to the pads, upwards";

@@ -3,10 +3,10 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   parameter Units.Length rW(min=0.1) = 0.46 "Wheel radius";
   parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
   parameter Units.Length rB(min=0.1) = 0.30 "Radius at which the pads act";
-  parameter Units.Inertia JW = 110.0 "Inertia of the wheelset about its axle";
-  parameter Units.Inertia JR = 1500.0 "Inertia of the roller alone";
+  parameter Units.Inertia JW(min=1.0) = 110.0 "Inertia of the wheelset about its axle";
+  parameter Units.Inertia JR(min=1.0) = 1500.0 "Inertia of the roller alone";
   parameter Units.Force Fz(min=1000.0) = 80000.0 "Wheel load";
-  parameter Units.FrictionCoefficient muWR = 0.15 "Friction wheel-rail at zero slip velocity";
+  parameter Units.FrictionCoefficient muWR(min=0.01) = 0.15 "Friction wheel-rail at zero slip velocity";
   parameter Units.FrictionCoefficient muDC = 0.30 "Friction disc-pad";
   parameter Units.AngularVelocity omega0(min=1e-6) = 0.05 "Speed below which pad friction is smoothed";
   parameter Contact.PolachParameters polach "Law of the creep force";
@@ -23,6 +23,9 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.AngularVelocity omegaR(start=0.0, fixed=true, nominal=50.0) "Angular velocity of the roller";
   output Units.Force Fx "Longitudinal creep force of both wheels";
   output Units.Velocity slip "Slip velocity";
+  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
 
   replaceable Brakes.LinearActuation actuation(pB=pB)
     constrainedby Brakes.PartialActuation(pB=pB) "Brake actuation";
@@ -38,6 +41,12 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(F=Fx)
+    constrainedby Sensors.PartialForceSensor(F=Fx) "Force sensor of the rig";
 
 protected
   parameter Units.Force K = Contact.kalkerStiffness(Fz) "Creep force per creepage at zero slip";
@@ -57,8 +66,8 @@ the model of the disturbance observer; the friction corrections <code>dmuWR</cod
 <code>tauR</code> is the torque of an inertia-simulating drive, <code>JR</code> the roller's own
 inertia.</p>
 <h4>Slots</h4>
-<p>Actuation, pad friction, contact friction and losses are replaceable: a new physical effect is a
-<code>redeclare</code>.</p>
+<p>Actuation, pad friction, contact friction, losses and sensors are replaceable: a new physical effect
+is a <code>redeclare</code>. A sensor changes its reading and nothing else.</p>
 <h4>References</h4>
 <p>C. Schwarz, J. Brembeck, B. Heckmann (2018), equations (1) to (3).</p>
 </html>"));

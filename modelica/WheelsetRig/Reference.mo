@@ -3,10 +3,10 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
   parameter Units.Length rW(min=0.1) = 0.46 "Wheel radius";
   parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
   parameter Units.Length rB(min=0.1) = 0.30 "Radius at which the pads act";
-  parameter Units.Inertia JW = 110.0 "Inertia of the wheelset about its axle";
-  parameter Units.Inertia JR = 1500.0 "Inertia of the roller alone";
+  parameter Units.Inertia JW(min=1.0) = 110.0 "Inertia of the wheelset about its axle";
+  parameter Units.Inertia JR(min=1.0) = 1500.0 "Inertia of the roller alone";
   parameter Units.Force Fz(min=1000.0) = 80000.0 "Wheel load at rest";
-  parameter Units.FrictionCoefficient muWR = 0.40 "Friction wheel-rail at zero slip velocity: dry";
+  parameter Units.FrictionCoefficient muWR(min=0.01) = 0.40 "Friction wheel-rail at zero slip velocity: dry";
   parameter Units.FrictionCoefficient muDC = 0.30 "Friction disc-pad";
   parameter Real muDCunit[3](each unit="1", each min=0) = {1.0, 1.0, 1.0}
     "Friction of each brake unit over muDC";
@@ -16,13 +16,14 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
   parameter Contact.PolachParameters polach "Law of the creep force";
   parameter Units.Mass mF = 4000.0 "Mass of the bogie frame";
   parameter Units.Inertia IF[3] = {2500.0, 2200.0, 4500.0} "Moments of inertia of the bogie frame";
-  parameter Units.Mass mG = 150.0 "Mass of a guidance arm";
-  parameter Units.Length lG = 0.5 "From the axle forward to the pivot of the guidance arms";
-  parameter Units.Mass mB = 110.0 "Mass of a brake unit";
+  parameter Units.Mass mG(min=1.0) = 150.0 "Mass of a guidance arm";
+  parameter Units.Length lG = 0.5
+    "From the axle forward to the pivot of the guidance arms; negative: behind it; at least 0.05 m";
+  parameter Units.Mass mB(min=1.0) = 110.0 "Mass of a brake unit";
   parameter Units.Length lB = 0.35 "From the pads outward to the pivot of a brake unit";
   parameter Units.Length lC = 0.0 "From the pivot to the centre of gravity of a brake unit";
-  parameter Units.Mass mW = 1900.0 "Mass of the wheelset with discs";
-  parameter Units.Inertia IW = 1150.0 "Inertia of the wheelset about x and z";
+  parameter Units.Mass mW(min=1.0) = 1900.0 "Mass of the wheelset with discs";
+  parameter Units.Inertia IW(min=1.0) = 1150.0 "Inertia of the wheelset about x and z";
   parameter Units.Length yG = 1.0 "Lateral position of axle boxes and cylinders";
   parameter Units.Length yW = 0.75 "Lateral position of the contact points";
   parameter Units.Length yB[3] = {0.35, 0.0, -0.35} "Lateral position of the brake discs";
@@ -45,6 +46,9 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
   output Units.Power discPower[3] = {pads[i].lossPower for i in 1:3} "Heat in each brake disc";
   output Units.Power slipPower = contact[1].slipPower + contact[2].slipPower
     "Heat in the contact of both wheels";
+  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
 
   replaceable Brakes.LinearActuation actuation(pB=pB)
     constrainedby Brakes.PartialActuation(pB=pB) "Brake actuation";
@@ -64,6 +68,12 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(F=FcellL + FcellR)
+    constrainedby Sensors.PartialForceSensor(F=FcellL + FcellR) "Sum of the load cells";
 
   inner Parts.World world
     annotation (Placement(transformation(extent={{-100,80},{-80,100}})));
@@ -153,6 +163,10 @@ equation
   omegaR = roller.omega;
   aW = der(omegaW);
   aR = der(omegaR);
+  assert(abs(lG) >= 0.05, "The guidance arms are too short to turn about their pivots");
+  // FV > 0, written in free parameters: compilers may decide conditions on final ones.
+  assert(Fz > 0.5*world.g*(mF + mW + 2.0*mG + 3.0*mB),
+    "The wheel load Fz is less than the weight of the rig: the vertical cylinders pull");
   energy = frame.energy + wheelset.energy + roller.energy + lateral.energy + guide.energy
     + sum(arm.energy) + sum(unit.energy) + sum(primary.energy) + sum(axleBox.energy)
     + sum(longitudinal.energy) + sum(vertical.energy) + sum(contact.energy);
@@ -232,7 +246,8 @@ series, with the wheels rolling along: 78 and 60 MN/m each.</li>
 of the roller; lateral creep and spin creepage are neglected. The reaction of bearing friction on
 the axle boxes is neglected.</p>
 <h4>Slots</h4>
-<p>As in <code>MinimalObserver</code>; pad friction is an array of three, contact friction of two.</p>
+<p>As in <code>MinimalObserver</code>; pad friction is an array of three, contact friction of two.
+The force sensor reads the sum of the load cells.</p>
 <h4>References</h4>
 <p>C. Schwarz, J. Brembeck, B. Heckmann (2018), Table 2; S. Iwnicki (1998), <em>Manchester
 benchmarks for rail vehicle simulation</em>, Vehicle System Dynamics 30, 295-313, for masses and

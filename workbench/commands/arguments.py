@@ -1,12 +1,19 @@
 """What the commands share."""
 
 import argparse
+import json
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
+
+from workbench.case import Case, check_names
+from workbench.errors import InputError
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 MINIMAL_OBSERVER = Path("fmus/fmi2/MinimalObserver.fmu")
+FULL_OBSERVER = Path("fmus/fmi2/FullObserver.fmu")
 
 
 def positive(text: str) -> int:
@@ -15,3 +22,76 @@ def positive(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is not 1 or more")
     return value
+
+
+def add_map(parser: argparse.ArgumentParser) -> None:
+    """Add the option --map, which `model_names` reads."""
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="OURS=THEIRS",
+        help="the FMU's own name of a variable, such as pB=brakePressure; may be repeated "
+        "(also in case.toml, [model.names])",
+    )
+
+
+def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, str]:
+    """Names of variables in the FMU, from the command line and from the cases.
+
+    Parameters
+    ----------
+    mapped : the values of --map, "pB=brakePressure"; they win over the cases.
+    cases : their names must agree, because one FMU runs on all of them.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read, names no variable of ours, or cases contradict each other.
+    """
+    given: dict[str, str] = {}
+    for entry in mapped:
+        ours, equals, theirs = entry.partition("=")
+        if not equals or ours in given:
+            raise InputError(
+                where=f"command line, --map {entry}",
+                found=f"a second name for '{ours}'" if equals else "no '='",
+                expected="OURS=THEIRS, once for each variable",
+                remedy="write for instance --map pB=brakePressure",
+            )
+        given[ours] = theirs
+    given = check_names(given, "command line, --map")
+    names: dict[str, str] = {}
+    for case in cases:
+        for ours, theirs in case.names.items():
+            if names.setdefault(ours, theirs) != theirs and ours not in given:
+                raise InputError(
+                    where=f"{case.source.parent / 'case.toml'}, [model.names] {ours}",
+                    found=f"'{theirs}', in a case before it '{names[ours]}'",
+                    expected="the same name in all cases, because one FMU runs on all",
+                    remedy=f"run these cases apart, or decide with --map {ours}=NAME",
+                )
+    return check_names(names | given, "--map and [model.names]")
+
+
+def require_compiler() -> None:
+    """Refuse to go on without the extra that holds the Modelica compiler.
+
+    Raises
+    ------
+    InputError
+        If one of its packages is missing.
+    """
+    if missing := [name for name in ("rumoca", "casadi", "ziglang") if find_spec(name) is None]:
+        raise InputError(
+            where="workbench.compiler",
+            found=f"no package '{missing[0]}'",
+            expected="the extra [compiler], which holds the Modelica compiler",
+            remedy="run 'make fmus', or: pip install -e '.[compiler]' -c constraints.txt",
+        )
+
+
+def write_json(content: dict[str, Any], path: Path) -> None:
+    """Write results, in folders made as needed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=2) + "\n")

@@ -1,17 +1,16 @@
 """`workbench fmu`: build FMUs from Modelica, describe them, check whether they are fit."""
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-from workbench.commands.arguments import Commands, positive
+from workbench.commands.arguments import Commands, positive, require_compiler, write_json
 from workbench.description import Description, read_description
 from workbench.errors import InputError
 from workbench.fitness import Finding, check, is_fit
 
 _FMUS = Path("fmus")
+_OMC = Path("build/omc")
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 
@@ -33,7 +32,8 @@ def _add_build(jobs: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench fmu build --all\n"
         "  python -m workbench fmu build MyRig/package.mo MyRig.Model --fmi 3 --out model.fmu\n"
-        "  python -m workbench fmu build --all --check",
+        "  python -m workbench fmu build --all --check\n"
+        "  python -m workbench fmu build --all --compiler omc",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     build.add_argument(
@@ -41,7 +41,18 @@ def _add_build(jobs: Commands) -> None:
     )
     build.add_argument("model", nargs="?", help="dotted name of the model")
     build.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
-    build.add_argument("--out", type=Path, metavar="FILE", help="FMU to write (default: MODEL.fmu)")
+    build.add_argument(
+        "--compiler",
+        choices=("workbench", "omc"),
+        default="workbench",
+        help="omc: OpenModelica, where it is installed; FMI 2.0 (default: %(default)s)",
+    )
+    build.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="FMU to write (default: MODEL.fmu); with omc a folder (default: build/omc)",
+    )
     build.add_argument("--all", action="store_true", help="everything that fmus/ holds")
     build.add_argument("--check", action="store_true", help="with --all: compare, write nothing")
     build.set_defaults(run=_build)
@@ -84,15 +95,11 @@ def _add_check(jobs: Commands) -> None:
 
 
 def _build(options: argparse.Namespace) -> int:
-    try:
-        from workbench import compiler  # an extra: everything else runs without it
-    except ModuleNotFoundError as error:
-        raise InputError(
-            where="workbench.compiler",
-            found=f"no package '{error.name}'",
-            expected="the extra [compiler], which holds the Modelica compiler",
-            remedy="run 'make fmus', or: pip install -e '.[compiler]' -c constraints.txt",
-        ) from None
+    require_compiler()
+    from workbench import compiler  # an extra: everything else runs without it
+
+    if options.compiler == "omc":
+        return _build_with_omc(options)
     if options.all and options.check:
         found = compiler.differences(options.package, _FMUS)
         print("\n".join(found) or f"{_FMUS} matches its sources")
@@ -101,6 +108,35 @@ def _build(options: argparse.Namespace) -> int:
         for built in compiler.build_all(options.package, _FMUS):
             print(f"{built.path}  {built.sha256}")
         return 0
+    _require_model(options)
+    out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
+    built = compiler.build(options.package, options.model, out, fmi=options.fmi)
+    print(f"{built.path}  {built.sha256}")
+    return 0
+
+
+def _build_with_omc(options: argparse.Namespace) -> int:
+    from workbench.compiler import MODELS
+    from workbench.compiler.openmodelica import build_with_omc
+
+    if options.fmi != 2 or options.check:
+        raise InputError(
+            where="--compiler omc",
+            found=f"--fmi {options.fmi}" if options.fmi != 2 else "--check",
+            expected="FMI 2.0, built, not compared: OpenModelica has no more",
+            remedy="leave the option out",
+        )
+    models = [options.model]
+    if options.all:
+        models = [f"{options.package.parent.name}.{model}" for model in MODELS]
+    else:
+        _require_model(options)
+    for path in build_with_omc(options.package, models, options.out or _OMC):
+        print(path)
+    return 0
+
+
+def _require_model(options: argparse.Namespace) -> None:
     if options.model is None:
         raise InputError(
             where="command line",
@@ -108,17 +144,13 @@ def _build(options: argparse.Namespace) -> int:
             expected="the dotted name of a model, or --all",
             remedy="see 'python -m workbench fmu build --help'",
         )
-    out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
-    built = compiler.build(options.package, options.model, out, fmi=options.fmi)
-    print(f"{built.path}  {built.sha256}")
-    return 0
 
 
 def _info(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
     print(_format_description(description))
     if options.json:
-        _write_json(asdict(description) | {"path": description.path.name}, options.json)
+        write_json(asdict(description) | {"path": description.path.name}, options.json)
     return 0
 
 
@@ -137,7 +169,7 @@ def _check(options: argparse.Namespace) -> int:
             "sha256": description.sha256,
         }
         listed = [asdict(finding) for finding in findings]
-        _write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
+        write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
     return 0 if fit else 1
 
 
@@ -178,8 +210,3 @@ def _format_findings(findings: list[Finding]) -> str:
         if f.reason:
             lines.append(f"    {f.reason}")
     return "\n".join(lines)
-
-
-def _write_json(content: dict[str, Any], path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=2) + "\n")

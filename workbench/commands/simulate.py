@@ -3,28 +3,38 @@
 import argparse
 import os
 import platform
+import subprocess
 import time
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import ExitStack
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from workbench.case import Case, read_cases
-from workbench.commands.arguments import MINIMAL_OBSERVER, Commands, positive
+from workbench.commands.arguments import (
+    FULL_OBSERVER,
+    MINIMAL_OBSERVER,
+    Commands,
+    add_map,
+    model_names,
+    positive,
+)
 from workbench.cosim import observe
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
-from workbench.observers import (
-    DirectInversion,
-    DisturbanceGains,
-    DisturbanceObserver,
-    OpenLoop,
-    stationary_gains,
-)
+from workbench.observers import Settings, all_estimators, reasoned_settings
 from workbench.report import (
+    CaseFigure,
     CaseResult,
+    LiveWindow,
+    case_figure,
     draw_case,
     format_table,
+    summarise,
     write_estimates,
+    write_page,
     write_summary,
 )
 
@@ -34,12 +44,13 @@ def add_simulate(commands: Commands) -> None:
     simulate = commands.add_parser(
         "simulate",
         help="run all estimators on recorded brake stops",
-        description="Run all estimators on recorded brake stops; write estimates (CSV), scores "
-        "(summary.json) and figures.",
+        description="Run all estimators on recorded brake stops; write a page to read "
+        "(index.html), and beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"
         "  python -m workbench simulate\n"
         "  python -m workbench simulate cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
-        "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine",
+        "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
+        "  python -m workbench simulate cases/03_dry_120_3.6 --live",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     simulate.add_argument(
@@ -65,69 +76,143 @@ def add_simulate(commands: Commands) -> None:
         help="minimal observer model (default: %(default)s)",
     )
     simulate.add_argument(
+        "--full-fmu",
+        type=Path,
+        default=FULL_OBSERVER,
+        metavar="FILE",
+        help="model of the parameter estimator (default: %(default)s)",
+    )
+    add_map(simulate)
+    simulate.add_argument(
         "--workers",
         type=positive,
         default=os.cpu_count() or 1,
         metavar="N",
         help="processes (default: one per processor, %(default)s)",
     )
+    simulate.add_argument(
+        "--live",
+        action="store_true",
+        help="show each run in a window as it goes, one after the other",
+    )
     simulate.set_defaults(run=_simulate)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What runs on every case; travels to the processes.
+
+    Attributes
+    ----------
+    minimal, full : files of the two observer models.
+    names : our names of variables to those in the FMUs.
+    """
+
+    minimal: Path
+    full: Path
+    names: Mapping[str, str]
+    settings: Settings
+    weights: Weights
+    out: Path
 
 
 def _simulate(options: argparse.Namespace) -> int:
     cases = read_cases(options.cases)
+    names = model_names(options.map, cases)
+    window = LiveWindow() if options.live else None
     options.out.mkdir(parents=True, exist_ok=True)
-    with FMU(options.fmu) as fmu:
-        gains = stationary_gains(fmu)
+    with FMU(options.fmu, names) as minimal, FMU(options.full_fmu, names) as full:
+        settings = reasoned_settings(minimal, full)
+        print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
+        for estimator in all_estimators(minimal, full, settings):
+            estimator.run(cases[0].time[:2], cases[0].u[:2], cases[0].y[:2])
         provenance = {
             "workbench": version("wheelset-workbench"),
+            "commit": _commit(),
             "python": platform.python_version(),
-            "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy")},
-            "fmu": {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256},
-            "disturbance_observer": {
-                "L": gains.L.tolist(),
-                "T_WR": gains.T_WR,
-                "T_DC": gains.T_DC,
-                "effect": gains.effect.tolist(),
-                "source": "stationary Kalman gain of the linearised model",
+            "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
+            **{
+                key: {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
+                for key, fmu in (("fmu", minimal), ("full_fmu", full))
             },
+            **settings.summary(),
         }
     weights = Weights()
-    results: list[CaseResult] = []
+    plan = _Plan(options.fmu, options.full_fmu, names, settings, weights, options.out)
+    done: list[tuple[CaseResult, CaseFigure]] = []
     begin = time.perf_counter()
     interrupted = False
-    with ProcessPoolExecutor(min(options.workers, len(cases))) as pool:
-        tasks = [pool.submit(_run_case, c, options.fmu, gains, weights, options.out) for c in cases]
-        try:
-            for task in as_completed(tasks):
-                results.append(task.result())
-                _show_progress(len(results), len(cases), results[-1].case.name, begin)
-        except KeyboardInterrupt:
-            interrupted = True
-            pool.shutdown(cancel_futures=True)
-    results.sort(key=lambda result: result.case.name)
-    if results:
-        write_summary(results, weights, provenance, options.out / "summary.json")
+    if window is None:
+        runs = _in_processes(cases, options.workers, plan)
+    else:
+        runs = (_run_case(case, plan, window) for case in cases)
+    try:
+        for result, figure in runs:
+            done.append((result, figure))
+            _show_progress(len(done), len(cases), figure.name, begin)
+    except KeyboardInterrupt:
+        interrupted = True
+        print("interrupted", flush=True)
+    if done:
+        done.sort(key=lambda pair: pair[1].name)
+        results = [result for result, _ in done]
+        summary = summarise(results, weights, provenance)
+        write_summary(summary, options.out / "summary.json")
+        page = options.out / "index.html"
+        write_page(summary, [figure for _, figure in done], len(cases), page)
         print(format_table(results))
-        print(
-            f"{len(results)} of {len(cases)} cases; figures, CSV and summary.json in {options.out}"
-        )
+        print(f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it")
+    if window is not None and not interrupted:
+        window.wait()
     return 130 if interrupted else 0
 
 
+def _in_processes(
+    cases: Sequence[Case], workers: int, plan: _Plan
+) -> Iterator[tuple[CaseResult, CaseFigure]]:
+    """All cases, each in a process, in the order they end; an interruption drops the others."""
+    with ProcessPoolExecutor(min(workers, len(cases))) as pool:
+        tasks = [pool.submit(_run_case, case, plan) for case in cases]
+        try:
+            for task in as_completed(tasks):
+                yield task.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
 def _run_case(
-    case: Case, fmu_path: Path, gains: DisturbanceGains, weights: Weights, out: Path
-) -> CaseResult:
-    """All estimators on one case, in a process of its own; writes its CSV and figure."""
-    with FMU(fmu_path) as fmu:
-        roller_radius = fmu.defaults["rR"]
-        estimators = (OpenLoop(fmu), DirectInversion(fmu), DisturbanceObserver(fmu, gains))
+    case: Case, plan: _Plan, window: LiveWindow | None = None
+) -> tuple[CaseResult, CaseFigure]:
+    """All estimators on one case; writes its CSV and figures."""
+    with ExitStack() as stack:
+        minimal, full = (
+            stack.enter_context(FMU(path, plan.names)) for path in (plan.minimal, plan.full)
+        )
+        roller_radius = minimal.defaults["rR"]
+        estimators = all_estimators(minimal, full, plan.settings)
+        if window is not None:
+            window.show(case, estimators)
         runs = {e.name: observe(case, e) for e in estimators}
-    scores = {name: score(case, run, roller_radius, weights) for name, run in runs.items()}
+    scores = {name: score(case, run, roller_radius, plan.weights) for name, run in runs.items()}
     result = CaseResult(case, runs, scores)
-    write_estimates(result, out / f"{case.name}.csv")
-    draw_case(result, roller_radius, out / f"{case.name}.png")
-    return result
+    figure = case_figure(result, roller_radius)
+    write_estimates(result, plan.out / f"{case.name}.csv")
+    draw_case(figure, [plan.out / f"{case.name}.png", plan.out / f"{case.name}.svg"])
+    return result, figure
+
+
+def _commit() -> str | None:
+    """Commit of the checkout that this package is run from, "-dirty" if changed; None if none."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return None
+    git = ["git", "--no-optional-locks", "-C", str(root)]
+    describe = ["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        answer = subprocess.run([*git, *describe], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return answer.stdout.strip()
 
 
 def _show_progress(done: int, total: int, name: str, begin: float) -> None:

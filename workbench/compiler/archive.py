@@ -27,6 +27,12 @@ PLATFORMS = {
     "macos-aarch64": ("aarch64-darwin", "aarch64-darwin", "aarch64-macos", ".dylib"),
 }
 
+# Without frame pointers: in calls of a small model, saving them is a tenth of the time.
+FLAGS = (
+    *("-std=c99", "-O2", "-g0", "-fPIC", "-fvisibility=hidden"),
+    *("-ffp-contract=off", "-fomit-frame-pointer"),
+)
+
 
 def library_sources(fmi: int) -> list[str]:
     """C files that make up the library, besides headers."""
@@ -69,8 +75,7 @@ def compile_library(sources: Path, library: Path, fmi: int, target: str) -> None
     """
     library.parent.mkdir(parents=True, exist_ok=True)
     command = [
-        *(sys.executable, "-m", "ziglang", "cc", "-target", target, "-std=c99", "-O2", "-g0"),
-        *("-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-s", "-I."),
+        *(sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS, "-shared", "-s", "-I."),
         *library_sources(fmi),
         *(() if "windows" in target else ("-lm",)),
         *((f"-Wl,-install_name,@rpath/{library.name}",) if "macos" in target else ()),

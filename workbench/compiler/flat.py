@@ -335,7 +335,7 @@ class _Reader:
             case "and" | "or":
                 lhs, rhs = self._condition(body["lhs"]), self._condition(body["rhs"])
                 return BINARY[kind](lhs, rhs)
-            case "expression":
+            case "expression" | "discrete":
                 return self.arena.value(body)[()]
         raise self.arena.refuse(f"a condition of kind '{kind}'")
 

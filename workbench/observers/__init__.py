@@ -3,6 +3,7 @@
 from workbench.observers.baselines import DirectInversion, OpenLoop
 from workbench.observers.contract import ESTIMATE, Estimate, Estimator
 from workbench.observers.disturbance import (
+    DiscModel,
     DisturbanceGains,
     DisturbanceObserver,
     NoiseLevels,
@@ -12,10 +13,12 @@ from workbench.observers.disturbance import (
 from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
 from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
 from workbench.observers.suite import Settings, all_estimators, reasoned_settings
+from workbench.observers.utilisation import PeakForce
 
 __all__ = [
     "ESTIMATE",
     "DirectInversion",
+    "DiscModel",
     "DisturbanceGains",
     "DisturbanceObserver",
     "Estimate",
@@ -27,6 +30,7 @@ __all__ = [
     "OperatingPoint",
     "ParameterEstimator",
     "ParameterGains",
+    "PeakForce",
     "Settings",
     "UnscentedKalmanFilter",
     "all_estimators",

@@ -3,11 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import evaluate, linearise, read, set_states, solve
+from workbench.kernel import compiled, evaluate, inlined, linearise, read, set_states, solve
 from workbench.observers.contract import Estimator, measure, report
 
 
@@ -21,7 +20,7 @@ class _OpenLoopMemory(NamedTuple):
     change: Matrix
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _open_loop_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of the model; y is not used."""
     system, change = memory.system, memory.change
@@ -31,7 +30,7 @@ def _open_loop_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-un
         status = status or evaluate(plant)
         for i in range(n):
             change[i, 0] = h * plant.dx[i]
-        status = status or linearise(plant)
+        status = status or linearise(plant, n)
         for i in range(n):
             for j in range(n):
                 system[i, j] = -h * plant.jacobian[j, i]
@@ -45,7 +44,7 @@ def _open_loop_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-un
     return status or report(plant, settings.order, settings.nominal, row)
 
 
-@njit(cache=True)
+@compiled
 def _open_loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _open_loop_law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
@@ -85,7 +84,7 @@ class _InversionMemory(NamedTuple):
     filtered: Vector  # speed, torque
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _inversion_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """The roller's balance through a first-order low-pass (backward Euler)."""
     filtered = memory.filtered
@@ -103,7 +102,7 @@ def _inversion_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-un
     return status
 
 
-@njit(cache=True)
+@compiled
 def _inversion(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _inversion_law(plant, settings, memory, steps[k], u[k], y[k], rows[k])

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 
+from workbench.case import MODEL_VARIABLES
+from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, plant, read, set_inputs, set_states
+from workbench.kernel import checked, inlined, plant, read, set_inputs, set_states
+from workbench.units import si_factor
 
 # Columns of an estimate, with units; NaN where a method does not estimate the quantity.
 ESTIMATE = {
@@ -60,13 +62,19 @@ class Estimator(ABC):
     Parameters
     ----------
     fmu : model with states omegaW, omegaR, inputs as in INPUTS and outputs as in OUTPUTS.
+
+    Raises
+    ------
+    InputError
+        If the model lacks one of MODEL_VARIABLES or has it in another unit.
     """
 
-    name: ClassVar[str]
+    name: str
     _law: ClassVar[Any]
     _loop: ClassVar[Any]
 
     def __init__(self, fmu: FMU) -> None:
+        check_model(fmu)
         self.fmu = fmu
         self._plant = plant(fmu, INPUTS, OUTPUTS)
         self._order = np.array([fmu.states.index("omegaW"), fmu.states.index("omegaR")])
@@ -128,37 +136,75 @@ class Estimator(ABC):
         return _split(rows)
 
 
+def check_model(fmu: FMU) -> None:
+    """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
+
+    Raises
+    ------
+    InputError
+        If the model lacks one of MODEL_VARIABLES, has a speed that is no state, a parameter
+        without a value, or a variable in another unit.
+    """
+    fmu.variables(tuple(MODEL_VARIABLES))
+    for ours, unit in MODEL_VARIABLES.items():
+        theirs = fmu.names.get(ours, ours)
+        where = f"{fmu.path}, variable '{theirs}'"
+        if ours in ("omegaW", "omegaR") and ours not in fmu.states:
+            raise InputError(
+                where=where,
+                found="a variable that is no state",
+                expected=f"a continuous state for {ours}, because estimators set it",
+                remedy=f"choose the speed as state in the model, or map another: --map {ours}=NAME",
+            )
+        if ours in (*FRICTIONS, "rW", "rR", "JR") and ours not in fmu.defaults:
+            raise InputError(
+                where=where,
+                found="no start value",
+                expected=f"a parameter with a value for {ours}",
+                remedy=f"make it a parameter of the model, or map another: --map {ours}=NAME",
+            )
+        declared = fmu.units.get(ours)
+        # Coefficients and inertias are hardly ever in any other unit; spellings of kg.m2 abound.
+        if declared and unit not in ("1", "kg.m2") and si_factor(declared, unit, where) != 1.0:
+            raise InputError(
+                where=where,
+                found=f"unit [{declared}]",
+                expected=f"[{unit}] for {ours}; nothing is converted silently",
+                remedy=f"export the model with this variable in {unit}",
+            )
+
+
 def _split(rows: Any) -> Estimate:
     return Estimate(rows[..., :WIDTH], rows[..., WIDTH : 2 * WIDTH], rows[..., -1])
 
 
-@njit(cache=True, inline="always")
+@inlined
 def fading(speed):  # type: ignore[no-untyped-def]
     """Share of the feedback at a rolling velocity [m/s]: none at rest, all of it at speed."""
     return speed * speed / (speed * speed + FADING_SPEED**2)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def clip(value, low, high):  # type: ignore[no-untyped-def]
     """Limit to low..high; a NaN stays."""
     return min(max(value, low), high)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def measure(plant, u):  # type: ignore[no-untyped-def]
     """Set the measured inputs, u = [pB, tauR]; returns a status."""
     plant.u[0], plant.u[1] = u[0], u[1]
     return set_inputs(plant, 0, 2)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def correct(plant, dmuWR, dmuDC):  # type: ignore[no-untyped-def]
     """Set the states plant.x and the friction deviations; returns a status."""
     plant.u[2], plant.u[3] = dmuWR, dmuDC
     return set_inputs(plant, 2, 2) or set_states(plant)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def report(plant, order, nominal, row):  # type: ignore[no-untyped-def]
     """Write the estimate that the FMU is at into a row; returns a status."""
     status = read(plant)

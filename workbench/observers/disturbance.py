@@ -6,22 +6,24 @@ with rates T_WR, T_DC; all four are corrected by L [dy; integral of dy], dy = y 
 Two factors of the rows of L are ours, because measured stops coast, reverse and end at standstill:
 authority (a friction is corrected in proportion to the effect it has) and fading (below walking
 pace, measured slip is noise).
+
+The paper leaves a physical model of g_D open; `DiscModel` is one for muDC, with textbook values.
 """
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import evaluate, linearise, solve
+from workbench.kernel import compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import (
     FRICTION_RANGE,
     Estimator,
+    check_model,
     clip,
     correct,
     fading,
@@ -46,6 +48,37 @@ class DisturbanceGains:
     T_WR: float
     T_DC: float
     effect: Vector
+
+
+class DiscModel(NamedTuple):
+    """Trend of disc-pad friction with speed and disc temperature, T.
+
+    Nominal muDC is multiplied by (1 + slope (1 - v/speed)) (1 - fade (T - temperature)); the discs
+    of an axle are one lump, capacity dT/dt = share * power - cooling (T - ambient). Water on the
+    discs is no part of it. Defaults are the middle of ranges usual for disc brakes with organic
+    pads, identified from no recording: 60 to 110 kg and 460 to 540 J/(kg.K) a disc, a share of
+    0.90 to 0.98, 15 to 30 + (5 to 10) v^0.8 W/(m2.K) on 0.8 to 1.5 m2, slope 0.1 to 0.4, fade up
+    to 1e-3 /K.
+
+    Attributes
+    ----------
+    slope : change of friction over one reference speed, relative to that at the reference [1].
+    fade : loss per warming [1/K].
+    speed, temperature : of nominal friction: rolling velocity [m/s], disc [degC].
+    capacity : heat capacity of all discs on the axle [J/K].
+    share : of friction power that heats the discs; the pads take the rest [1].
+    cooling : of all discs, at medium speed [W/K].
+    ambient : of the air, and of the discs at the start [degC].
+    """
+
+    slope: float = 0.25
+    fade: float = 5e-4
+    speed: float = 22.0
+    temperature: float = 100.0
+    capacity: float = 3 * 85.0 * 500.0
+    share: float = 0.94
+    cooling: float = 3 * 120.0
+    ambient: float = 20.0
 
 
 @dataclass(frozen=True)
@@ -127,7 +160,14 @@ def stationary_gains(
 
 
 def hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
-    """Put the FMU where the creep force carries the brake torque at the given speed."""
+    """Put the FMU where the creep force carries the brake torque at the given speed.
+
+    Raises
+    ------
+    InputError
+        If estimators cannot work on the FMU.
+    """
+    check_model(fmu)
     radii = fmu.variables(["rW", "rR"])
     inputs = fmu.variables(["pB", "tauR", "dmuWR", "dmuDC"])
     wheelset, roller = fmu.states.index("omegaW"), fmu.states.index("omegaR")
@@ -154,27 +194,47 @@ class _Settings(NamedTuple):
     decay: Vector
     effect: Vector
     radius: float
+    disc: DiscModel
+    inertia: float  # of the wheelset, turns an effect on der(omegaW) into a torque
 
 
 class _Memory(NamedTuple):
     z: Vector  # omegaW, omegaR, dmuWR, dmuDC
     integral: Vector  # of dy
+    disc: Vector  # temperature [degC], physical dmuDC [1]
     system: Matrix
     change: Matrix
 
 
-@njit(cache=True, inline="always")
+@compiled
+def _trend(disc, nominal, speed, temperature):  # type: ignore[no-untyped-def]
+    """Physical muDC minus nominal."""
+    of_speed = 1.0 + disc.slope * (1.0 - abs(speed) / disc.speed)
+    return nominal * (of_speed * (1.0 - disc.fade * (temperature - disc.temperature)) - 1.0)
+
+
+@inlined
 def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of equation (9)."""
     z, integral, order = memory.z, memory.integral, settings.order
-    system, change = memory.system, memory.change
+    system, change, disc = memory.system, memory.change, settings.disc
     status = measure(plant, u)
     if h > 0.0:
         status = status or evaluate(plant)
         for i in range(2):
             change[i, 0] = h * plant.dx[order[i]]
             change[2 + i, 0] = h * settings.decay[i] * z[2 + i]
-        status = status or linearise(plant)
+        status = status or linearise(plant, 2)
+        # The effect of muDC on der(omegaW) is the brake torque per muDC, over the inertia.
+        torque = settings.inertia * plant.jacobian[3, order[0]] * (settings.nominal[1] + z[3])
+        power = disc.share * abs(torque * z[0])
+        memory.disc[0] += (
+            h * (power - disc.cooling * (memory.disc[0] - disc.ambient)) / disc.capacity
+        )
+        before = memory.disc[1]
+        memory.disc[1] = _trend(disc, settings.nominal[1], settings.radius * z[1], memory.disc[0])
+        # The deviation decays towards the physical friction, which moves on.
+        change[3, 0] += memory.disc[1] - before - h * settings.decay[1] * memory.disc[1]
         fade = fading(settings.radius * y[1])
         for i in range(4):
             share = fade
@@ -200,12 +260,11 @@ def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
             z[i] += change[i, 0]
             integral[i] += h * (y[i] - z[i])
             z[2 + i] = clip(z[2 + i] + change[2 + i, 0], settings.low[i], settings.high[i])
-        plant.x[order[0]], plant.x[order[1]] = z[0], z[1]
-        status = correct(plant, z[2], z[3])
-    return status or report(plant, order, settings.nominal, row)
+    plant.x[order[0]], plant.x[order[1]] = z[0], z[1]
+    return status or correct(plant, z[2], z[3]) or report(plant, order, settings.nominal, row)
 
 
-@njit(cache=True)
+@compiled
 def _loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
@@ -229,14 +288,26 @@ class DisturbanceObserver(Estimator):
     ----------
     fmu : minimal model, with two states.
     gains : see DisturbanceGains.
+    disc : physical trend of muDC; None for a constant. Needs the parameter JW of the model.
+
+    Notes
+    -----
+    What the trend is worth, measured with the defaults of DiscModel on fourteen recorded stops
+    (rig: fourteen of the virtual rig, whose pads follow laws of the same form, other numbers):
+    with the gains of `stationary_gains` the mean error of Fx falls from 0.22 to 0.19 % dry (rig
+    0.21, unchanged) and from 0.57 to 0.50 % with water (rig 0.58 to 0.51); in the slowest wet stop
+    it rises from 1.12 to 1.18 %. The error of muDC stays 0.6e-3 (rig). With a tenth of the gain on
+    muDC, errors of dry stops are halved: Fx 0.37 to 0.17 %, muDC 0.7e-3 to 0.3e-3 (rig).
     """
 
     name = "disturbance_observer"
     _law = staticmethod(_law)
     _loop = staticmethod(_loop)
 
-    def __init__(self, fmu: FMU, gains: DisturbanceGains) -> None:
+    def __init__(self, fmu: FMU, gains: DisturbanceGains, disc: DiscModel | None = None) -> None:
         super().__init__(fmu)
+        if disc is not None:
+            self.name = "disturbance_observer_physical"
         low, high = (FRICTION_RANGE - self._nominal[:, None]).T
         decay = np.array([gains.T_WR, gains.T_DC])
         self._settings = _Settings(
@@ -248,13 +319,20 @@ class DisturbanceObserver(Estimator):
             decay=decay,
             effect=np.ascontiguousarray(gains.effect),
             radius=self._radius,
+            disc=disc or DiscModel(slope=0.0, fade=0.0),
+            inertia=fmu.defaults["JW"] if disc else 0.0,
         )
-        self._memory = _Memory(np.zeros(4), np.zeros(2), np.zeros((4, 4)), np.zeros((4, 1)))
+        self._memory = _Memory(
+            np.zeros(4), np.zeros(2), np.zeros(2), np.zeros((4, 4)), np.zeros((4, 1))
+        )
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._memory
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        self._memory.z[:] = [y[0], y[1], 0.0, 0.0]
+        disc = self._settings.disc
+        trend = _trend(disc, self._nominal[1], self._radius * y[1], disc.ambient)
+        self._memory.disc[:] = [disc.ambient, trend]
+        self._memory.z[:] = [y[0], y[1], 0.0, trend]
         self._memory.integral[:] = 0.0
         self._plant.x[self._order] = y

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import evaluate, linearise, solve
+from workbench.kernel import compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import (
     FRICTION_RANGE,
     Estimator,
@@ -24,10 +23,13 @@ from workbench.observers.contract import (
     report,
 )
 
-
 # Distance of sigma points, as a share of the cubature rule's: a friction that nothing is known of
 # has a wide sigma, and points as far as that would slide where the wheel rolls.
 POINT_DISTANCE = 0.2
+
+# Share of feedback (see `fading`) below which the unscented filter takes the tangent: under 1 m/s
+# the slip law bends within a fraction of sigma.
+TANGENT_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -76,28 +78,36 @@ class _Memory(NamedTuple):
     work: Matrix
 
 
-@njit(cache=True)
+@inlined
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@compiled
 def _predict_mean(plant, memory, z, h):  # type: ignore[no-untyped-def]
     """Advance z by one linearly implicit step; leaves I - h*A in memory.system; a status."""
     n = plant.x.size
-    plant.x[:] = z[:n]
+    for i in range(n):
+        plant.x[i] = z[i]
     status = correct(plant, z[n], z[n + 1]) or evaluate(plant)
     for i in range(n):
         memory.change[i, 0] = h * plant.dx[i]
     memory.change[n, 0] = memory.change[n + 1, 0] = 0.0
-    status = status or linearise(plant)
-    memory.system[:] = 0.0
+    status = status or linearise(plant, n)
     for i in range(n + 2):
-        memory.system[i, i] = 1.0
-        for j in range(n):
-            memory.system[j, i] -= h * plant.jacobian[i, j]
-    memory.work[:] = memory.system
+        for j in range(n + 2):
+            memory.system[j, i] = -h * plant.jacobian[i, j] if j < n else 0.0
+        memory.system[i, i] += 1.0
+    _copy(memory.system, memory.work)
     status = status or solve(memory.work, memory.change)
-    z += memory.change[:, 0]
+    for i in range(n + 2):
+        z[i] += memory.change[i, 0]
     return status
 
 
-@njit(cache=True)
+@compiled
 def _measurement_noise(settings, y):  # type: ignore[no-untyped-def]
     """Variances of omegaW and omegaR [rad2/s2], raised towards standstill."""
     fade = max(fading(settings.radius * y[1]), 1e-3)
@@ -105,14 +115,15 @@ def _measurement_noise(settings, y):  # type: ignore[no-untyped-def]
     return (wheelset / fade) ** 2, (settings.floor[1] / fade) ** 2
 
 
-@njit(cache=True)
+@compiled
 def _conclude(plant, settings, memory, row):  # type: ignore[no-untyped-def]
     """Limit the frictions, report the estimate and its standard deviations; returns a status."""
     z, P, n = memory.z, memory.P, plant.x.size
     for i in range(2):
         z[n + i] = clip(z[n + i], settings.low[i], settings.high[i])
-    plant.x[:] = z[:n]
-    status = correct(plant, z[n], z[n + 1]) or linearise(plant)
+    for i in range(n):
+        plant.x[i] = z[i]
+    status = correct(plant, z[n], z[n + 1]) or linearise(plant, n + 2)
     status = status or report(plant, settings.order, settings.nominal, row)
     width = 8
     for i in range(2):
@@ -126,7 +137,7 @@ def _conclude(plant, settings, memory, row):  # type: ignore[no-untyped-def]
     return status
 
 
-@njit(cache=True)
+@compiled
 def _start(plant, settings, memory, u, y):  # type: ignore[no-untyped-def]
     """Covariance of the first sample; returns a status."""
     noise = _measurement_noise(settings, y)
@@ -135,7 +146,7 @@ def _start(plant, settings, memory, u, y):  # type: ignore[no-untyped-def]
     return measure(plant, u)
 
 
-@njit(cache=True)
+@compiled
 def _update(settings, memory, y, noise, row):  # type: ignore[no-untyped-def]
     """Correct mean and covariance by a sample, measured as states (Joseph form); the NIS."""
     z, P, K = memory.z, memory.P, memory.gain
@@ -169,7 +180,7 @@ def _update(settings, memory, y, noise, row):  # type: ignore[no-untyped-def]
             P[i, j] = P[j, i] = value
 
 
-@njit(cache=True)
+@compiled
 def _ekf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """Predict by the linearised model, correct by the sample."""
     if h == 0.0:
@@ -181,19 +192,19 @@ def _ekf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
     fade = fading(settings.radius * y[1])
     for i in range(size):
         P[i, i] += h * (fade * settings.walk[i]) ** 2
-    memory.work[:] = memory.system
+    _copy(memory.system, memory.work)
     status = status or solve(memory.work, P)
-    memory.transition[:] = P.T
-    memory.work[:] = memory.system
+    _copy(P.T, memory.transition)
+    _copy(memory.system, memory.work)
     status = status or solve(memory.work, memory.transition)
     if status:
         return status
-    P[:] = memory.transition
+    _copy(memory.transition, P)
     _update(settings, memory, y, _measurement_noise(settings, y), row)
     return _conclude(plant, settings, memory, row)
 
 
-@njit(cache=True)
+@compiled
 def _ekf(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _ekf_law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
@@ -202,10 +213,10 @@ def _ekf(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped
     return 0
 
 
-@njit(cache=True)
-def _triangularise(stack):  # type: ignore[no-untyped-def]
-    """Reduce rows (m, n) to the upper triangle R, (n, n) on top, with R'R = stack' stack."""
-    m, n = stack.shape
+@compiled
+def _triangularise(stack, m, root):  # type: ignore[no-untyped-def]
+    """Reduce the first m rows, (m, n), to a triangle: root, (n, n), with root' root = stack' stack."""
+    n = stack.shape[1]
     for k in range(n):
         norm = 0.0
         for i in range(k, m):
@@ -225,8 +236,9 @@ def _triangularise(stack):  # type: ignore[no-untyped-def]
             for i in range(k + 1, m):
                 stack[i, j] -= factor * stack[i, k]
         stack[k, k] = alpha
-        for i in range(k + 1, m):
-            stack[i, k] = 0.0
+    for i in range(n):
+        for j in range(n):
+            root[i, j] = stack[i, j] if j >= i else 0.0
 
 
 class _PointMemory(NamedTuple):
@@ -239,10 +251,10 @@ class _PointMemory(NamedTuple):
     work: Matrix
     root: Matrix  # upper triangle, P = root' root
     points: Matrix  # (2 size, size)
-    stack: Matrix  # (3 size + 2, size)
+    stack: Matrix  # (2 size, size)
 
 
-@njit(cache=True)
+@compiled
 def _root_to_covariance(memory):  # type: ignore[no-untyped-def]
     size = memory.z.size
     for i in range(size):
@@ -253,7 +265,7 @@ def _root_to_covariance(memory):  # type: ignore[no-untyped-def]
             memory.P[i, j] = memory.P[j, i] = total
 
 
-@njit(cache=True)
+@compiled
 def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
     """Cholesky's root of P; directions that rounding has left without variance get none."""
     P, root = memory.P, memory.root
@@ -269,7 +281,7 @@ def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
                 root[i, j] = total / root[i, i] if root[i, i] > 0.0 else 0.0
 
 
-@njit(cache=True)
+@compiled
 def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """Square-root unscented filter with 2n points of equal weight."""
     z, root, points, stack = memory.z, memory.root, memory.points, memory.stack
@@ -281,25 +293,23 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
         return status or _conclude(plant, settings, memory, row)
     fade = fading(settings.radius * y[1])
     spread = POINT_DISTANCE * np.sqrt(1.0 * size)
-    if fade < 0.8:
-        # Below 1 m/s the slip law bends within a fraction of sigma: only its tangent is of use.
+    if fade < TANGENT_SHARE:
         status = _ekf_law(plant, settings, memory, h, u, y, row)
         _covariance_to_root(memory)
         return status
     status = measure(plant, u)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
-        stack[i] = root[i]
-        stack[size + i] = 0.0
-        stack[size + i, i] = np.sqrt(h) * fade * settings.walk[i]
-    stack[2 * size :] = 0.0
-    _triangularise(stack)
+        for j in range(size):
+            stack[i, j] = root[i, j]
+            stack[size + i, j] = np.sqrt(h) * fade * settings.walk[i] if j == i else 0.0
+    _triangularise(stack, 2 * size, root)
     n = plant.x.size
     for i in range(size):
         for side in range(2):
             point = points[2 * i + side]
             for j in range(size):
-                point[j] = z[j] + (1 - 2 * side) * spread * stack[i, j]
+                point[j] = z[j] + (1 - 2 * side) * spread * root[i, j]
             for j in range(2):
                 point[n + j] = clip(point[n + j], settings.low[j], settings.high[j])
             status = status or _predict_mean(plant, memory, point, h)
@@ -311,20 +321,15 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
             total += points[i, j]
         z[j] = total / (2 * size)
     share = np.sqrt(0.5) / spread
-    stack[:] = 0.0
     for i in range(2 * size):
         for j in range(size):
             stack[i, j] = share * (points[i, j] - z[j])
-    _triangularise(stack)
-    for i in range(size):
-        for j in range(size):
-            root[i, j] = stack[i, j] if j >= i else 0.0
+    _triangularise(stack, 2 * size, root)
     _root_to_covariance(memory)
     noise = _measurement_noise(settings, y)
     _update(settings, memory, y, noise, row)
     # The root of the Joseph form: rows of root (I - K H)', and of the gain times the noise.
     a, b = settings.order
-    stack[:] = 0.0
     for i in range(size):
         for j in range(size):
             stack[i, j] = (
@@ -333,15 +338,12 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
     for j in range(size):
         stack[size, j] = memory.gain[j, 0] * np.sqrt(noise[0])
         stack[size + 1, j] = memory.gain[j, 1] * np.sqrt(noise[1])
-    _triangularise(stack)
-    for i in range(size):
-        for j in range(size):
-            root[i, j] = stack[i, j] if j >= i else 0.0
+    _triangularise(stack, size + 2, root)
     _root_to_covariance(memory)
     return _conclude(plant, settings, memory, row)
 
 
-@njit(cache=True)
+@compiled
 def _ukf(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _ukf_law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
@@ -422,7 +424,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
             *_buffers(size),
             root=np.zeros((size, size)),
             points=np.zeros((2 * size, size)),
-            stack=np.zeros((3 * size + 2, size)),
+            stack=np.zeros((2 * size, size)),
         )
 
     def _begin(self, u: Vector, y: Vector) -> None:

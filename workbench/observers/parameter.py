@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import evaluate, linearise, solve
+from workbench.kernel import compiled, evaluate, linearise, solve
 from workbench.observers.contract import (
     FRICTION_RANGE,
     Estimator,
@@ -93,7 +92,7 @@ class _Memory(NamedTuple):
     change: Matrix
 
 
-@njit(cache=True)
+@compiled
 def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of model and PI controller together."""
     order, integral, gains = settings.order, memory.integral, memory.gains
@@ -104,7 +103,7 @@ def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         status = status or evaluate(plant)
         for i in range(n):
             change[i, 0] = h * plant.dx[i]
-        status = status or linearise(plant)
+        status = status or linearise(plant, n)
         fade = fading(settings.radius * y[1])
         for i in range(2):
             # Authority has the sign of the rotation and vanishes without pressure or slip.
@@ -143,7 +142,7 @@ def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     return status or report(plant, order, settings.nominal, row)
 
 
-@njit(cache=True)
+@compiled
 def _loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
         status = _law(plant, settings, memory, steps[k], u[k], y[k], rows[k])

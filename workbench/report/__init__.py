@@ -1,6 +1,25 @@
 """Figures, tables and files, the last stage: reads results, computes nothing."""
 
-from workbench.report.figures import draw_case
-from workbench.report.results import CaseResult, format_table, write_estimates, write_summary
+from workbench.report.figures import CaseFigure, case_figure, draw_case
+from workbench.report.live import LiveWindow
+from workbench.report.page import write_page
+from workbench.report.results import (
+    CaseResult,
+    format_table,
+    summarise,
+    write_estimates,
+    write_summary,
+)
 
-__all__ = ["CaseResult", "draw_case", "format_table", "write_estimates", "write_summary"]
+__all__ = [
+    "CaseFigure",
+    "CaseResult",
+    "LiveWindow",
+    "case_figure",
+    "draw_case",
+    "format_table",
+    "summarise",
+    "write_estimates",
+    "write_page",
+    "write_summary",
+]

@@ -13,7 +13,8 @@ import pandas as pd
 
 from workbench.case import Case
 from workbench.cosim import Run
-from workbench.objective import Score, Weights
+from workbench.fmu import Vector
+from workbench.objective import Score, Weights, low_pass
 from workbench.observers import ESTIMATE
 
 
@@ -25,26 +26,60 @@ class CaseResult:
     runs: Mapping[str, Run]
     scores: Mapping[str, Score]
 
+    def measured_force(self) -> Vector | None:
+        """Creep force as it judges, below 5 Hz [N], (n,); None where it was not measured."""
+        return None if self.case.Fx is None else low_pass(self.case.time, self.case.Fx)
+
+    def error(self, name: str) -> Vector | None:
+        """Estimated minus measured creep force below 5 Hz [N], (n,); None without measurement."""
+        if self.case.Fx is None:
+            return None
+        return low_pass(self.case.time, self.runs[name].signal("Fx") - self.case.Fx)
+
+    def sigma(self, name: str, signal: str) -> Vector | None:
+        """Standard deviation of an estimated signal, (n,); None for a method without."""
+        sigma: Vector = self.runs[name].sigma[:, list(ESTIMATE).index(signal)]
+        return None if np.isnan(sigma).all() else sigma
+
 
 def write_estimates(result: CaseResult, path: Path) -> None:
-    """Write one CSV of all estimates of a case: time, then `estimator.signal [unit]`.
+    """Write one CSV of a case, all that its figure shows: time, then `source.signal [unit]`.
 
-    Signals that a method does not estimate are left out.
+    The source is `measured` or an estimator. Signals that a method does not estimate are left out;
+    `Fx_5Hz` and `Fx_error` are below 5 Hz, `sigma_...` are standard deviations, `muWR_claimed` is 1
+    where muWR is near enough to the adhesion limit to be observable.
     """
-    columns = {"time [s]": result.case.time}
+    case = result.case
+    columns = {
+        "time [s]": case.time,
+        "measured.pB [Pa]": case.pB,
+        "measured.tauR [N.m]": case.tauR,
+        "measured.omegaW [rad/s]": case.omegaW,
+        "measured.omegaR [rad/s]": case.omegaR,
+    }
+    measured = result.measured_force()
+    if case.Fx is not None and measured is not None:
+        columns |= {"measured.Fx [N]": case.Fx, "measured.Fx_5Hz [N]": measured}
     for name, run in result.runs.items():
         for signal, unit in ESTIMATE.items():
-            values = run.signal(signal)
+            values, sigma = run.signal(signal), result.sigma(name, signal)
             if not np.isnan(values).all():
                 columns[f"{name}.{signal} [{unit}]"] = values
+            if sigma is not None:
+                columns[f"{name}.sigma_{signal} [{unit}]"] = sigma
+        if not np.isnan(run.signal("muWR")).all():
+            columns[f"{name}.muWR_claimed [1]"] = run.muWR_claimed.astype(int)
+        error = result.error(name)
+        if error is not None:
+            columns[f"{name}.Fx_error [N]"] = error
     text = pd.DataFrame(columns).to_csv(index=False, float_format="%.7g")
     _write(path, text)
 
 
-def write_summary(
-    results: Sequence[CaseResult], weights: Weights, provenance: Mapping[str, Any], path: Path
-) -> None:
-    """Write summary.json: scores by case and estimator, weights of z, and what made them."""
+def summarise(
+    results: Sequence[CaseResult], weights: Weights, provenance: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Scores by case and estimator, weights of z, and what made them: the one source of numbers."""
     cases = {
         result.case.name: {
             "title": result.case.title,
@@ -62,8 +97,31 @@ def write_summary(
         }
         for result in results
     }
-    summary = {"provenance": provenance, "weights": asdict(weights), "cases": cases}
+    return {"provenance": provenance, "weights": asdict(weights), "cases": cases}
+
+
+def write_summary(summary: Mapping[str, Any], path: Path) -> None:
+    """Write summary.json."""
     _write(path, json.dumps(summary, indent=2) + "\n")
+
+
+def label(name: str) -> str:
+    """Name of an estimator for people.
+
+    >>> label("open_loop"), label("ekf")
+    ('open loop', 'extended Kalman filter')
+    """
+    full = {"ekf": "extended Kalman filter", "ukf": "unscented Kalman filter"}
+    return full.get(name, name.replace("_", " "))
+
+
+def percent(share: float) -> str:
+    """A share in percent, as tables and figures give it.
+
+    >>> percent(0.01117)
+    '1.12 %'
+    """
+    return f"{100 * share:.2f} %"
 
 
 def _write(path: Path, text: str) -> None:
@@ -93,7 +151,7 @@ def format_table(results: Sequence[CaseResult]) -> str:
         max((s for s in (r.scores[name].Fx_nrmse for r in results) if s is not None), default=None)
         for name in estimators
     ]
-    cells = ["n/a" if value is None else f"{100 * value:.2f} %" for value in worst]
+    cells = ["n/a" if value is None else percent(value) for value in worst]
     lines.append(f"{'worst':<{width}}" + "".join(f"{cell:>22}" for cell in cells))
     reasons = {
         f"{result.case.name}, {name}: {score.reason}"
@@ -105,4 +163,4 @@ def format_table(results: Sequence[CaseResult]) -> str:
 
 
 def _percent(score: Score) -> str:
-    return "n/a" if score.Fx_nrmse is None else f"{100 * score.Fx_nrmse:.2f} %"
+    return "n/a" if score.Fx_nrmse is None else percent(score.Fx_nrmse)

@@ -4,7 +4,7 @@ model WheelRollerContact "Elastic contact of one wheel on the roller, with creep
   parameter Units.Length rW "Wheel radius";
   parameter Units.Length rR "Roller radius";
   parameter Units.Force Q0(min=1000.0) "Wheel load at rest";
-  parameter Units.Stiffness c = 1.2e9 "Stiffness of the normal contact at rest";
+  parameter Units.Stiffness c(min=1e6) = 1.2e9 "Stiffness of the normal contact at rest";
   parameter Units.Damping d = 60000.0 "Damping of the normal contact at rest";
   parameter Contact.PolachParameters polach "Law of the creep force";
   parameter Units.Force QMin(min=1e-3) = 1.0 "Wheel load below which creep is smoothed";

@@ -1,8 +1,8 @@
 within WheelsetRig.Parts;
 model BrakeUnit "Calliper that bounces and pitches on the bogie frame"
   extends Interfaces.PartialTwoFrames;
-  parameter Units.Mass m "Mass";
-  parameter Units.Inertia J "Moment of inertia about the pivot";
+  parameter Units.Mass m(min=1.0) "Mass";
+  parameter Units.Inertia J(min=0.1) "Moment of inertia about the pivot";
   parameter Units.Length lB "From the pivot forward to the pads; negative: pads behind it";
   parameter Units.Length lC = 0.0 "From the pivot forward to the centre of gravity";
   parameter Units.Stiffness c "Stiffness of the suspension, vertical";

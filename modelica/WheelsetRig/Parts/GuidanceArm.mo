@@ -1,8 +1,8 @@
 within WheelsetRig.Parts;
 model GuidanceArm "Arm that pitches on the bogie frame and guides an axle box"
   extends Interfaces.PartialTwoFrames;
-  parameter Units.Mass m "Mass";
-  parameter Units.Inertia J "Moment of inertia about the pivot";
+  parameter Units.Mass m(min=1.0) "Mass";
+  parameter Units.Inertia J(min=0.1) "Moment of inertia about the pivot";
   parameter Units.Length l "From the axle box forward to the pivot; negative: pivot behind it";
   Joints.Revolute pitch(n={0, 1, 0}) "betaG"
     annotation (Placement(transformation(extent={{-70,-10},{-50,10}})));

@@ -1,8 +1,8 @@
 within WheelsetRig.Parts;
 model Wheelset "Axle with wheels and brake discs: five motions of the axle, and spin"
-  parameter Units.Mass m "Mass";
-  parameter Units.Inertia I "Moment of inertia about x and z";
-  parameter Units.Inertia J "Moment of inertia about the axle";
+  parameter Units.Mass m(min=1.0) "Mass";
+  parameter Units.Inertia I(min=1.0) "Moment of inertia about x and z";
+  parameter Units.Inertia J(min=1.0) "Moment of inertia about the axle";
   outer World world;
   Interfaces.Frame axle "Axle centre; does not spin"
     annotation (Placement(transformation(extent={{90,-10},{110,10}})));

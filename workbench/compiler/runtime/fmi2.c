@@ -1,7 +1,8 @@
 /* FMI 2.0 for Model Exchange and Co-Simulation.
  *
  * Extension: fmi2SetReal may set continuous states and tunable parameters at any time after
- * initialization, as some importers do. On a Co-Simulation instance between steps, fmi2SetTime, fmi2Get/SetContinuousStates, fmi2GetDerivatives, fmi2GetNominalsOfContinuousStates,
+ * initialization, as some importers do. On a Co-Simulation instance between steps, fmi2SetTime,
+ * fmi2Get/SetContinuousStates, fmi2GetDerivatives, fmi2GetNominalsOfContinuousStates,
  * fmi2GetEventIndicators and fmi2CompletedIntegratorStep work as in Model Exchange, so that an
  * observer can correct the state of a model that integrates itself. Source: J. Brembeck,
  * A. Pfeiffer, M. Fleps-Dezasse, M. Otter, K. Wernersson and H. Elmqvist, Nonlinear State

@@ -1,7 +1,8 @@
 /* FMI 3.0 for Model Exchange and Co-Simulation.
  *
  * Extension: fmi3SetFloat64 may set continuous states and tunable parameters at any time after
- * initialization, as some importers do. On a Co-Simulation instance in step mode, fmi3SetTime, fmi3Get/SetContinuousStates, fmi3GetContinuousStateDerivatives,
+ * initialization, as some importers do. On a Co-Simulation instance in step mode, fmi3SetTime,
+ * fmi3Get/SetContinuousStates, fmi3GetContinuousStateDerivatives,
  * fmi3GetNominalsOfContinuousStates, fmi3GetEventIndicators and fmi3CompletedIntegratorStep work as
  * in Model Exchange, so that an observer can correct the state of a model that integrates itself.
  * Source: J. Brembeck, A. Pfeiffer, M. Fleps-Dezasse, M. Otter, K. Wernersson and H. Elmqvist,

@@ -5,6 +5,13 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Keeps messages out of the code of the calls that succeed. */
+#ifdef __GNUC__
+#define COLD __attribute__((noinline, cold))
+#else
+#define COLD
+#endif
+
 enum { DERIVATIVES = 1, ALGEBRAICS = 2, JACOBIAN_XU = 4, JACOBIAN_P = 8 }; /* bits of `valid` */
 
 static const double default_tolerance = 1e-6;
@@ -55,22 +62,15 @@ static void name_phases(unsigned phases, char *text, size_t size) {
     }
 }
 
-int allowed(Instance *i, const char *function, unsigned phases) {
-    if (i == NULL) {
-        return 0;
-    }
-    i->function = function;
-    if ((i->state.phase & phases) == 0) {
-        char found[64], expected[128];
-        name_phases((unsigned)i->state.phase, found, sizeof found);
-        name_phases(phases, expected, sizeof expected);
-        report(i, STATUS_ERROR,
-               "called in phase '%s', allowed in: %s. Call the functions in the order of the FMI "
-               "standard's state machine.",
-               found, expected);
-        return 0;
-    }
-    return 1;
+int refuse_phase(const Instance *i, unsigned phases) {
+    char found[64], expected[128];
+    name_phases((unsigned)i->state.phase, found, sizeof found);
+    name_phases(phases, expected, sizeof expected);
+    report(i, STATUS_ERROR,
+           "called in phase '%s', allowed in: %s. Call the functions in the order of the FMI "
+           "standard's state machine.",
+           found, expected);
+    return 0;
 }
 
 void enter(Instance *i, Phase phase) {
@@ -157,7 +157,7 @@ Status instance_setup(Instance *i, int tolerance_defined, double tolerance, doub
 
 /* Evaluation ---------------------------------------------------------------------------------- */
 
-static Status not_finite(const Instance *i, int reference, double time) {
+static COLD Status not_finite(const Instance *i, int reference, double time) {
     return report(i, STATUS_DISCARD,
                   "the variable with value reference %d is not finite at time %.9g. Check the "
                   "states, inputs and parameters, or take a smaller step.",
@@ -222,7 +222,7 @@ static Status unknown_reference(const Instance *i, unsigned reference) {
                   reference, REFERENCE_TIME);
 }
 
-static Status null_pointer(const Instance *i) {
+static COLD Status null_pointer(const Instance *i) {
     return report(i, STATUS_ERROR, "an argument is NULL, expected an array or variable. Pass it.");
 }
 
@@ -269,7 +269,7 @@ Status instance_get(Instance *i, const unsigned reference[], size_t n, double va
 }
 
 /* Checks that a variable may be set now. */
-static Status check_settable(const Instance *i, unsigned reference) {
+static COLD Status check_settable(const Instance *i, unsigned reference) {
     const unsigned before_start = INSTANTIATED | INITIALIZATION;
     const char *what = NULL;
     unsigned phases = 0;
@@ -315,7 +315,7 @@ static Status check_settable(const Instance *i, unsigned reference) {
     return STATUS_OK;
 }
 
-static Status refuse_value(const Instance *i, int reference, double value) {
+static COLD Status refuse_value(const Instance *i, int reference, double value) {
     return report(i, STATUS_ERROR,
                   "%g for the variable with value reference %d, expected a finite number. Nothing "
                   "was set; check where the value comes from.",
@@ -327,20 +327,22 @@ Status instance_set(Instance *i, const unsigned reference[], size_t n, const dou
         return null_pointer(i);
     }
     for (size_t k = 0; k < n; k++) {
-        if (check_settable(i, reference[k]) != STATUS_OK) {
+        const Group group = group_of(reference[k]);
+        /* Every phase in which importers may set anything allows states and inputs. */
+        if (group != GROUP_X && group != GROUP_U && check_settable(i, reference[k]) != STATUS_OK) {
             return STATUS_ERROR;
         }
         if (!isfinite(value[k])) {
             return refuse_value(i, (int)reference[k], value[k]);
         }
     }
+    int changed = 0; /* importers often set what has not */
     for (size_t k = 0; k < n; k++) {
         double *const target = &i->state.value[place_of(reference[k])];
-        if (*target != value[k]) { /* importers often set what has not changed */
-            *target = value[k];
-            i->valid = 0;
-        }
+        changed |= *target != value[k];
+        *target = value[k];
     }
+    i->valid = changed ? 0 : i->valid;
     return STATUS_OK;
 }
 
@@ -377,12 +379,12 @@ Status instance_set_states(Instance *i, const double x[], size_t n) {
             return refuse_value(i, REFERENCE_X + k, x[k]);
         }
     }
+    int changed = 0;
     for (int k = 0; k < NX; k++) {
-        if (i->state.value[k] != x[k]) {
-            i->state.value[k] = x[k];
-            i->valid = 0;
-        }
+        changed |= i->state.value[k] != x[k];
+        i->state.value[k] = x[k];
     }
+    i->valid = changed ? 0 : i->valid;
     return STATUS_OK;
 }
 
@@ -430,37 +432,32 @@ Status instance_check_assertions(Instance *i) {
 
 /* Partial derivatives ------------------------------------------------------------------------- */
 
-/* Place of an unknown in `work`, which holds x, der(x), w; -1 after a message. */
-static int unknown_place(const Instance *i, unsigned reference) {
-    switch (group_of(reference)) {
-    case GROUP_X:
-    case GROUP_XDOT:
-        return (int)reference;
-    case GROUP_W:
-        return (int)reference - REFERENCE_W + 2 * NX;
-    default:
-        report(i, STATUS_ERROR,
-               "value reference %u is no unknown, expected a state, derivative, output or local "
-               "variable. Take the unknowns from the model structure in modelDescription.xml.",
-               reference);
-        return -1;
-    }
+static COLD Status no_unknown(const Instance *i, unsigned reference) {
+    return report(i, STATUS_ERROR,
+                  "value reference %u is no unknown, expected a state, derivative, output or local "
+                  "variable. Take the unknowns from the model structure in modelDescription.xml.",
+                  reference);
 }
 
-/* Column of a known: x and u, then p; -1 after a message. */
-static int known_column(const Instance *i, unsigned reference) {
-    switch (group_of(reference)) {
-    case GROUP_X:
-    case GROUP_U:
-    case GROUP_P:
-        return (int)place_of(reference);
-    default:
-        report(i, STATUS_ERROR,
-               "value reference %u is no known, expected a state, input or parameter. Take the "
-               "knowns from the model structure in modelDescription.xml.",
-               reference);
-        return -1;
-    }
+static COLD Status no_known(const Instance *i, unsigned reference) {
+    return report(i, STATUS_ERROR,
+                  "value reference %u is no known, expected a state, input or parameter. Take the "
+                  "knowns from the model structure in modelDescription.xml.",
+                  reference);
+}
+
+/* Place of an unknown in `work`, which holds x, der(x), w; -1 if it is none. */
+static int unknown_place(unsigned reference) {
+    const int64_t r = reference;
+    return r < REFERENCE_U                          ? (int)r
+           : r >= REFERENCE_W && r < REFERENCE_TIME ? (int)r - REFERENCE_W + REFERENCE_U
+                                                    : -1;
+}
+
+/* Column of a known: x and u, then p; -1 if it is none. */
+static int known_column(unsigned reference) {
+    const Group group = group_of(reference);
+    return group == GROUP_X || group == GROUP_U || group == GROUP_P ? (int)place_of(reference) : -1;
 }
 
 /* The nonzeros of a column of the Jacobian. */
@@ -470,7 +467,7 @@ typedef struct {
     int length;
 } Column;
 
-static Status get_column(Instance *i, int column, Column *result) {
+static inline Status get_column(Instance *i, int column, Column *result) {
     const int is_parameter = column >= NX + NU;
     const double *const nonzeros = jacobian(i, is_parameter ? JACOBIAN_P : JACOBIAN_XU);
     if (nonzeros == NULL) {
@@ -485,11 +482,50 @@ static Status get_column(Instance *i, int column, Column *result) {
     return STATUS_OK;
 }
 
-static Status not_differentiable(const Instance *i, unsigned reference) {
+static COLD Status not_differentiable(const Instance *i, unsigned reference) {
     return report(i, STATUS_DISCARD,
                   "the partial derivative for value reference %u is not finite at time %.9g. Check "
                   "the seed, the states, inputs and parameters.",
                   reference, i->state.time);
+}
+
+/* Zero for each unknown. Returns the place of the first if they stand one after the other, as in a
+ * column of all derivatives, else -1. */
+static int clear_block(const unsigned unknown[], size_t unknowns, double sensitivity[]) {
+    unsigned gaps = 0;
+    for (size_t k = 0; k < unknowns; k++) {
+        gaps |= unknown[k] - unknown[0] - (unsigned)k;
+    }
+    for (size_t k = 0; k < unknowns; k++) {
+        sensitivity[k] = 0.0;
+    }
+    const int first = gaps == 0 && unknowns > 0 ? unknown_place(unknown[0]) : -1;
+    const int last = first >= 0 ? unknown_place(unknown[unknowns - 1]) : -1;
+    return last - first == (int64_t)unknowns - 1 ? first : -1;
+}
+
+/* The product with one known, for a cleared block of unknowns: nonzeros go where they belong. */
+static Status directional_block(Instance *i, const unsigned unknown[], size_t unknowns, int first,
+                                int number, double seed, double sensitivity[]) {
+    Column column;
+    if (get_column(i, number, &column) != STATUS_OK) {
+        return STATUS_DISCARD;
+    }
+    for (int n = 0; n < column.length; n++) {
+        const size_t k = (size_t)(NX + column.row[n] - first); /* huge if it is before the block */
+        if (k < unknowns) {
+            const double product = column.nonzero[n] * seed;
+            if (!isfinite(product)) {
+                return not_differentiable(i, unknown[k]);
+            }
+            sensitivity[k] = product;
+        }
+    }
+    const size_t own = (size_t)(number - first);
+    if (number < NX && own < unknowns) {
+        sensitivity[own] = seed;
+    }
+    return STATUS_OK;
 }
 
 Status instance_directional(Instance *i, const unsigned unknown[], size_t unknowns,
@@ -499,12 +535,18 @@ Status instance_directional(Instance *i, const unsigned unknown[], size_t unknow
         (knowns > 0 && (known == NULL || seed == NULL))) {
         return null_pointer(i);
     }
+    const double only = knowns == 1 ? seed[0] : 0.0;
+    const int only_known = isnormal(only) ? known_column(known[0]) : -1;
+    const int first = only_known >= 0 ? clear_block(unknown, unknowns, sensitivity) : -1;
+    if (first >= 0) {
+        return directional_block(i, unknown, unknowns, first, only_known, only, sensitivity);
+    }
     memset(i->work, 0, sizeof i->work);
     for (size_t k = 0; k < knowns; k++) {
-        const int number = known_column(i, known[k]);
+        const int number = known_column(known[k]);
         Column column;
         if (number < 0) {
-            return STATUS_ERROR;
+            return no_known(i, known[k]);
         }
         if (seed[k] == 0.0) {
             continue;
@@ -520,9 +562,9 @@ Status instance_directional(Instance *i, const unsigned unknown[], size_t unknow
         }
     }
     for (size_t k = 0; k < unknowns; k++) {
-        const int place = unknown_place(i, unknown[k]);
+        const int place = unknown_place(unknown[k]);
         if (place < 0) {
-            return STATUS_ERROR;
+            return no_unknown(i, unknown[k]);
         }
         if (!isfinite(i->work[place])) {
             return not_differentiable(i, unknown[k]);
@@ -541,17 +583,17 @@ Status instance_adjoint(Instance *i, const unsigned unknown[], size_t unknowns,
     }
     memset(i->work, 0, sizeof i->work);
     for (size_t k = 0; k < unknowns; k++) {
-        const int place = unknown_place(i, unknown[k]);
+        const int place = unknown_place(unknown[k]);
         if (place < 0) {
-            return STATUS_ERROR;
+            return no_unknown(i, unknown[k]);
         }
         i->work[place] += seed[k];
     }
     for (size_t k = 0; k < knowns; k++) {
-        const int number = known_column(i, known[k]);
+        const int number = known_column(known[k]);
         Column column;
         if (number < 0) {
-            return STATUS_ERROR;
+            return no_known(i, known[k]);
         }
         if (get_column(i, number, &column) != STATUS_OK) {
             return STATUS_DISCARD;

@@ -92,8 +92,18 @@ __attribute__((format(printf, 3, 4)))
 Status report(const Instance *i, Status status, const char *format, ...);
 void inform(const Instance *i, const char *message);
 
+/* Logs that the function being called is not allowed in this phase; returns false. */
+int refuse_phase(const Instance *i, unsigned phases);
+
 /* True if `function` may be called in this phase; else logs an error. NULL is no instance. */
-int allowed(Instance *i, const char *function, unsigned phases);
+static inline int allowed(Instance *i, const char *function, unsigned phases) {
+    if (i == NULL) {
+        return 0;
+    }
+    i->function = function;
+    return ((unsigned)i->state.phase & phases) != 0 || refuse_phase(i, phases);
+}
+
 void enter(Instance *i, Phase phase);
 
 Status instance_setup(Instance *i, int tolerance_defined, double tolerance, double start_time,

@@ -1,0 +1,6 @@
+within WheelsetRig.Sensors;
+model IdealForceSensor "Null version: the sensor reads the truth"
+  extends PartialForceSensor;
+equation
+  reading = F;
+end IdealForceSensor;

@@ -1,0 +1,3 @@
+within WheelsetRig;
+package Sensors "Sensors: from the true value to the reading"
+end Sensors;

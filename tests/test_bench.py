@@ -1,0 +1,67 @@
+"""Times of calls into an FMU: that they are measured, and of the same numbers."""
+
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+from workbench.compiler.benchmark import measure_calls
+from workbench.description import read_description
+from workbench.errors import InputError
+
+
+def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -> Path:
+    """Copy an FMU with other text in one of its sources."""
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(changed, "w") as target:
+        for entry in source.namelist():
+            data = source.read(entry)
+            if entry == f"sources/{name}":
+                assert right.encode() in data
+                data = data.replace(right.encode(), wrong.encode())
+            target.writestr(entry, data)
+    return changed
+
+
+def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path) -> None:
+    times = measure_calls(read_description(minimal_path), seed=1)
+    assert (times.states, times.inputs) == (2, 6)
+    # 50 operations and five elementary functions: no computer needs less than 5 ns or, through
+    # FMI, more than 5 us. A step is several evaluations.
+    assert 5e-9 < times.derivatives < times.derivatives_fmi < 5e-6
+    assert times.nonzeros < times.jacobian_fmi < 5e-6
+    assert times.derivatives < times.step < 1e-3
+
+
+def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_path: Path) -> None:
+    slow = change_source(
+        minimal_path,
+        tmp_path / "slow.fmu",
+        "fmi2.c",
+        "    return (fmi2Status)instance_get_derivatives",
+        "    for (volatile int n = 0; n < 1000; n++) {\n    }\n"
+        "    return (fmi2Status)instance_get_derivatives",
+    )
+    # 1000 volatile increments take 200 ns or more, the plain call 30 to 100.
+    assert measure_calls(read_description(slow), seed=1).ratios()["derivatives"] > 3.0
+
+
+def test_an_interface_that_gives_other_numbers_is_refused(
+    minimal_path: Path, tmp_path: Path
+) -> None:
+    wrong = change_source(
+        minimal_path, tmp_path / "wrong.fmu", "instance.c", "xdot[k] = source[k]", "xdot[k] = 1.0"
+    )
+    with pytest.raises(InputError, match=r"wrong\.fmu: found derivatives differ"):
+        measure_calls(read_description(wrong), seed=1)
+
+
+def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path) -> None:
+    path = tmp_path / "three.fmu"
+    shutil.copyfile(root / "fmus" / "fmi3" / "MinimalObserver.fmu", path)
+    with pytest.raises(InputError, match=r"C sources of FMI 2\.0 that compile"):
+        measure_calls(read_description(path), seed=1)

@@ -1,0 +1,196 @@
+"""A model with names of its own runs like ours, and what does not fit is refused at the door."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from numpy.testing import assert_array_equal
+
+from workbench.case import MODEL_VARIABLES, Case, read_case
+from workbench.commands.arguments import model_names
+from workbench.cosim import Outcome, observe
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers import (
+    DisturbanceObserver,
+    ExtendedKalmanFilter,
+    OpenLoop,
+    stationary_gains,
+)
+from workbench.observers.contract import check_model
+
+NAMES = {
+    "omegaW": "speedWheelset",
+    "omegaR": "speedRoller",
+    "pB": "brakePressure",
+    "tauR": "driveTorque",
+    "dmuWR": "adhesionChange",
+    "dmuDC": "padChange",
+    "Fx": "creep",
+    "slip": "sliding",
+    "muWR": "adhesionLevel",
+    "muDC": "padLevel",
+    "rW": "wheelRadius",
+    "rR": "rollerRadius",
+    "JR": "rollerInertia",
+}
+
+
+@pytest.fixture(scope="module")
+def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """MinimalObserver with every variable that estimators use under another name."""
+    pytest.importorskip("rumoca")
+    pytest.importorskip("casadi")
+    from workbench import compiler  # needs the extra
+
+    folder = tmp_path_factory.mktemp("renamed")
+    library = folder / "WheelsetRig"
+    shutil.copytree(root / "modelica" / "WheelsetRig", library)
+    source = library / "MinimalObserver.mo"
+    text = source.read_text()
+    for ours, theirs in NAMES.items():
+        # Not the left side of a modifier such as `actuation(pB=pB)`.
+        text = re.sub(rf"\b{ours}\b(?!=)", theirs, text)
+    source.write_text(text)
+    path = folder / "Renamed.fmu"
+    compiler.build(
+        library / "package.mo", "WheelsetRig.MinimalObserver", path, platforms=("linux-x86_64",)
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def start_of_stop(dry_case: Case) -> Case:
+    """Coasting, first contact and the first second of braking."""
+    signals = ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
+    return replace(dry_case, **{name: getattr(dry_case, name)[:1000] for name in signals})
+
+
+@pytest.mark.parametrize("kind", [OpenLoop, DisturbanceObserver, ExtendedKalmanFilter])
+def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
+    root: Path, renamed_path: Path, start_of_stop: Case, kind: type
+) -> None:
+    estimates = []
+    with (
+        FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as ours,
+        FMU(renamed_path, NAMES) as theirs,
+    ):
+        for fmu in (ours, theirs):
+            gains = (stationary_gains(fmu),) if kind is DisturbanceObserver else ()
+            run = observe(start_of_stop, kind(fmu, *gains))
+            assert run.outcome is Outcome.OK
+            estimates.append(run.estimate)
+    assert_array_equal(*estimates)
+
+
+def test_a_model_with_other_names_is_refused_without_mapping(renamed_path: Path) -> None:
+    with FMU(renamed_path) as fmu, pytest.raises(InputError, match=r"no variable 'omegaW'.*--map"):
+        check_model(fmu)
+
+
+def test_a_name_that_the_fmu_does_not_have_is_refused_with_the_closest(minimal_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no variable 'tauRoll' \(closest: 'tauR'\).*'tauR'"):
+        FMU(minimal_path, {"tauR": "tauRoll"})
+
+
+def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_path: Path) -> None:
+    """FxReading takes the place of Fx; the model's own Fx is fmu.Fx from then on."""
+    with FMU(minimal_path) as plain, FMU(minimal_path, {"Fx": "FxReading"}) as mapped:
+        pairs = [("FxReading", "Fx"), ("Fx", "fmu.Fx")]
+        for own, new in pairs:
+            expected = plain.variables([own]).references
+            assert_array_equal(mapped.variables([new]).references, expected)
+        assert "fmu.Fx" in mapped.outputs
+
+
+@pytest.mark.parametrize(
+    ("names", "match"),
+    [
+        ({"omegaW": "omegaWReading"}, "'omegaWReading': found a variable that is no state"),
+        ({"muWR": "Fx", "Fx": "FxReading"}, "'Fx': found no start value"),
+        ({"slip": "Fx", "Fx": "FxReading"}, r"'Fx': found \[N\], a unit of another dimension"),
+    ],
+)
+def test_a_variable_of_the_wrong_kind_is_refused(
+    minimal_path: Path, names: dict[str, str], match: str
+) -> None:
+    with FMU(minimal_path, names) as fmu, pytest.raises(InputError, match=match):
+        check_model(fmu)
+
+
+@pytest.mark.parametrize(
+    ("ours", "unit"),
+    [("pB", "bar"), ("tauR", "kN.m"), ("omegaR", "rpm"), ("Fx", "kN"), ("slip", "km/h")],
+)
+def test_another_unit_is_refused_and_both_are_named(minimal: FMU, ours: str, unit: str) -> None:
+    minimal.units[ours] = unit
+    match = rf"'{ours}': found unit \[{unit}\]; expected \[{MODEL_VARIABLES[ours]}\]"
+    for use in (check_model, OpenLoop, stationary_gains):
+        with pytest.raises(InputError, match=match):
+            use(minimal)
+
+
+def test_a_variable_without_a_unit_is_taken_as_si(minimal: FMU) -> None:
+    minimal.units.clear()
+    check_model(minimal)
+
+
+def copy(case: Path, folder: Path, text: str) -> Case:
+    """A case with more text in its case.toml."""
+    shutil.copytree(case, folder)
+    toml = folder / "case.toml"
+    toml.write_text(f"{toml.read_text()}\n{text}\n")
+    return read_case(folder)
+
+
+def test_names_come_from_cases_and_from_the_command_line_which_wins(
+    root: Path, tmp_path: Path
+) -> None:
+    folder = root / "cases" / "03_dry_120_3.6"
+    text = '[model.names]\npB = "pressure"\ntauR = "torque"'
+    cases = [copy(folder, tmp_path / name, text) for name in ("a", "b")]
+    assert cases[0].names == {"pB": "pressure", "tauR": "torque"}
+    assert model_names(["pB=brakePressure"], cases) == {"pB": "brakePressure", "tauR": "torque"}
+    assert model_names([]) == read_case(folder).names == {}
+
+
+def test_cases_that_contradict_each_other_need_the_command_line(root: Path, tmp_path: Path) -> None:
+    folder = root / "cases" / "03_dry_120_3.6"
+    cases = [copy(folder, tmp_path / n, f'[model.names]\npB = "{n}"') for n in ("a", "b")]
+    match = r"b/case.toml, \[model.names\] pB: found 'b', in a case before it 'a'"
+    with pytest.raises(InputError, match=match):
+        model_names([], cases)
+    assert model_names(["pB=c"], cases) == {"pB": "c"}
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ('[model]\nname = "x"', r"\[model\]: found unknown key 'name' \(closest: 'names'\)"),
+        ('[model.names]\npb = "x"', r"unknown key 'pb' \(closest: 'pB'\)"),
+        ("[model.names]\npB = 1", r"\[model.names\] pB: found 1; expected a text"),
+        ('[model.names]\npB = "x"\ntauR = "x"', r"tauR: found variable 'x', which is already pB"),
+    ],
+)
+def test_a_wrong_name_in_a_case_is_refused(
+    root: Path, tmp_path: Path, text: str, match: str
+) -> None:
+    with pytest.raises(InputError, match=match):
+        copy(root / "cases" / "03_dry_120_3.6", tmp_path / "case", text)
+
+
+@pytest.mark.parametrize(
+    ("mapped", "match"),
+    [
+        (["pB"], "--map pB: found no '='"),
+        (["pB=a", "pB=b"], "--map pB=b: found a second name for 'pB'"),
+        (["pb=a"], r"unknown key 'pb' \(closest: 'pB'\)"),
+        (["pB="], "--map pB: found ''; expected a text"),
+        (["pB=a", "tauR=a"], "--map tauR: found variable 'a', which is already pB"),
+    ],
+)
+def test_a_wrong_map_option_is_refused(mapped: list[str], match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        model_names(mapped)

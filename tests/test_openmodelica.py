@@ -1,0 +1,105 @@
+"""The driver of OpenModelica: what it asks of omc, and what it makes of omc's answers.
+
+A shell script stands in for omc: it writes down how it was called, prints what omc prints, and
+leaves a file. Trajectories of real builds are compared in `test_clients`.
+"""
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+
+from workbench.__main__ import main
+from workbench.compiler.openmodelica import Message, build_with_omc, errors
+from workbench.errors import InputError
+
+CHECKED = (
+    '"Check of Rig.M completed successfully.\nClass Rig.M has {} equation(s) and {} variable(s)."'
+)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    path = tmp_path / 'a "quoted" folder' / "Rig" / "package.mo"
+    path.parent.mkdir(parents=True)
+    path.write_text("package Rig end Rig;")
+    return path
+
+
+def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, prints: str, *, builds: bool) -> Path:
+    """Put a program 'omc' on the PATH; returns the file in which it notes its call."""
+    calls, said = folder / "calls", folder / "said"
+    said.write_text(prints)
+    program = folder / "bin" / "omc"
+    program.parent.mkdir()
+    leave = "echo fmu > M.fmu" if builds else ":"
+    program.write_text(
+        f'#!/bin/sh\necho "$@" > {calls}\ncat build.mos >> {calls}\n{leave}\ncat {said}\n'
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
+    return calls
+
+
+def test_omc_is_asked_for_fmi_2_with_cvode_and_directional_derivatives(
+    tmp_path: Path, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = stand_in(tmp_path, monkeypatch, CHECKED.format(7, 7), builds=True)
+    out = tmp_path / "out" / "omc"
+    assert build_with_omc(package, ["Rig.M"], out) == [out / "M.fmu"]
+    assert (out / "M.fmu").read_text() == "fmu\n"
+    assert [p.name for p in out.iterdir()] == ["M.fmu"]
+    options, load, _, build, _ = calls.read_text().splitlines()
+    assert options == "--fmiFlags=s:cvode -d=-disableDirectionalDerivatives build.mos"
+    assert 'a \\"quoted\\" folder/Rig/package.mo"); getErrorString();' in load
+    assert build.startswith('buildModelFMU(Rig.M, version="2.0", fmuType="me_cs"')
+
+
+@pytest.mark.parametrize(
+    ("prints", "match"),
+    [
+        (
+            'true\n"[/lib/Rig/Part.mo:12:3-12:20:writable] Error: Class Foo not found.\n'
+            'Error: Error occurred while flattening model Rig.M"\n',
+            r"^/lib/Rig/Part.mo:12: found Class Foo not found\.",
+        ),
+        ('"Error: Failed to load package Rig"', "model Rig.M: found Failed to load package Rig"),
+        (CHECKED.format(6, 7), "found 6 equations, 7 unknowns"),
+        ("Killed", "found Killed"),
+        ("", "found nothing printed"),
+    ],
+)
+def test_what_omc_refuses_is_reported_and_nothing_is_written(
+    prints: str, match: str, tmp_path: Path, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # An FMU with a missing equation may be left behind, and must not be taken.
+    stand_in(tmp_path, monkeypatch, prints, builds="equation" in prints)
+    with pytest.raises(InputError, match=match):
+        build_with_omc(package, ["Rig.M"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_warnings_and_notifications_are_no_errors() -> None:
+    output = (
+        "[/lib/A.mo:1:2-3:4:readonly] Warning: Parameter k has no value.\n"
+        "[/lib/B.mo:5:6-7:8:writable] Notification: From here:\n"
+        r"[C:\lib\C.mo:9:1-9:2:writable] Error: No viable alternative near token: end"
+    )
+    assert errors(output) == [Message(r"C:\lib\C.mo:9", "No viable alternative near token: end")]
+
+
+def test_without_omc_the_command_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert main(["fmu", "build", "--all", "--compiler", "omc"]) == 2
+    assert "no program 'omc' on the PATH" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_fmi_3_is_not_asked_of_omc(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fmu", "build", "--all", "--compiler", "omc", "--fmi", "3"]) == 2
+    assert "--compiler omc: found --fmi 3" in capsys.readouterr().err

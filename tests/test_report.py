@@ -1,0 +1,560 @@
+"""The page of `simulate`: what a colleague reads, sees, hears and prints without the tool."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import lxml.html
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from workbench.__main__ import main
+from workbench.case import Case
+from workbench.cosim import observe
+from workbench.fmu import FMU
+from workbench.objective import Weights, score
+from workbench.observers import DirectInversion, OpenLoop
+from workbench.report import (
+    CaseResult,
+    case_figure,
+    summarise,
+    write_estimates,
+    write_page,
+)
+from workbench.report.figures import DARK, LIGHT
+from workbench.report.page import extremes, standings
+from workbench.report.results import label
+
+CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
+UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
+PROVENANCE = {
+    "workbench": "0",
+    "commit": None,
+    "python": "3",
+    "packages": {},
+    "fmu": {"file": "a.fmu", "model": "A", "sha256": "0" * 64},
+}
+SCORE = {"Fx_nrmse": None, "Fx_rms_N": 1.0, "z": 1.0, "seconds": 1.0, "reason": ""}
+CHROMIUM = shutil.which("chromium")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Three recorded stops and one without Fx, through the command line."""
+    folder = tmp_path_factory.mktemp("report")
+    source = root / "cases" / "02_dry_100_2.7"
+    vehicle = folder / UNJUDGED
+    vehicle.mkdir()
+    (vehicle / "case.toml").write_text((source / "case.toml").read_text())
+    table = pd.read_csv(source / "measured.csv").drop(columns="Fx [N]").iloc[:1600]
+    table.to_csv(vehicle / "measured.csv", index=False)
+    out = folder / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        cases = [f"cases/{name}" for name in CASES]
+        assert main(["simulate", *cases, str(vehicle), "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def summary(results: Path) -> dict[str, Any]:
+    return json.loads((results / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def page(results: Path) -> Any:
+    return lxml.html.fromstring((results / "index.html").read_bytes())
+
+
+def columns(table: Any) -> list[str]:
+    return [" ".join(cell.text_content().split()) for cell in table.xpath("./thead/tr/th")]
+
+
+def rows(table: Any) -> list[list[Any]]:
+    return [list(row) for row in table.xpath("./tbody/tr")]
+
+
+def test_headings_are_in_order_below_one_title(page: Any) -> None:
+    levels = [int(heading.tag[1]) for heading in page.xpath("//h1|//h2|//h3|//h4|//h5|//h6")]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert max(np.diff(levels)) <= 1
+    assert page.get("lang") == "en"
+
+
+def test_skip_link_is_first_and_leads_to_the_results(page: Any) -> None:
+    first = page.xpath("//body//*[self::a or self::button or @tabindex]")[0]
+    assert page.get_element_by_id(first.get("href")[1:]).tag == "main"
+
+
+def test_every_picture_states_its_finding(page: Any, summary: dict[str, Any]) -> None:
+    drawings = page.xpath("//svg[not(ancestor::svg)]")
+    assert len(drawings) == len(summary["cases"])
+    assert not page.xpath("//img[not(@alt)]")
+    for article, drawing in zip(page.xpath("//article"), drawings, strict=True):
+        assert drawing.get("role") == "img"
+        errors = [
+            values["Fx_nrmse"]
+            for values in summary["cases"][article.xpath("string(h3)")]["estimators"].values()
+        ]
+        if None in errors:
+            assert "no Fx to judge by" in drawing.get("aria-label")
+        for error in errors:
+            assert error is None or f"{100 * error:.2f} %" in drawing.get("aria-label")
+    assert not page.xpath("//svg[ancestor::svg][not(@aria-hidden)]")
+
+
+def test_every_table_has_a_caption_and_headers_with_scope(page: Any) -> None:
+    assert page.xpath("//table")
+    for table in page.xpath("//table"):
+        assert table.xpath("string(caption)").strip()
+        assert all(cell.get("scope") == "col" for cell in table.xpath("thead//th"))
+        assert all(row[0].get("scope") == "row" for row in rows(table))
+
+
+def test_regions_and_labels_refer_to_what_exists(page: Any) -> None:
+    ids = page.xpath("//@id")
+    assert len(ids) == len(set(ids))
+    assert set(page.xpath("//@aria-labelledby")) <= set(ids)
+
+
+def test_page_asks_for_nothing_from_elsewhere(results: Path, page: Any) -> None:
+    addresses = page.xpath("//@href|//@src|//@srcset|//@action|//@data")
+    assert not [a for a in addresses if re.match(r"\s*(\w+:)?//", a)]
+    assert not [a for a in addresses if ":" in a.split("/")[0] and not a.startswith("data:")]
+    text = (results / "index.html").read_text()
+    assert "url(" not in text
+    assert "@import" not in text
+    policy = page.xpath("//meta[@http-equiv='Content-Security-Policy']/@content")[0]
+    assert policy.startswith("default-src 'none'")
+    assert not re.search(r"http|\*|self", policy)
+
+
+def test_links_lead_to_headings_and_to_files_beside_the_page(results: Path, page: Any) -> None:
+    ids = set(page.xpath("//@id"))
+    links = [unquote(a) for a in page.xpath("//a/@href")]
+    assert len([a for a in links if a.endswith((".csv", ".png", ".svg"))]) == 3 * (len(CASES) + 1)
+    for link in links:
+        assert link[1:] in ids if link.startswith("#") else (results / link).stat().st_size > 0
+
+
+def test_numbers_are_those_of_the_summary(page: Any, summary: dict[str, Any]) -> None:
+    table = page.get_element_by_id("case-table")
+    titles = columns(table)
+    best = standings(summary)[0].name
+    for row in rows(table):
+        scores = summary["cases"][row[0].text_content().strip()]["estimators"]
+        shown = dict(zip(titles, row, strict=True))
+        expected = {f"{label(n)} [%]": s["Fx_nrmse"] for n, s in scores.items()}
+        expected |= {"rms error [N]": scores[best]["Fx_rms_N"], "objective z": scores[best]["z"]}
+        assert len(titles) == len(expected) + 2
+        for title, value in expected.items():
+            if value is None:
+                assert shown[title].get("data-value") == ""
+                assert shown[title].text_content() == "n/a"
+                continue
+            assert float(shown[title].get("data-value")) == value
+            share = 100 if "[%]" in title else 1
+            # Half of the last digit that a cell shows.
+            digits = len(shown[title].text_content().partition(".")[2])
+            assert_allclose(
+                float(shown[title].text_content()), share * value, rtol=0, atol=0.5001 * 10**-digits
+            )
+
+
+def best_estimator(summary: dict[str, Any]) -> str:
+    """The one whose worst case is the least."""
+
+    def worst(name: str) -> float:
+        errors = (case["estimators"][name]["Fx_nrmse"] for case in summary["cases"].values())
+        return max(error for error in errors if error is not None)
+
+    return min(next(iter(summary["cases"].values()))["estimators"], key=worst)
+
+
+def test_worst_case_of_the_best_estimator_comes_first(page: Any, summary: dict[str, Any]) -> None:
+    best = best_estimator(summary)
+    errors = {n: c["estimators"][best]["Fx_nrmse"] for n, c in summary["cases"].items()}
+    judged = sorted(CASES, key=lambda name: -errors[name])
+    names = [row[0].text_content().strip() for row in rows(page.get_element_by_id("case-table"))]
+    assert names == [*judged, UNJUDGED]
+    assert page.xpath("//article/h3/text()") == names
+    headline = page.find_class("headline")[0].text_content()
+    assert label(best) in headline
+    assert judged[0] in headline
+    assert f"{100 * errors[judged[0]]:.2f} %" in headline
+
+
+def test_page_says_what_was_run(page: Any, summary: dict[str, Any]) -> None:
+    text = page.text_content()
+    provenance = summary["provenance"]
+    assert provenance["fmu"]["sha256"] in text
+    assert provenance["fmu"]["model"] in text
+    assert provenance["commit"] is None or provenance["commit"] in text
+    for row in provenance["disturbance_observer"]["L"]:
+        for gain in row:
+            assert f"{gain:.4g}" in text
+
+
+def test_missing_scores_are_explained(page: Any) -> None:
+    warnings = [" ".join(p.text_content().split()) for p in page.find_class("warning")]
+    assert any(UNJUDGED in text and "no Fx" in text for text in warnings)
+
+
+def test_curve_of_the_page_is_that_of_the_data(results: Path, page: Any) -> None:
+    name = CASES[2]
+    data = pd.read_csv(results / f"{name}.csv")
+    plot = page.get_element_by_id(name).xpath(".//svg[@role='img']")[0]
+    axes = plot.xpath("./g[starts-with(text, 'Error of Fx')]")[0]
+    low, high = float(axes.get("data-low")), float(axes.get("data-high"))
+    panel = axes.xpath("./svg")[0]
+    levels = float(panel.get("viewbox").split()[3])
+    path = panel.xpath("./path[@data-style='2']/@d")[0]
+    assert path.count("M") == 1
+    steps = np.array(re.findall(r"-?\d+", path), dtype=float).reshape(-1, 2)
+    x, y = np.cumsum(steps, axis=0).T
+    error = np.interp(x / 1e3, data["time [s]"], data["disturbance_observer.Fx_error [N]"]) / 1e3
+    inside = (error > low) & (error < high)
+    assert inside.mean() > 0.9
+    shown = high - y * (high - low) / levels
+    # Half a level of rounding; the CSV has seven digits.
+    assert_allclose(shown[inside], error[inside], rtol=0, atol=0.51 * (high - low) / levels)
+
+
+@given(
+    values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=200),
+    blocks=st.integers(1, 50),
+)
+def test_decimation_keeps_ends_and_extremes(values: list[float], blocks: int) -> None:
+    signal = np.array(values)
+    kept = extremes(signal, blocks)
+    assert kept[0] == 0
+    assert kept[-1] == signal.size - 1
+    assert (np.diff(kept) > 0).all()
+    assert kept.size <= 2 * blocks + 2
+    assert signal[kept].min() == signal.min()
+    assert signal[kept].max() == signal.max()
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours, WCAG 2.2."""
+
+    def luminance(colour: str) -> float:
+        c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+        linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize(("theme", "curves"), [(0, LIGHT), (1, DARK)])
+def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[str, str]) -> None:
+    """WCAG 2.2 AA: 4.5 for text, 3 for graphics."""
+    css = (root / "workbench" / "report" / "page.css").read_text()
+    named = dict(re.findall(r"--(\w+): (#\w{6});", css.split(":root {")[1 + theme]))
+    for text in ("text", "quiet", "accent", "warning"):
+        assert contrast(named[text], named["ground"]) >= 4.5
+        assert contrast(named[text], named["raised"]) >= 4.5
+    for colour in curves.values():
+        assert contrast(colour, named["ground"]) >= 3.0
+
+
+@pytest.fixture(scope="module")
+def uncertain(dry_case: Case, minimal_path: Path) -> CaseResult:
+    """Two estimators, the second with a standard deviation of Fx in the first half."""
+    with FMU(minimal_path) as fmu:
+        radius = fmu.defaults["rR"]
+        runs = {e.name: observe(dry_case, e) for e in (OpenLoop(fmu), DirectInversion(fmu))}
+    sigma = np.full_like(runs["direct_inversion"].estimate, np.nan)
+    sigma[: len(sigma) // 2, 6] = 1e3  # [N], column of Fx
+    runs["direct_inversion"] = replace(runs["direct_inversion"], sigma=sigma)
+    scores = {name: score(dry_case, run, radius, Weights()) for name, run in runs.items()}
+    return CaseResult(dry_case, runs, scores)
+
+
+def write(result: CaseResult, path: Path, planned: int) -> Any:
+    """A page of one case."""
+    summary = summarise([result], Weights(), PROVENANCE)
+    write_page(summary, [case_figure(result, 0.7)], planned, path)
+    return lxml.html.fromstring(path.read_bytes())
+
+
+def test_standard_deviations_become_bands_and_columns(
+    uncertain: CaseResult, tmp_path: Path
+) -> None:
+    page = write(uncertain, tmp_path / "index.html", planned=1)
+    bands = page.xpath("//path[contains(@class, 'band')]")
+    assert [band.get("data-style") for band in bands] == ["1"]
+    panel = bands[0].xpath("./ancestor::g[1]")[0]
+    assert "Creep force" in panel.xpath("string(text)")
+    steps = np.array(re.findall(r"-?\d+", bands[0].get("d")), dtype=float).reshape(-1, 2)
+    x, y = np.cumsum(steps, axis=0).T
+    half = 1e3 * (uncertain.case.time[-1] - uncertain.case.time[0]) / 2
+    assert_allclose(x.max(), half, rtol=0, atol=200.0)  # [ms] two blocks of the band
+    # The band closes with the lower edge below the upper one by two standard deviations.
+    height = (y[-1] - y[0]) / 4000 * (float(panel.get("data-high")) - float(panel.get("data-low")))
+    assert_allclose(height, 2.0, rtol=0.01)  # [kN] rounded to levels of some 10 N
+    write_estimates(uncertain, tmp_path / "case.csv")
+    table = pd.read_csv(tmp_path / "case.csv")
+    assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]
+
+
+def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
+    uncertain: CaseResult, tmp_path: Path
+) -> None:
+    run = uncertain.runs["direct_inversion"]
+    rng = np.random.default_rng(1)
+    noise = rng.normal(1.0, 0.1, (run.time.size, 1))
+    estimate = np.nan_to_num(run.estimate, nan=0.3) * noise
+    noisy = replace(run, estimate=estimate, sigma=0.1 * np.abs(estimate))
+    names = [f"estimator_{k}" for k in range(6)]
+    figure = case_figure(
+        CaseResult(
+            uncertain.case,
+            dict.fromkeys(names, noisy),
+            dict.fromkeys(names, uncertain.scores["direct_inversion"]),
+        ),
+        roller_radius=0.7,
+    )
+    estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
+    cases = {f"case_{k}": {"title": "", "estimators": estimators} for k in range(14)}
+    figures = [replace(figure, name=name) for name in cases]
+    summary = {"provenance": PROVENANCE, "weights": {"cW": 1, "cR": 1, "cF": 1}, "cases": cases}
+    write_page(summary, figures, len(cases), tmp_path / "index.html")
+    assert 1e6 < (tmp_path / "index.html").stat().st_size < 5e6
+
+
+def test_an_interrupted_run_says_so(uncertain: CaseResult, tmp_path: Path) -> None:
+    page = write(uncertain, tmp_path / "index.html", planned=3)
+    assert "1 of 3 cases" in page.find_class("warning")[0].text_content()
+    assert not write(uncertain, tmp_path / "index.html", planned=1).find_class("warning")
+
+
+def test_an_estimator_that_fails_on_a_hard_case_does_not_win() -> None:
+    cases = {
+        "easy": {
+            "estimators": {
+                "brave": {**SCORE, "Fx_nrmse": 0.02},
+                "brittle": {**SCORE, "Fx_nrmse": 0.01},
+            }
+        },
+        "hard": {"estimators": {"brave": {**SCORE, "Fx_nrmse": 0.05}, "brittle": SCORE}},
+    }
+    ranking = standings({"cases": cases})
+    assert [standing.name for standing in ranking] == ["brave", "brittle"]
+    assert (ranking[0].case, ranking[0].worst) == ("hard", 0.05)
+    assert (ranking[1].judged, ranking[1].worst) == (1, 0.01)
+
+
+PROBE = """
+<script>
+const told = {};
+const plot = document.querySelector(".plot");
+const panels = [...plot.querySelectorAll(".panel")];
+const place = plot.parentElement;
+const [zoomIn, zoomOut, earlier, later, whole] = place.previousElementSibling.children;
+const view = () => panels.map((panel) => panel.getAttribute("viewBox").split(" ").map(Number));
+const press = (key) => place.dispatchEvent(new KeyboardEvent("keydown", { key, cancelable: true }));
+const table = document.getElementById("case-table");
+const order = () => [...table.tBodies[0].rows].map((row) => row.cells[0].textContent.trim());
+const sorts = () => [...table.tHead.rows[0].cells].map((cell) => cell.getAttribute("aria-sort"));
+const sort = (column) => {
+  table.tHead.rows[0].cells[column].querySelector("button").click();
+  return [order(), sorts()];
+};
+told.sorts = [[order(), sorts()], sort(3), sort(3), sort(0)];
+
+told.whole = view();
+zoomIn.click(); told.in = view();
+later.click(); told.later = view();
+press("ArrowLeft"); told.back = view();
+press("0"); told.reset = view();
+const box = panels[0].getBoundingClientRect();
+SVGElement.prototype.setPointerCapture = () => {}; // no pointer is active in this test
+const point = (type, share, options = {}) => plot.dispatchEvent(new PointerEvent(type, {
+  button: 0, clientX: box.left + share * box.width, clientY: box.top + 5, ...options }));
+point("pointerdown", 0.25); point("pointermove", 0.5);
+told.selections = document.querySelectorAll(".selection").length;
+point("pointerup", 0.5); told.dragged = view();
+point("pointerdown", 0.5, { shiftKey: true }); point("pointermove", 0.4); point("pointerup", 0.4);
+told.moved = view();
+place.dispatchEvent(new WheelEvent("wheel", { deltaY: 100, ctrlKey: true,
+  clientX: box.left + box.width / 2, cancelable: true }));
+told.wheeled = view();
+for (let k = 0; k < 20; k += 1) zoomIn.click();
+told.closest = view();
+whole.click();
+const entry = place.parentElement.querySelector(".legend [data-style='0'] button");
+entry.click();
+told.hidden = [entry.getAttribute("aria-pressed"),
+  [...plot.querySelectorAll("path[data-style='0']")].map((path) => path.style.display)];
+told.visible = panels.map((panel) => panel.getBoundingClientRect().height);
+told.curves = [...plot.querySelectorAll(".curve")].map((path) => path.getTotalLength());
+told.errors = errors;
+const answer = document.createElement("pre");
+answer.id = "probe";
+answer.textContent = JSON.stringify(told);
+document.body.append(answer);
+</script>
+"""
+COLLECT = """<script>
+const errors = [];
+for (const name of ["error", "securitypolicyviolation"]) {
+  addEventListener(name, (event) => errors.push(`${event.message ?? event.violatedDirective}`));
+}
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def browser(results: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What a script that uses the page finds in headless Chromium, opened as a file."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium")
+    folder = tmp_path_factory.mktemp("browser")
+    text = (results / "index.html").read_text()
+    text = text.replace("<head>", "<head>" + COLLECT).replace("</body>", PROBE + "</body>")
+    (folder / "index.html").write_text(text)
+    run = subprocess.run(
+        [
+            CHROMIUM,
+            *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+            *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+            *("--window-size=1200,900", "--enable-logging=stderr", "--dump-dom"),
+            f"--user-data-dir={folder / 'profile'}",
+            (folder / "index.html").as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
+    assert not console
+    answer = lxml.html.fromstring(run.stdout.encode()).get_element_by_id("probe")
+    return json.loads(answer.text_content())
+
+
+def test_page_opens_without_errors_and_draws_every_panel(browser: dict[str, Any]) -> None:
+    assert browser["errors"] == []
+    assert len(browser["visible"]) == 7
+    assert min(browser["visible"]) > 40  # [px] a panel that can be read
+    assert min(browser["curves"]) > 0
+
+
+def test_table_sorts_on_click(browser: dict[str, Any], page: Any, summary: dict[str, Any]) -> None:
+    """The script of the browser clicks the fourth heading twice, then the first."""
+    fourth = columns(page.get_element_by_id("case-table"))[3]
+    estimators = next(iter(summary["cases"].values()))["estimators"]
+    (clicked,) = [name for name in estimators if f"{label(name)} [%]" == fourth]
+
+    def by(estimator: str, sign: int) -> list[str]:
+        errors = {n: c["estimators"][estimator]["Fx_nrmse"] for n, c in summary["cases"].items()}
+        return [*sorted(CASES, key=lambda name: sign * errors[name]), UNJUDGED]
+
+    (first, _), (down, down_sorts), (up, up_sorts), (names, name_sorts) = browser["sorts"]
+    assert first == by(best_estimator(summary), -1)
+    assert (down, down_sorts[3]) == (by(clicked, -1), "descending")
+    assert (up, up_sorts[3]) == (by(clicked, 1), "ascending")
+    assert (names, name_sorts[0]) == ([*CASES, UNJUDGED], "ascending")
+    for sorts in (down_sorts, up_sorts, name_sorts):
+        assert sorts.count("none") == len(sorts) - 1
+
+
+def test_zoom_changes_the_view_of_all_panels_together(browser: dict[str, Any]) -> None:
+    whole = np.array(browser["whole"])
+    duration = whole[0, 2]
+
+    def times(key: str) -> list[float]:
+        view = np.array(browser[key])
+        assert np.unique(view[:, [0, 2]], axis=0).shape == (1, 2)
+        return list(view[0, [0, 2]] / duration)
+
+    assert times("whole") == [0.0, 1.0]
+    assert times("in") == [0.25, 0.5]
+    assert times("later") == [0.375, 0.5]
+    assert times("back") == [0.25, 0.5]
+    assert browser["reset"] == browser["whole"]
+    assert browser["selections"] == len(whole)
+    # A pixel of the pointer is 1/900 of the time.
+    assert_allclose(times("dragged"), [0.25, 0.25], rtol=0, atol=2e-3)
+    assert_allclose(times("moved"), [0.275, 0.25], rtol=0, atol=2e-3)
+    assert_allclose(times("wheeled")[1], 0.25 * 1.002**100, rtol=1e-2)
+    assert np.array(browser["closest"])[0, 2] == 200.0  # [ms]
+
+
+def test_zoomed_panels_fit_what_is_visible(browser: dict[str, Any]) -> None:
+    """Within a quarter of a stop, some signal moves less than half of its way."""
+    whole, zoomed = np.array(browser["whole"]), np.array(browser["dragged"])
+    assert (zoomed[:, 3] <= 1.13 * whole[:, 3]).all()  # the margin is 6 % on either side
+    assert (zoomed[:, 3] < 0.5 * whole[:, 3]).any()
+
+
+def test_legend_hides_an_estimator_everywhere(browser: dict[str, Any]) -> None:
+    pressed, displays = browser["hidden"]
+    assert pressed == "false"
+    # Force, residual, two frictions, and muWR in two parts where only some of it is claimed.
+    assert displays == ["none"] * len(displays)
+    assert len(displays) >= 4
+
+
+def test_live_without_a_display_gives_status_2_and_a_message(root: Path, tmp_path: Path) -> None:
+    headless = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "workbench", "simulate", f"cases/{CASES[0]}", "--live"]
+    run = subprocess.run(
+        [*command, "--out", str(tmp_path)], cwd=root, env=headless, capture_output=True, text=True
+    )
+    assert run.returncode == 2
+    assert "--live: found no window" in run.stderr
+    assert "run without --live" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+LIVE = """
+import sys
+from pathlib import Path
+import matplotlib.pyplot as plt
+from workbench.case import read_case
+from workbench.fmu import FMU
+from workbench.observers import DirectInversion, OpenLoop
+from workbench.report import LiveWindow
+
+window = LiveWindow()
+case = read_case(Path(sys.argv[1]))
+with FMU(Path(sys.argv[2])) as fmu:
+    window.show(case, [OpenLoop(fmu), DirectInversion(fmu)])
+    lines = plt.gcf().axes[0].get_lines()
+    print([(line.get_label(), len(line.get_xdata()) == case.time.size) for line in lines])
+    plt.close("all")
+    window.show(case, [OpenLoop(fmu)])
+window.wait()
+"""
+
+
+@pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no virtual screen")
+def test_live_window_draws_whole_runs_and_may_be_closed(root: Path, minimal_path: Path) -> None:
+    pytest.importorskip("tkinter", reason="no toolkit for windows")
+    case = root / "cases" / CASES[0]
+    environment = {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}
+    run = subprocess.run(
+        ["xvfb-run", "-a", sys.executable, "-c", LIVE, str(case), str(minimal_path)],
+        cwd=root,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert run.returncode == 0, run.stderr
+    expected = [("measured", True), ("open loop", True), ("direct inversion", True)]
+    assert run.stdout.strip() == str(expected)

@@ -1,0 +1,148 @@
+"""Friction wheel-rail is claimed where the creep force shows it, and nowhere else."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.case import Case, read_case
+from workbench.cosim import Run, observe
+from workbench.fmu import FMU
+from workbench.observers import (
+    ESTIMATE,
+    DirectInversion,
+    DisturbanceObserver,
+    ExtendedKalmanFilter,
+    OpenLoop,
+    PeakForce,
+    stationary_gains,
+)
+
+RR, NOMINAL = 0.70, 0.15
+
+
+@pytest.fixture(scope="module")
+def fmu(minimal_path: Path) -> Iterator[FMU]:
+    with FMU(minimal_path) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def peak_force(fmu: FMU) -> PeakForce:
+    return PeakForce(fmu)
+
+
+def estimates(
+    muWR: list[float], force: list[float], *, speed: float = 40.0, slip: float = 0.01
+) -> np.ndarray:
+    """Rows of an estimate; force of one wheel [N], speed and slip [m/s]."""
+    rows = np.zeros((len(muWR), len(ESTIMATE)))
+    for name, values in {
+        "omegaR": speed / RR,
+        "muWR": muWR,
+        "dmuWR": np.subtract(muWR, NOMINAL),
+        "Fx": np.multiply(2.0, force),
+        "slip": slip,
+    }.items():
+        rows[:, list(ESTIMATE).index(name)] = values
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("muWR", "used"), [(0.55, [0.15, 0.29, 0.45]), (0.40, [0.19, 0.38, 0.59]), (0.15, [0.44, 0.87])]
+)
+def test_utilisation_is_that_of_polachs_law(
+    peak_force: PeakForce, muWR: float, used: list[float]
+) -> None:
+    """Reference: peaks of the law found apart from the FMU, 40 m/s, 4, 8 and 12.5 kN a wheel."""
+    force = [4e3, 8e3, 12.5e3][: len(used)]
+    found = peak_force.utilisation(estimates([muWR] * len(used), force))
+    # Half of the last digit of the reference, as much again for interpolation.
+    np.testing.assert_allclose(found, used, atol=0.01)
+
+
+def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force: PeakForce) -> None:
+    """Reference: data sheet of the rig, F = 2 Q mu/pi (kA eps/(1+(kA eps)^2) + atan(kS eps))."""
+    Q, K, kA, kS, A, B = 80e3, 9.68e6, 1.0, 0.4, 0.4, 0.6
+    w = np.linspace(1e-3, 5.0, 50_000)
+    for speed in (1.0, 5.0, 17.0, 44.4):
+        for mu0 in (0.05, 0.12, 0.33):
+            mu = mu0 * ((1 - A) * np.exp(-B * w) + A)
+            eps = np.pi * K * w / (4 * Q * mu * np.hypot(speed, 0.1))
+            peak = (
+                2 * Q * mu / np.pi * (kA * eps / (1 + (kA * eps) ** 2) + np.arctan(kS * eps))
+            ).max()
+            found = peak_force.utilisation(estimates([mu0], [peak / 2], speed=speed))
+            # Linear interpolation between 14 speeds and 10 frictions.
+            assert found == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(
+    peak_force: PeakForce,
+) -> None:
+    """A locked wheel at 44 m/s has 0.65 of the peak force; what it shows is the friction."""
+    locked = estimates([0.55], [0.220 * 80e3], speed=44.4, slip=44.4)
+    assert peak_force.utilisation(locked) == 1.0
+    assert peak_force.claims(locked)
+
+
+def test_direction_does_not_matter(peak_force: PeakForce) -> None:
+    forward = estimates([0.2, 0.3], [10e3, 10e3], slip=0.1)
+    signs = np.ones(len(ESTIMATE))
+    signs[[list(ESTIMATE).index(name) for name in ("omegaR", "Fx", "slip")]] = -1.0
+    np.testing.assert_array_equal(
+        peak_force.utilisation(forward), peak_force.utilisation(signs * forward)
+    )
+
+
+def test_claims_begin_above_six_tenths(peak_force: PeakForce) -> None:
+    """8 kN of 13.4 (0.60), at muWR 0.25, where 0.01 in muWR is worth some 100 N."""
+    force = np.linspace(2e3, 14e3, 121)
+    rows = estimates([0.25] * force.size, list(force))
+    used, claimed = peak_force.utilisation(rows), peak_force.claims(rows)
+    np.testing.assert_array_equal(claimed, used > 0.6)
+    assert 0 < claimed.sum() < claimed.size
+
+
+def test_what_was_not_learned_is_not_claimed(peak_force: PeakForce) -> None:
+    assert peak_force.claims(estimates([NOMINAL + 0.001], [8e3]))
+    assert not peak_force.claims(estimates([NOMINAL], [8e3]))
+    assert not peak_force.claims(estimates([float("nan")], [8e3]))
+
+
+def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
+    assert not peak_force.claims(estimates([0.2], [20e3], speed=0.4))
+
+
+@pytest.fixture(scope="module")
+def slide(root: Path, fmu: FMU) -> tuple[Case, Run]:
+    case = read_case(root / "cases" / "09_wet_160_4.2_wsp")
+    return case, observe(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
+
+
+def test_a_dry_stop_claims_nothing(fmu: FMU, dry_case: Case) -> None:
+    """An ordinary dry stop uses half of the adhesion at most: muWR is not observable in it."""
+    for estimator in (
+        OpenLoop(fmu),
+        DirectInversion(fmu),
+        DisturbanceObserver(fmu, stationary_gains(fmu)),
+        ExtendedKalmanFilter(fmu),
+    ):
+        assert not observe(dry_case, estimator).muWR_claimed.any(), estimator.name
+
+
+def test_a_recorded_slide_is_claimed_throughout(slide: tuple[Case, Run]) -> None:
+    """Slip beyond 2 m/s is beyond the peak of any contact (at most 1 m/s with this law)."""
+    case, run = slide
+    sliding = RR * case.omegaR - 0.46 * case.omegaW > 2.0
+    assert sliding.sum() > 50  # a quarter of a second of the recording
+    assert run.muWR_claimed[sliding].all()
+    assert not run.muWR_claimed[case.time < 2.0].any()  # coasting
+
+
+@pytest.mark.parametrize("kind", [OpenLoop, DirectInversion])
+def test_methods_that_estimate_no_friction_claim_none(
+    fmu: FMU, slide: tuple[Case, Run], kind: type
+) -> None:
+    assert not observe(slide[0], kind(fmu)).muWR_claimed.any()

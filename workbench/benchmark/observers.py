@@ -1,0 +1,295 @@
+"""Times of the observers: compiled laws beside FMPy's methods and plain C, in one run."""
+
+import functools
+import json
+import math
+import multiprocessing
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from multiprocessing.queues import Queue
+from pathlib import Path
+
+import numpy as np
+
+from workbench.benchmark import fmpy_loops
+from workbench.benchmark.c_loop import CLoop
+from workbench.case import Case
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.observers import (
+    DisturbanceObserver,
+    Estimator,
+    ExtendedKalmanFilter,
+    ParameterEstimator,
+    Settings,
+    UnscentedKalmanFilter,
+    reasoned_settings,
+)
+
+RATES = (200.0, 1000.0, 5000.0)  # Hz
+LENGTH = 4  # times the recording, for the growth with length
+_RATE = 1000.0
+_REPEATS = 15
+_FMPY_REPEATS = 3
+_FMPY_STEPS = 1500
+_PROCESSES = 2
+_PROCESS_REPEATS = 5
+_PATIENCE = 120.0  # s, for an answer of a worker; it takes less than one
+
+Samples = tuple[Vector, Matrix, Matrix]
+
+
+@dataclass(frozen=True)
+class ObserverTimes:
+    """Medians over repeats, of whole runs per step [s].
+
+    Attributes
+    ----------
+    states : of the model.
+    step : at 1 kHz.
+    times_real_time : 1 ms over `step`.
+    by_rate : as `step` at each of RATES.
+    long : as `step` with a recording LENGTH times as long.
+    fmpy : of the same method written with FMPy's methods; None where it is not measured.
+    c : of the same method in C without FMI; None where there is none.
+    """
+
+    observer: str
+    states: int
+    step: float
+    times_real_time: float
+    by_rate: dict[float, float]
+    long: float
+    fmpy: float | None
+    c: float | None
+
+
+@dataclass(frozen=True)
+class ProcessTimes:
+    """All four observers over all cases at 1 kHz, in workers that have loaded their FMUs.
+
+    Attributes
+    ----------
+    one, two : medians with one worker and with two [s].
+    peak_memory : of one worker [bytes].
+    """
+
+    cases: int
+    one: float
+    two: float
+    peak_memory: int
+
+
+def resample(case: Case, rate: float, stretch: float = 1.0) -> Samples:
+    """Time, u and y of a recording at even steps of 1/rate, by linear interpolation.
+
+    Parameters
+    ----------
+    rate : [Hz].
+    stretch : how many times as long the recording is to last.
+    """
+    recorded = (case.time - case.time[0]) * stretch
+    t = np.arange(0.0, recorded[-1], 1.0 / rate)
+    u, y = (
+        np.column_stack([np.interp(t, recorded, column) for column in signals.T])
+        for signals in (case.u, case.y)
+    )
+    return t, u, y
+
+
+def measure_observers(case: Case, minimal: Path, full: Path) -> list[ObserverTimes]:
+    """Time all observers on one recording; Kalman filters on both models.
+
+    Parameters
+    ----------
+    minimal, full : the two observer models, FMI 2.0, the minimal one with C sources.
+    """
+    with ExitStack() as stack:
+        small, large = (stack.enter_context(FMU(path)) for path in (minimal, full))
+        settings = reasoned_settings(small, large)
+        by_fmpy, by_fmpy_large = (
+            stack.enter_context(fmpy_loops.FMPyModel(path)) for path in (minimal, full)
+        )
+        loops: list[Callable[..., object] | None] = [
+            functools.partial(fmpy_loops.disturbance_observer, by_fmpy, settings.disturbance),
+            functools.partial(fmpy_loops.parameter_estimator, by_fmpy_large, settings.parameter),
+            functools.partial(fmpy_loops.extended_kalman_filter, by_fmpy, settings.noise),
+            functools.partial(fmpy_loops.unscented_kalman_filter, by_fmpy, settings.noise),
+            None,
+            None,
+        ]
+        estimators = [
+            *_observers(small, large, settings),
+            ExtendedKalmanFilter(large, settings.noise),
+            UnscentedKalmanFilter(large, settings.noise),
+        ]
+        plain = CLoop(small, settings.disturbance)
+        return [
+            _measure(case, estimator, loop, plain if estimator is estimators[0] else None)
+            for estimator, loop in zip(estimators, loops, strict=True)
+        ]
+
+
+def _observers(minimal: FMU, full: FMU, settings: Settings) -> list[Estimator]:
+    return [
+        DisturbanceObserver(minimal, settings.disturbance),
+        ParameterEstimator(full, settings.parameter),
+        ExtendedKalmanFilter(minimal, settings.noise),
+        UnscentedKalmanFilter(minimal, settings.noise),
+    ]
+
+
+def _measure(
+    case: Case, estimator: Estimator, by_fmpy: Callable[..., object] | None, plain: CLoop | None
+) -> ObserverTimes:
+    estimator.run(*resample(case, _RATE))
+    runs: list[Callable[..., object]] = [estimator.run, *([plain.run] if plain else [])]
+    step, *c = _per_step(runs, resample(case, _RATE))
+    by_rate = {rate: _per_step([estimator.run], resample(case, rate))[0] for rate in RATES}
+    fmpy = None
+    if by_fmpy is not None:
+        t, u, y = resample(case, _RATE)
+        # From the middle of the recording on, where every law does its full work.
+        part = slice(t.size // 3, t.size // 3 + _FMPY_STEPS)
+        fmpy = _per_step([by_fmpy], (t[part], u[part], y[part]), _FMPY_REPEATS)[0]
+    return ObserverTimes(
+        observer=estimator.name,
+        states=len(estimator.fmu.states),
+        step=step,
+        times_real_time=1.0 / (_RATE * step),
+        by_rate=by_rate,
+        long=_per_step([estimator.run], resample(case, _RATE, LENGTH), 5)[0],
+        fmpy=fmpy,
+        c=c[0] if c else None,
+    )
+
+
+def _per_step(
+    runs: Sequence[Callable[..., object]], samples: Samples, repeats: int = _REPEATS
+) -> list[float]:
+    """Median time per step [s] of each; in turns, so that they meet the same load."""
+    spent: list[list[float]] = [[] for _ in runs]
+    for _ in range(repeats):
+        for run, times in zip(runs, spent, strict=True):
+            begin = time.perf_counter()
+            run(*samples)
+            times.append(time.perf_counter() - begin)
+    return [statistics.median(times) / samples[0].size for times in spent]
+
+
+def measure_compilation(minimal: Path, full: Path) -> dict[str, float]:
+    """Time of the first call of each observer [s], in a process with an empty cache."""
+    with tempfile.TemporaryDirectory() as cache:
+        run = subprocess.run(
+            [sys.executable, "-m", "workbench.benchmark.first_calls", str(minimal), str(full)],
+            env={**os.environ, "XDG_CACHE_HOME": cache},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    seconds: dict[str, float] = json.loads(run.stdout)
+    return seconds
+
+
+def measure_processes(cases: Sequence[Case], minimal: Path, full: Path) -> ProcessTimes:
+    """Time all cases with one worker and with two."""
+    one, memory = _time_workers(1, cases, minimal, full)
+    two, _ = _time_workers(_PROCESSES, cases, minimal, full)
+    return ProcessTimes(len(cases), one, two, memory)
+
+
+def _time_workers(
+    workers: int, cases: Sequence[Case], minimal: Path, full: Path
+) -> tuple[float, int]:
+    """Median time of all cases [s], and the largest memory of a worker [bytes]."""
+    context = multiprocessing.get_context("spawn")
+    tasks: Queue[int | None] = context.Queue()
+    answers: Queue[int] = context.Queue()
+    arguments = (list(cases), minimal, full, tasks, answers)
+    processes = [context.Process(target=_work, args=arguments, daemon=True) for _ in range(workers)]
+    for process in processes:
+        process.start()
+    _collect(answers, workers)
+    # The longest first, so that no worker is left with a long one at the end.
+    order = sorted(range(len(cases)), key=lambda k: -cases[k].time[-1])
+    spent = []
+    for _ in range(_PROCESS_REPEATS):
+        begin = time.perf_counter()
+        for k in order:
+            tasks.put(k)
+        _collect(answers, len(order))
+        spent.append(time.perf_counter() - begin)
+    for _ in processes:
+        tasks.put(None)
+    memory = max(_collect(answers, workers))
+    for process in processes:
+        process.join()
+    return statistics.median(spent), memory
+
+
+def _collect(answers: "Queue[int]", count: int) -> list[int]:
+    return [answers.get(timeout=_PATIENCE) for _ in range(count)]
+
+
+def _work(
+    cases: Sequence[Case],
+    minimal: Path,
+    full: Path,
+    tasks: "Queue[int | None]",
+    answers: "Queue[int]",
+) -> None:
+    """Run cases by number until None comes; answers once when ready, once a case, and memory."""
+    with FMU(minimal) as small, FMU(full) as large:
+        estimators = _observers(small, large, reasoned_settings(small, large))
+        samples = [resample(case, _RATE) for case in cases]
+        for estimator in estimators:
+            estimator.run(*(part[:2] for part in samples[0]))
+        answers.put(0)
+        while (number := tasks.get()) is not None:
+            for estimator in estimators:
+                estimator.run(*samples[number])
+            answers.put(number)
+    unit = 1 if sys.platform == "darwin" else 1024
+    answers.put(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
+
+
+def format_observers(
+    observers: Sequence[ObserverTimes], processes: ProcessTimes, compilation: Mapping[str, float]
+) -> str:
+    """The measurements as a table."""
+    rates = "".join(f" {rate:>7.0f} Hz" for rate in RATES)
+    lines = [
+        "us per step of the observers, recorded stop at 1 kHz",
+        f"{'observer':<21} {'states':>6} {'us':>6} {'real time':>10} {'FMPy':>6} {'C':>5}"
+        f"{rates} {LENGTH:>3}x long",
+    ]
+    for row in observers:
+        growth = "".join(f" {1e6 * row.by_rate[rate]:>10.2f}" for rate in RATES)
+        fmpy = row.fmpy / row.step if row.fmpy else math.nan
+        plain = row.step / row.c if row.c else math.nan
+        lines.append(
+            f"{row.observer:<21} {row.states:>6} {1e6 * row.step:>6.2f} "
+            f"{row.times_real_time:>9.0f}x {_ratio(fmpy, 5, 0)} {_ratio(plain, 4, 2)}"
+            f"{growth} {1e6 * row.long:>8.2f}"
+        )
+    lines += [
+        "FMPy: how many times as long the same method takes with FMPy's methods and numpy; "
+        "C: how many times as long as plain C without FMI",
+        "compiled once, on the first call: "
+        + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in compilation.items()),
+        f"{processes.cases} cases, all observers: {processes.one:.2f} s in one process, "
+        f"{processes.two:.2f} s in two, {processes.one / processes.two:.2f} times as fast; "
+        f"peak memory of a process {processes.peak_memory / 1e6:.0f} MB",
+    ]
+    return "\n".join(lines)
+
+
+def _ratio(value: float, width: int, digits: int) -> str:
+    return " " * (width + 1) if math.isnan(value) else f"{value:>{width}.{digits}f}x"

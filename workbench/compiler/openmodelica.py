@@ -1,0 +1,137 @@
+"""Modelica to FMU by OpenModelica, the second compiler, where it is installed.
+
+FMI 2.0 only. Its Co-Simulation is explicit Euler by default, which a stiff slip mode does not
+survive: CVODE is asked for. Directional derivatives have to be asked for, too. Source:
+OpenModelica User's Guide, chapter "FMI and TLM".
+"""
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.compiler.ccode import identifier
+from workbench.errors import InputError
+
+_OPTIONS = ("--fmiFlags=s:cvode", "-d=-disableDirectionalDerivatives")
+_MESSAGE = re.compile(
+    r"\[(?P<file>[^\]\n]*?):(?P<line>\d+):\d+-\d+:\d+:\w+\] "
+    r"(?P<kind>Error|Warning|Notification): (?P<text>.*)"
+)
+_UNPLACED = re.compile(r"^\"?Error: (?P<text>.*)", re.MULTILINE)
+_COUNTS = re.compile(r"has (\d+) equation\(s\) and (\d+) variable\(s\)")
+
+
+@dataclass(frozen=True)
+class Message:
+    """An error of omc: `place` is file:line, empty where omc gives none."""
+
+    place: str
+    text: str
+
+
+def build_with_omc(package: Path, models: Sequence[str], folder: Path) -> list[Path]:
+    """Build FMUs with OpenModelica: FMI 2.0, Model Exchange and Co-Simulation with CVODE.
+
+    Parameters
+    ----------
+    package : `package.mo` of the library.
+    models : dotted names of the models.
+    folder : where the FMUs go; a file changes only when its model has been built.
+
+    Returns
+    -------
+    fmus : paths of the FMUs, in the order of `models`.
+
+    Raises
+    ------
+    InputError
+        If omc is not installed, or refuses a model.
+    """
+    omc = shutil.which("omc")
+    if omc is None:
+        raise InputError(
+            where="--compiler omc",
+            found="no program 'omc' on the PATH",
+            expected="an installation of OpenModelica",
+            remedy="install it from https://openmodelica.org, or leave the option out",
+        )
+    if not package.is_file():
+        raise InputError(
+            where=str(package),
+            found="no such file",
+            expected="the package.mo of a Modelica library",
+            remedy="correct the path",
+        )
+    return [_build(omc, package, model, folder) for model in models]
+
+
+def script(package: Path, model: str) -> str:
+    """Commands for omc: load, count equations and unknowns, build.
+
+    Examples
+    --------
+    >>> print(script(Path("/lib/Rig/package.mo"), "Rig.Minimal"))
+    loadFile("/lib/Rig/package.mo"); getErrorString();
+    checkModel(Rig.Minimal); getErrorString();
+    buildModelFMU(Rig.Minimal, version="2.0", fmuType="me_cs", fileNamePrefix="Minimal");
+    getErrorString();
+    <BLANKLINE>
+    """
+    path = package.as_posix().replace('"', '\\"')
+    name = identifier(model)
+    return (
+        f'loadFile("{path}"); getErrorString();\n'
+        f"checkModel({model}); getErrorString();\n"
+        f'buildModelFMU({model}, version="2.0", fmuType="me_cs", fileNamePrefix="{name}");\n'
+        "getErrorString();\n"
+    )
+
+
+def errors(output: str) -> list[Message]:
+    """Errors in what omc printed, in its order; warnings are left out.
+
+    Examples
+    --------
+    >>> errors("[/lib/Rig/package.mo:3:5-3:20:writable] Error: Class Foo not found in scope Rig.")
+    [Message(place='/lib/Rig/package.mo:3', text='Class Foo not found in scope Rig.')]
+    """
+    placed = [
+        Message(f"{found['file']}:{found['line']}", found["text"].rstrip('"'))
+        for found in _MESSAGE.finditer(output)
+        if found["kind"] == "Error"
+    ]
+    unplaced = [Message("", found["text"].rstrip('"')) for found in _UNPLACED.finditer(output)]
+    # The unplaced ones sum up: "Error occurred while flattening model".
+    counts = _COUNTS.search(output)
+    if not placed and not unplaced and counts and counts[1] != counts[2]:
+        # omc calls such a check successful.
+        return [Message("", f"{counts[1]} equations, {counts[2]} unknowns")]
+    return placed + unplaced
+
+
+def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
+    name = f"{identifier(model)}.fmu"
+    with tempfile.TemporaryDirectory() as scratch:
+        (Path(scratch) / "build.mos").write_text(script(package.resolve(), model))
+        run = subprocess.run(
+            [omc, *_OPTIONS, "build.mos"], cwd=scratch, capture_output=True, text=True, check=False
+        )
+        built = Path(scratch) / name
+        found = errors(run.stdout + run.stderr)
+        if found or not built.is_file():
+            said = (run.stdout + run.stderr).strip()[-500:]
+            first = found[0] if found else Message("", said or "nothing printed")
+            raise InputError(
+                where=first.place or f"omc, model {model}",
+                found=first.text,
+                expected="Modelica that OpenModelica translates to an FMU",
+                remedy="correct the source; the workbench's own compiler may say more",
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        part = folder / f"{name}.part"
+        shutil.copyfile(built, part)
+        return part.replace(folder / name)

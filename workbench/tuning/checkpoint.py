@@ -1,0 +1,129 @@
+"""The state of a search after a generation, in one file that is whole at any moment."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.tuning.evolution import Population
+
+
+@dataclass(frozen=True)
+class Generation:
+    """What one generation came to.
+
+    Attributes
+    ----------
+    z : objective of the best candidate.
+    worst, second : cases that decide it: the worst, and the next one.
+    margin : by how much the worst exceeds the next, as a share of z.
+    candidates : judged in this generation.
+    samples : evaluated for them; `of` would have been needed for the full evaluation.
+    unstable : candidates that diverged or failed, by case.
+    crashed : candidates that killed their worker twice.
+    seconds : wall time.
+    """
+
+    z: float
+    worst: str
+    second: str
+    margin: float
+    candidates: int
+    samples: int
+    of: int
+    unstable: dict[str, int]
+    crashed: int
+    seconds: float
+
+    @property
+    def saved(self) -> float:
+        """Share of the work that was not needed."""
+        return 1.0 - self.samples / self.of
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """Everything that the next generation depends on.
+
+    Attributes
+    ----------
+    identity : hash of what is tuned and how; only the same search may go on from here.
+    population : after the last generation of `history`.
+    rng : state of the random numbers, as the bit generator gives it.
+    history : of all generations, the initial one included.
+    """
+
+    identity: str
+    population: Population
+    rng: dict[str, object]
+    history: tuple[Generation, ...]
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it is either as before or complete, whatever happens."""
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def save(checkpoint: Checkpoint, path: Path) -> None:
+    """Write a checkpoint in place of the one before."""
+    population = checkpoint.population
+    content = {
+        "identity": checkpoint.identity,
+        "members": population.members.tolist(),
+        "z": population.z.tolist(),
+        "z_k": population.z_k.tolist(),
+        "order": population.order.tolist(),
+        "rng": checkpoint.rng,
+        "history": [vars(generation) for generation in checkpoint.history],
+    }
+    # JSON writes the shortest digits that read back to the same bits.
+    write_whole(path, json.dumps(content).encode())
+
+
+def load(path: Path, identity: str) -> Checkpoint | None:
+    """Read a checkpoint; None if there is none yet.
+
+    Raises
+    ------
+    InputError
+        If the file is no checkpoint, or one of another search.
+    """
+    try:
+        content = json.loads(path.read_text())
+        found = content["identity"]
+        population = Population(
+            np.array(content["members"]),
+            np.array(content["z"]),
+            np.array(content["z_k"]),
+            np.array(content["order"], np.intp),
+        )
+        history = tuple(Generation(**generation) for generation in content["history"])
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            where=str(path),
+            found=f"no checkpoint ({error})",
+            expected="one that an earlier run wrote",
+            remedy="remove the file, or run without --resume",
+        ) from None
+    if found != identity:
+        raise InputError(
+            where=str(path),
+            found="the checkpoint of another search",
+            expected="the same FMU, cases, seed, population and weights",
+            remedy="repeat the command of that search, or run without --resume",
+        )
+    return Checkpoint(found, population, content["rng"], history)

@@ -1,0 +1,207 @@
+"""What a candidate costs, equation (12) of Schwarz et al. (2018): no more than decides."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from workbench.case import Case
+from workbench.errors import InputError
+from workbench.fmu import FMU, FMUError, Matrix, Vector
+from workbench.objective import Weights
+from workbench.observers import ESTIMATE, Estimator
+from workbench.observers.contract import WIDTH
+from workbench.tuning.space import Gains, build, from_vector
+
+PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
+DIVERGED = 1e3  # z of a mean error of 1000 rad/s or 1 MN: no estimate of a brake stop
+_OMEGA_W, _OMEGA_R, _FORCE = (list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx"))
+
+
+class Recording(NamedTuple):
+    """A case as the loop reads it.
+
+    Attributes
+    ----------
+    name : of the case.
+    steps : (n,) from the sample before [s].
+    u, y : (n, 2) measured inputs and outputs.
+    force : (n,) measured creep force [N].
+    share : (n,) weight of each sample in the time average (trapezoidal rule) [1].
+    """
+
+    name: str
+    steps: Vector
+    u: Matrix
+    y: Matrix
+    force: Vector
+    share: Vector
+
+
+def recording(case: Case) -> Recording:
+    """Prepare a case.
+
+    Raises
+    ------
+    InputError
+        If it has no measured force to judge by.
+    """
+    if case.Fx is None:
+        raise InputError(
+            where=str(case.source),
+            found="no column 'Fx'",
+            expected="the measured force, by which gains are judged",
+            remedy="leave this case out of the tuning with --cases",
+        )
+    steps = np.diff(case.time, prepend=case.time[0])
+    share = 0.5 * (steps + np.append(steps[1:], 0.0)) / (case.time[-1] - case.time[0])
+    return Recording(case.name, steps, case.u.copy(), case.y.copy(), case.Fx.copy(), share)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """All that a worker needs to judge candidates, on any machine.
+
+    Attributes
+    ----------
+    estimator : its name.
+    fmu : the file's bytes.
+    names : our names of variables to those in the FMU.
+    gains : reasoned gains; what is not tuned is taken from them.
+    """
+
+    estimator: str
+    fmu: bytes
+    names: Mapping[str, str]
+    gains: Gains
+    recordings: tuple[Recording, ...]
+    weights: Weights
+
+
+class Candidate(NamedTuple):
+    """Gains to be judged.
+
+    Attributes
+    ----------
+    values : (n,) gains.
+    limit : z beyond which the candidate has lost.
+    order : cases to be judged by, the one that decides most often first.
+    """
+
+    values: Vector
+    limit: float
+    order: tuple[int, ...]
+
+
+class Verdict(NamedTuple):
+    """Judgement of one candidate.
+
+    Attributes
+    ----------
+    z : worst of z_k; infinite if the candidate has lost or failed.
+    z_k : (k,) of all cases of the job; infinite where not known.
+    samples : how many were evaluated.
+    unstable : case in which the estimate diverged or the FMU failed; -1 if none.
+    crashed : whether it killed its worker.
+    """
+
+    z: float
+    z_k: Vector
+    samples: int
+    unstable: int
+    crashed: bool = False
+
+
+class Bench:
+    """A model and its recordings, ready to judge one candidate after the other."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "model.fmu"
+            path.write_bytes(job.fmu)
+            self._fmu = FMU(path, job.names)
+        longest = max(r.steps.size for r in job.recordings)
+        self._rows = np.empty((longest, 2 * WIDTH + 1))
+        # The loop is compiled here, so that no candidate's time is spent on it.
+        start = Recording("", *(values[:PIECES] for values in job.recordings[0][1:]))
+        self._judge_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
+
+    def close(self) -> None:
+        """Free the model."""
+        self._fmu.close()
+
+    def judge(self, candidate: Candidate) -> Verdict:
+        """Judge a candidate until it has lost, or to the end.
+
+        The integral of equation (12) only grows, piece by piece and in floating point too, so what
+        is dropped has lost for certain.
+        """
+        job = self._job
+        gains = from_vector(job.gains, candidate.values)
+        estimator = build(job.estimator, self._fmu, gains)
+        z_k = np.full(len(job.recordings), np.inf)
+        samples = 0
+        limit = min(candidate.limit, DIVERGED)
+        for k in candidate.order:
+            z, done = self._judge_case(estimator, job.recordings[k], limit)
+            samples += done
+            if not z <= limit:
+                nothing = np.full(z_k.size, np.inf)
+                return Verdict(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
+            z_k[k] = z
+        return Verdict(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
+
+    def _judge_case(self, estimator: Estimator, case: Recording, limit: float) -> tuple[float, int]:
+        """The z of one case, or the part of it that is beyond the limit, and samples evaluated."""
+        z, size = 0.0, case.steps.size
+        edges = [size * i // PIECES for i in range(PIECES + 1)]
+        try:
+            estimator._reset(case.u[0], case.y[0])
+        except FMUError:
+            return np.nan, 0
+        settings, memory = estimator._arguments()
+        weights = self._job.weights
+        for begin, end in pairwise(edges):
+            part = slice(begin, end)
+            rows = self._rows[part]
+            status = estimator._loop(
+                estimator._plant,
+                settings,
+                memory,
+                case.steps[part],
+                case.u[part],
+                case.y[part],
+                rows,
+            )
+            if status:
+                self._fmu.renew(reload=False)
+                return np.nan, end
+            z = _add(
+                z,
+                rows,
+                case.y[part],
+                case.force[part],
+                case.share[part],
+                np.array([weights.cW, weights.cR, weights.cF]),
+            )
+            if not z <= limit:
+                return z, end
+        return z, size
+
+
+@njit(cache=True)
+def _add(z, rows, y, force, share, weights):  # type: ignore[no-untyped-def]
+    """Add a piece of recording to z, sample by sample, so that pieces do not change the sum."""
+    for i in range(share.size):
+        z += share[i] * (
+            weights[0] * abs(rows[i, _OMEGA_W] - y[i, 0])
+            + weights[1] * abs(rows[i, _OMEGA_R] - y[i, 1])
+            + weights[2] * abs(rows[i, _FORCE] - force[i])
+        )
+    return z

@@ -1,0 +1,124 @@
+"""What tuned gains are worth: on cases they have not seen, and each gain by itself."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.fmu import Matrix, Vector
+from workbench.tuning.cost import DIVERGED, Candidate, Job
+from workbench.tuning.search import Search
+from workbench.tuning.space import SearchSpace, gain_names
+from workbench.tuning.workers import Pool, judge_all
+
+STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
+NEGLIGIBLE = 0.01  # relative change of z that does not matter
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Gains tuned without some cases, judged on these.
+
+    Attributes
+    ----------
+    cases : left out.
+    tuned : worst z_k over them with gains tuned on the others.
+    reasoned : the same with untuned gains.
+    z : worst z_k over the cases that were tuned on.
+    """
+
+    cases: tuple[str, ...]
+    tuned: float
+    reasoned: float
+    z: float
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What z does when one gain is changed and the others stay.
+
+    Attributes
+    ----------
+    gain : its name.
+    less, more : relative change of z after a step of the gain down and up its search range.
+    without : relative change of z with the gain at zero; infinite if that is no estimator.
+    """
+
+    gain: str
+    less: float
+    more: float
+    without: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether z notices the gain."""
+        return max(abs(self.less), abs(self.more), abs(self.without)) > NEGLIGIBLE
+
+
+def judge_gains(pool: Pool, job: Job, gains: Sequence[Vector]) -> Matrix:
+    """z_k of gains in all cases, (g, k); infinite in all where an estimate diverges."""
+    order = tuple(range(len(job.recordings)))
+    candidates = [Candidate(values, np.inf, order) for values in gains]
+    return np.array([verdict.z_k for verdict in judge_all(pool, candidates, len(order))])
+
+
+def split(cases: int, folds: int) -> list[tuple[int, ...]]:
+    """Deal cases out to folds, so that each holds different conditions.
+
+    >>> split(5, 2)
+    [(0, 2, 4), (1, 3)]
+    """
+    return [tuple(range(fold, cases, folds)) for fold in range(folds)]
+
+
+def cross_validate(
+    pool: Pool,
+    job: Job,
+    reasoned: Vector,
+    folds: int,
+    tune: Callable[[int, Sequence[int]], Search | None],
+) -> list[Fold]:
+    """Tune without each fold and judge on it.
+
+    Parameters
+    ----------
+    reasoned : (n,) untuned gains.
+    tune : searches on some cases; called with the number of the fold and the cases. Ends the whole
+        by returning None or an interrupted search.
+    """
+    everything = range(len(job.recordings))
+    results: list[Fold] = []
+    for number, held_out in enumerate(split(len(everything), folds)):
+        found = tune(number, [k for k in everything if k not in held_out])
+        if found is None or found.interrupted:
+            break
+        tuned, untuned = judge_gains(pool, job, [found.best, reasoned])
+        results.append(
+            Fold(
+                cases=tuple(job.recordings[k].name for k in held_out),
+                tuned=float(tuned[list(held_out)].max()),
+                reasoned=float(untuned[list(held_out)].max()),
+                z=found.z,
+            )
+        )
+    return results
+
+
+def sensitivities(pool: Pool, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
+    """Change one gain after the other."""
+    names = gain_names(job.gains)
+    changed: list[Vector] = []
+    for i in range(len(names)):
+        for step in (-STEP, STEP):
+            coordinates = found.coordinates.copy()
+            coordinates[i] = np.clip(coordinates[i] + step, 0.0, 1.0)
+            changed.append(space.gains(coordinates))
+        without = found.best.copy()
+        without[i] = 0.0
+        changed.append(without)
+    z = judge_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
+    change = np.where(z < DIVERGED, z / found.z - 1.0, np.inf).reshape(-1, 3)
+    return [
+        Sensitivity(name, float(less), float(more), float(without))
+        for name, (less, more, without) in zip(names, change, strict=True)
+    ]
