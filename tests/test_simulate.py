@@ -100,6 +100,36 @@ def test_estimates_and_figures_are_written_for_every_case(results: Path, root: P
     assert not list(results.glob("*.part"))
 
 
+def test_gains_from_a_file_are_used_and_named(
+    results: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same gains give the same error; with the friction rows zero, nothing is learned."""
+    reasoned = json.loads((results / "summary.json").read_text())
+    values = reasoned["provenance"]["disturbance_observer"]
+    name = "02_dry_100_2.7"
+    errors = {}
+    for share in (1.0, 0.0):
+        rows = [
+            f"L{i + 1}{j + 1} = {(share if i >= 2 else 1.0) * gain!r}"
+            for i, row in enumerate(values["L"])
+            for j, gain in enumerate(row)
+        ]
+        text = ['estimator = "disturbance_observer"', "[gains]", *rows]
+        text += [f"{key} = {values[key]!r}" for key in ("T_WR", "T_DC")]
+        text += ["[design]", f"effect = {values['effect']!r}"]
+        gains, out = tmp_path / "gains.toml", tmp_path / str(share)
+        gains.write_text("\n".join(text))
+        monkeypatch.chdir(root)
+        assert main(["simulate", f"cases/{name}", "--gains", str(gains), "--out", str(out)]) == 0
+        summary = json.loads((out / "summary.json").read_text())
+        assert "gains.toml" in summary["provenance"]["disturbance_observer"]["source"]
+        scores = summary["cases"][name]["estimators"]["disturbance_observer"]
+        errors[share] = scores["Fx_nrmse"]
+    expected = reasoned["cases"][name]["estimators"]["disturbance_observer"]["Fx_nrmse"]
+    assert errors[1.0] == expected
+    assert errors[0.0] > 5 * expected
+
+
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [

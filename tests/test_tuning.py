@@ -20,11 +20,17 @@ from scipy.optimize import differential_evolution, rosen
 
 from workbench.__main__ import main
 from workbench.case import Case, read_case
+from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
 from workbench.cosim import observe
 from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
-from workbench.observers import DisturbanceObserver, FilterNoise, ParameterEstimator
+from workbench.observers import (
+    DisturbanceObserver,
+    FilterNoise,
+    ParameterEstimator,
+    reasoned_settings,
+)
 from workbench.tuning import (
     Job,
     Plan,
@@ -43,6 +49,7 @@ from workbench.tuning import (
     search_space,
     sensitivities,
     to_vector,
+    with_tuned,
 )
 from workbench.tuning.checkpoint import load
 from workbench.tuning.cost import Bench, Candidate, Verdict
@@ -332,9 +339,10 @@ def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
     problem: tuple[Job, SearchSpace],
 ) -> None:
     job, _ = problem
-    hasty = ProcessPool(job, 1, 1e-5)  # no candidate is judged within 10 us
+    endless = (0,) * 100_000  # at 1 ms a case, two minutes
+    hasty = ProcessPool(job, 1, 0.3)
     try:
-        [verdict] = judge_all(hasty, [Candidate(to_vector(job.gains), np.inf, (0,))], 3)
+        [verdict] = judge_all(hasty, [Candidate(to_vector(job.gains), np.inf, endless)], 3)
     finally:
         hasty.close()
     assert verdict.crashed
@@ -502,7 +510,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
 
 
 def command(folder: Path, out: Path, *options: str) -> list[str]:
-    search = ["--cases", str(folder), "--budget", "40", "--population", "4", "--workers", "1"]
+    search = ["--cases", str(folder), "--budget", "15", "--population", "4", "--workers", "1"]
     return ["tune", "parameter_estimator", *search, "--out", str(out), *options]
 
 
@@ -528,7 +536,7 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
     # As if it had been killed inside a checkpoint, which is written beside and then renamed.
     half = checkpoint.read_bytes()[:1000]
     checkpoint.with_name("checkpoint.json.part").write_bytes(half)
-    assert len(json.loads(checkpoint.read_text())["history"]) < 41
+    assert len(json.loads(checkpoint.read_text())["history"]) < 16
     monkeypatch.chdir(root)
     assert main(command(folder, killed, "--resume")) == 0
     assert main(command(folder, whole)) == 0
@@ -582,6 +590,9 @@ def test_results_keep_their_contract(
     for name in ("convergence.png", "cases.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert not list(tmp_path.glob("*.part"))
+    with FMU(MINIMAL_OBSERVER) as minimal, FMU(FULL_OBSERVER) as full:
+        settings = with_tuned(reasoned_settings(minimal, full), gains)
+    assert settings.parameter is gains
 
 
 @pytest.mark.parametrize(

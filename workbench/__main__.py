@@ -5,7 +5,14 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from workbench.commands import add_bench, add_fmu, add_observability, add_rig, add_simulate, add_tune
+from workbench.commands import (
+    add_bench,
+    add_fmu,
+    add_observability,
+    add_rig,
+    add_simulate,
+    add_tune,
+)
 from workbench.errors import InputError
 from workbench.fmu import FMUError
 

@@ -196,7 +196,11 @@ def _correct(
     K = P @ H.T @ inverse
     innovation = y - H @ z
     rest = np.eye(z.size) - K @ H
-    return z + K @ innovation, rest @ P @ rest.T + K @ R @ K.T, innovation @ inverse @ innovation
+    return (
+        z + K @ innovation,
+        rest @ P @ rest.T + K @ R @ K.T,
+        float(innovation @ inverse @ innovation),
+    )
 
 
 def _sigma(model: FMPyModel, P: Matrix) -> Vector:
@@ -205,7 +209,8 @@ def _sigma(model: FMPyModel, P: Matrix) -> Vector:
     variance = np.diag(P)
     friction = variance[model.n :]
     force = np.maximum(np.diag(C @ P @ C.T), 0.0)
-    return np.sqrt(np.concatenate([variance[model.speeds], friction, friction, force]))
+    sigma: Vector = np.sqrt(np.concatenate([variance[model.speeds], friction, friction, force]))
+    return sigma
 
 
 def _filter(

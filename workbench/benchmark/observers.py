@@ -37,11 +37,11 @@ RATES = (200.0, 1000.0, 5000.0)  # Hz
 LENGTH = 4  # times the recording, for the growth with length
 _RATE = 1000.0
 _REPEATS = 15
-_FMPY_REPEATS = 3
+_FEW = 3  # where one run is long
 _FMPY_STEPS = 1500
 _PROCESSES = 2
 _PROCESS_REPEATS = 5
-_PATIENCE = 120.0  # s, for an answer of a worker; it takes less than one
+_PATIENCE = 60.0  # s, for an answer of a worker; it takes less than one
 
 Samples = tuple[Vector, Matrix, Matrix]
 
@@ -152,20 +152,20 @@ def _measure(
     estimator.run(*resample(case, _RATE))
     runs: list[Callable[..., object]] = [estimator.run, *([plain.run] if plain else [])]
     step, *c = _per_step(runs, resample(case, _RATE))
-    by_rate = {rate: _per_step([estimator.run], resample(case, rate))[0] for rate in RATES}
+    by_rate = {rate: _per_step([estimator.run], resample(case, rate), _FEW)[0] for rate in RATES}
     fmpy = None
     if by_fmpy is not None:
         t, u, y = resample(case, _RATE)
         # From the middle of the recording on, where every law does its full work.
         part = slice(t.size // 3, t.size // 3 + _FMPY_STEPS)
-        fmpy = _per_step([by_fmpy], (t[part], u[part], y[part]), _FMPY_REPEATS)[0]
+        fmpy = _per_step([by_fmpy], (t[part], u[part], y[part]), _FEW)[0]
     return ObserverTimes(
         observer=estimator.name,
         states=len(estimator.fmu.states),
         step=step,
         times_real_time=1.0 / (_RATE * step),
         by_rate=by_rate,
-        long=_per_step([estimator.run], resample(case, _RATE, LENGTH), 5)[0],
+        long=_per_step([estimator.run], resample(case, _RATE, LENGTH), _FEW)[0],
         fmpy=fmpy,
         c=c[0] if c else None,
     )

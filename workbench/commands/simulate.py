@@ -37,6 +37,7 @@ from workbench.report import (
     write_page,
     write_summary,
 )
+from workbench.tuning import read_gains, with_tuned
 
 
 def add_simulate(commands: Commands) -> None:
@@ -82,6 +83,12 @@ def add_simulate(commands: Commands) -> None:
         metavar="FILE",
         help="model of the parameter estimator (default: %(default)s)",
     )
+    simulate.add_argument(
+        "--gains",
+        type=Path,
+        metavar="FILE",
+        help="gains.toml of 'workbench tune' (default: gains reasoned from the linearised models)",
+    )
     add_map(simulate)
     simulate.add_argument(
         "--workers",
@@ -123,6 +130,13 @@ def _simulate(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     with FMU(options.fmu, names) as minimal, FMU(options.full_fmu, names) as full:
         settings = reasoned_settings(minimal, full)
+        sources = settings.summary()
+        if options.gains is not None:
+            name, gains = read_gains(options.gains)
+            settings = with_tuned(settings, gains)
+            sources = settings.summary()
+            tuned = next(key for key in sources if name in key)
+            sources[tuned]["source"] = f"tuned, {options.gains.name}"
         print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
         for estimator in all_estimators(minimal, full, settings):
             estimator.run(cases[0].time[:2], cases[0].u[:2], cases[0].y[:2])
@@ -135,7 +149,7 @@ def _simulate(options: argparse.Namespace) -> int:
                 key: {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
                 for key, fmu in (("fmu", minimal), ("full_fmu", full))
             },
-            **settings.summary(),
+            **sources,
         }
     weights = Weights()
     plan = _Plan(options.fmu, options.full_fmu, names, settings, weights, options.out)

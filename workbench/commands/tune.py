@@ -4,10 +4,11 @@ import argparse
 import json
 import os
 import platform
+import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -184,7 +185,7 @@ def _tune(options: argparse.Namespace) -> int:
             warn=lambda message: print(f"warning: {message}", file=sys.stderr, flush=True),
         )
 
-    with closing(_pool(options, job)) as pool:
+    with _one_interruption(), closing(_pool(options, job)) as pool:
         reasoned = to_vector(job.gains)
         before = judge_gains(pool, job, [reasoned])[0]
         if not np.isfinite(before).all():
@@ -233,6 +234,21 @@ def _tune(options: argparse.Namespace) -> int:
     print(f"written: {out / 'gains.toml'}, summary and figures beside it")
     interrupted = found.interrupted or len(folds) < options.folds
     return 130 if interrupted else 0
+
+
+@contextmanager
+def _one_interruption() -> Iterator[None]:
+    """Let the first Ctrl-C stop the search, and none after it the writing of its result."""
+
+    def interrupt(number: int, frame: object) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _prepare(

@@ -215,7 +215,7 @@ def _ekf(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped
 
 @compiled
 def _triangularise(stack, m, root):  # type: ignore[no-untyped-def]
-    """Reduce the first m rows, (m, n), to a triangle: root, (n, n), with root' root = stack' stack."""
+    """Reduce m rows, (m, n), to the triangle root, (n, n): root' root = stack' stack."""
     n = stack.shape[1]
     for k in range(n):
         norm = 0.0
@@ -403,7 +403,8 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     """Square-root unscented Kalman filter: no derivative of the filter, the same noise levels.
 
     Sigma points of equal weight, each advanced by the linearly implicit step; the covariance is
-    scaled by their distance, see POINT_DISTANCE. All updates are orthogonal triangularisations, without downdates.
+    scaled by their distance, see POINT_DISTANCE. All updates are orthogonal triangularisations,
+    without downdates.
     Source: R. van der Merwe, E. Wan (2001), The square-root unscented Kalman filter for state and
     parameter estimation, ICASSP; I. Arasaratnam, S. Haykin (2009), Cubature Kalman filters.
 

@@ -9,6 +9,8 @@ from distributed import Client, KilledWorker
 from workbench.tuning.cost import Candidate, Job, Verdict
 from workbench.tuning.workers import equip, judge
 
+_PATIENCE = 5.0  # [s] for the scheduler to answer
+
 
 class DaskPool:
     """All workers of a cluster, those that join later included; see Pool.
@@ -22,7 +24,7 @@ class DaskPool:
     deaths: tuple[type[BaseException], ...] = (KilledWorker,)
 
     def __init__(self, job: Job, address: str, timeout: float) -> None:
-        self._client = Client(address)
+        self._client = Client(address, timeout=_PATIENCE)
         self._client.register_worker_callbacks(partial(equip, job, timeout))
         self._executor = self._client.get_executor()
         self.size = len(self._client.scheduler_info()["workers"])
