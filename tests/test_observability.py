@@ -333,6 +333,6 @@ def test_command_tells_when_frictions_are_known(start_of_a_stop, tmp_path, capsy
 
 def test_command_refuses_a_missing_full_model(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    arguments = ["observability", str(CASE), "--out", str(tmp_path), "--full", "none.fmu"]
+    arguments = ["observability", str(CASE), "--out", str(tmp_path), "--full-fmu", "none.fmu"]
     assert main(arguments) == 2
     assert "none.fmu: found no such file" in capsys.readouterr().err

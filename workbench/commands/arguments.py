@@ -24,6 +24,40 @@ def positive(text: str) -> int:
     return value
 
 
+def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
+    """Add the cases to read and the folder to write to."""
+    parser.add_argument(
+        "cases",
+        nargs="*",
+        type=Path,
+        default=[Path("cases")],
+        metavar="CASE",
+        help="case folder, or folder of case folders (default: cases)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(out),
+        metavar="DIR",
+        help="where to write (default: %(default)s)",
+    )
+
+
+def add_observer_models(parser: argparse.ArgumentParser) -> None:
+    """Add the files of the two observer models."""
+    for option, default, name in (
+        ("--fmu", MINIMAL_OBSERVER, "minimal"),
+        ("--full-fmu", FULL_OBSERVER, "full"),
+    ):
+        parser.add_argument(
+            option,
+            type=Path,
+            default=default,
+            metavar="FILE",
+            help=f"{name} observer model (default: %(default)s)",
+        )
+
+
 def add_map(parser: argparse.ArgumentParser) -> None:
     """Add the option --map, which `model_names` reads."""
     parser.add_argument(

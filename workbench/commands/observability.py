@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from workbench.case import Case, read_cases
-from workbench.commands.arguments import MINIMAL_OBSERVER, Commands, positive
+from workbench.commands.arguments import (
+    Commands,
+    add_observer_models,
+    add_recordings,
+    positive,
+)
 from workbench.cosim import Outcome, observe
 from workbench.fmu import FMU, FMUError
 from workbench.objective import braking_window
@@ -24,8 +29,6 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
-
-_FULL_OBSERVER = Path("fmus/fmi2/FullObserver.fmu")
 
 
 def add_observability(commands: Commands) -> None:
@@ -40,38 +43,11 @@ def add_observability(commands: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench observability\n"
         "  python -m workbench observability cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
-        "  python -m workbench observability my_cases --full my_full_model.fmu",
+        "  python -m workbench observability my_cases --full-fmu my_full_model.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    observability.add_argument(
-        "cases",
-        nargs="*",
-        type=Path,
-        default=[Path("cases")],
-        metavar="CASE",
-        help="case folder, or folder of case folders (default: cases)",
-    )
-    observability.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results/observability"),
-        metavar="DIR",
-        help="where to write (default: %(default)s)",
-    )
-    observability.add_argument(
-        "--fmu",
-        type=Path,
-        default=MINIMAL_OBSERVER,
-        metavar="FILE",
-        help="minimal observer model (default: %(default)s)",
-    )
-    observability.add_argument(
-        "--full",
-        type=Path,
-        default=_FULL_OBSERVER,
-        metavar="FILE",
-        help="full observer model (default: %(default)s)",
-    )
+    add_recordings(observability, out="results/observability")
+    add_observer_models(observability)
     observability.add_argument(
         "--workers",
         type=positive,
@@ -85,7 +61,7 @@ def add_observability(commands: Commands) -> None:
 def _observability(options: argparse.Namespace) -> int:
     cases = read_cases(options.cases)
     options.out.mkdir(parents=True, exist_ok=True)
-    models = (options.fmu, options.full)
+    models = (options.fmu, options.full_fmu)
     linear: list[LinearTest] = []
     files = []
     for path in models:

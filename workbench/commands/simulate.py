@@ -14,10 +14,10 @@ from pathlib import Path
 
 from workbench.case import Case, read_cases
 from workbench.commands.arguments import (
-    FULL_OBSERVER,
-    MINIMAL_OBSERVER,
     Commands,
     add_map,
+    add_observer_models,
+    add_recordings,
     model_names,
     positive,
 )
@@ -54,35 +54,8 @@ def add_simulate(commands: Commands) -> None:
         "  python -m workbench simulate cases/03_dry_120_3.6 --live",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    simulate.add_argument(
-        "cases",
-        nargs="*",
-        type=Path,
-        default=[Path("cases")],
-        metavar="CASE",
-        help="case folder, or folder of case folders (default: cases)",
-    )
-    simulate.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results/simulate"),
-        metavar="DIR",
-        help="where to write (default: %(default)s)",
-    )
-    simulate.add_argument(
-        "--fmu",
-        type=Path,
-        default=MINIMAL_OBSERVER,
-        metavar="FILE",
-        help="minimal observer model (default: %(default)s)",
-    )
-    simulate.add_argument(
-        "--full-fmu",
-        type=Path,
-        default=FULL_OBSERVER,
-        metavar="FILE",
-        help="model of the parameter estimator (default: %(default)s)",
-    )
+    add_recordings(simulate, out="results/simulate")
+    add_observer_models(simulate)
     simulate.add_argument(
         "--gains",
         type=Path,
