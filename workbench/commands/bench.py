@@ -62,7 +62,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _format_calls(calls: "dict[str, CallTimes]") -> str:
-    lines = [f"{'model':<16} {'evaluation':<12} {'plain':>9} {'FMI':>9}  {'ratio':>5}"]
+    lines = [
+        "derivatives: one C call (plain); setting states and inputs, getting derivatives (FMI)",
+        "jacobian: full matrix d[der(x), w]/d[x, u] from one C call for its nonzeros (plain);",
+        "    setting states and inputs, one directional derivative for each column (FMI)",
+        f"{'model':<16} {'evaluation':<12} {'plain':>9} {'FMI':>9}  {'ratio':>5}",
+    ]
     for name, times in calls.items():
         ratios = times.ratios()
         for kind, plain, through in (

@@ -37,9 +37,11 @@ class CallTimes:
     ----------
     derivatives : one evaluation by a plain call of the model's C function.
     derivatives_fmi : fmi2SetContinuousStates, fmi2SetReal of all inputs, fmi2GetDerivatives.
-    nonzeros : the nonzeros of the Jacobian of derivatives and outputs, plain.
-    jacobian : d(der(x))/d[x, u] as a matrix: the nonzeros, put where they belong.
-    jacobian_fmi : the same matrix, one fmi2GetDirectionalDerivative a column.
+    nonzeros : the nonzeros of the Jacobian, by a plain call of the model's C function.
+    jacobian : d[der(x), w]/d[x, u], w outputs and local variables, as a full matrix: the nonzeros,
+        put to places that are known beforehand.
+    jacobian_fmi : the same matrix: states and inputs set, one fmi2GetDirectionalDerivative a
+        column.
     step : one Co-Simulation step of 5 ms, inputs with the noise of their sensors.
     """
 
