@@ -35,6 +35,10 @@ def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path) -> None
     assert 5e-9 < times.derivatives < times.derivatives_fmi < 5e-6
     assert times.nonzeros < times.jacobian_fmi < 5e-6
     assert times.derivatives < times.step < 1e-3
+    # Measured 1.2 and 1.5 on x86-64; leaves room for other processors. Without the short ways for
+    # whole columns and all inputs in instance.c they are 1.5 and 2.9.
+    assert times.ratios()["derivatives"] < 2.0
+    assert times.ratios()["jacobian"] < 2.0
 
 
 def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_path: Path) -> None:
@@ -50,14 +54,19 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_pat
     assert measure_calls(read_description(slow), seed=1).ratios()["derivatives"] > 3.0
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "found"),
+    [
+        ("xdot[k] = source[k]", "xdot[k] = 1.0", "derivatives differ"),
+        ("sensitivity[k] = zero", "sensitivity[k] = 1.0", "Jacobians differ"),
+    ],
+)
 def test_an_interface_that_gives_other_numbers_is_refused(
-    minimal_path: Path, tmp_path: Path
+    minimal_path: Path, tmp_path: Path, right: str, wrong: str, found: str
 ) -> None:
-    wrong = change_source(
-        minimal_path, tmp_path / "wrong.fmu", "instance.c", "xdot[k] = source[k]", "xdot[k] = 1.0"
-    )
-    with pytest.raises(InputError, match=r"wrong\.fmu: found derivatives differ"):
-        measure_calls(read_description(wrong), seed=1)
+    changed = change_source(minimal_path, tmp_path / "wrong.fmu", "instance.c", right, wrong)
+    with pytest.raises(InputError, match=rf"wrong\.fmu: found {found}"):
+        measure_calls(read_description(changed), seed=1)
 
 
 def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -386,6 +387,29 @@ def test_cached_values_follow_every_change(open_fmu, version):
 
 
 @VERSIONS
+@pytest.mark.parametrize("unknowns", [[DX1, DX2], [FORCE, ENERGY], [DX1, DX2, FORCE, ENERGY]])
+def test_columns_of_the_jacobian_follow_every_change(open_fmu, version, unknowns):
+    fmu = open_fmu("oscillator", version, slave=False).start()
+    fmu.fmi.enterContinuousTimeMode()
+
+    def check(x1: float, k: float) -> None:
+        column = {DX1: 0.0, DX2: -k, FORCE: -k, ENERGY: k * x1}
+        found = fmu.fmi.getDirectionalDerivative(unknowns, [X1], [1.0])
+        assert found == [column[unknown] for unknown in unknowns]
+
+    check(1.0, 4.0)
+    state = fmu.save()
+    fmu.fmi.setContinuousStates((ctypes.c_double * 2)(3.0, 0.0), 2)
+    check(3.0, 4.0)
+    fmu.set([K], [5.0])
+    check(3.0, 5.0)
+    fmu.set([X1], [2.0])
+    check(2.0, 5.0)
+    fmu.restore(state)
+    check(1.0, 4.0)
+
+
+@VERSIONS
 def test_reset_instance_repeats_a_new_one_with_identical_bits(open_fmu, version):
     results = []
     fmu = open_fmu("oscillator", version)
@@ -501,7 +525,12 @@ def test_dependencies_are_the_pattern_of_the_jacobian(open_fmu):
 @VERSIONS
 @pytest.mark.parametrize(
     ("unknowns", "knowns", "match"),
-    [([U], [X1], "4 is no unknown"), ([DX1], [FORCE], "7 is no known"), ([99], [X1], "99 is no")],
+    [
+        ([U], [X1], "4 is no unknown"),
+        ([DX1], [FORCE], "7 is no known"),
+        ([DX1, DX2], [DX1], "2 is no known"),
+        ([99], [X1], "99 is no"),
+    ],
 )
 def test_wrong_unknown_or_known_is_refused(open_fmu, version, unknowns, knowns, match):
     fmu = open_fmu("oscillator", version).start()
@@ -600,6 +629,20 @@ def test_values_that_are_not_finite_are_refused(open_fmu, version, value):
     with fmu.refuses(ERROR, "value reference 0, expected a finite"):
         fmu.set([U, X1], [7.0, value])
     assert fmu.get(U) == [0.0]
+    with fmu.refuses(ERROR, "value reference 4, expected a finite"):
+        fmu.set([U], [value])
+
+
+@VERSIONS
+def test_states_that_are_not_finite_are_refused_but_large_ones_are_not(open_fmu, version):
+    fmu = open_fmu("oscillator", version, slave=False).start()
+    fmu.fmi.enterContinuousTimeMode()
+    large = sys.float_info.max  # two of them overflow a sum
+    fmu.fmi.setContinuousStates((ctypes.c_double * 2)(large, large), 2)
+    assert fmu.get(X1, X2) == [large, large]
+    with fmu.refuses(ERROR, "value reference 1, expected a finite"):
+        fmu.fmi.setContinuousStates((ctypes.c_double * 2)(1.0, math.nan), 2)
+    assert fmu.get(X1, X2) == [large, large]
 
 
 @VERSIONS
@@ -722,6 +765,7 @@ def test_overflow_discards_the_derivative(open_fmu, version):
         fmu.get(1)
     with fmu.refuses(DISCARD, "for value reference 1 is not finite"):
         fmu.fmi.getDirectionalDerivative([1], [0], [1.0])
+    assert fmu.fmi.getDirectionalDerivative([1], [0], [0.0]) == [0.0]
     fmu.fmi.setContinuousStates((ctypes.c_double * 1)(-2.0), 1)
     assert fmu.get(1) == [math.exp(-2.0)]
     with fmu.refuses(DISCARD, "reference 2 is not finite at time 0"):

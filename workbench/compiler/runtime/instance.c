@@ -5,11 +5,14 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Keeps messages out of the code of the calls that succeed. */
+/* COLD keeps messages, and what is called rarely, out of the code of frequent calls. APART keeps
+ * long code out of that of its caller. */
 #ifdef __GNUC__
 #define COLD __attribute__((noinline, cold))
+#define APART __attribute__((noinline))
 #else
 #define COLD
+#define APART
 #endif
 
 enum { DERIVATIVES = 1, ALGEBRAICS = 2, JACOBIAN_XU = 4, JACOBIAN_P = 8 }; /* bits of `valid` */
@@ -98,6 +101,12 @@ Instance *instance_create(Kind kind, const char *name, const char *token, const 
     i->importer = *importer;
     i->function = function;
     i->state.kind = kind;
+    for (int row = 0; row < NX + NW; row++) {
+        i->rows[row] = (unsigned)(row < NX ? REFERENCE_XDOT + row : REFERENCE_W + row - NX);
+    }
+    for (int column = 0; column < NX + NU; column++) {
+        i->columns[column] = (unsigned)(column < NX ? column : REFERENCE_U + column - NX);
+    }
     const int same_model = token != NULL && strcmp(token, MODEL_TOKEN) == 0;
     if (length == 0) {
         report(i, STATUS_ERROR, "the instance name is %s. Give the instance a name.",
@@ -195,7 +204,7 @@ static const double *algebraics(Instance *i) {
 }
 
 /* Nonzeros of the Jacobian with respect to [x, u] (JACOBIAN_XU) or to p (JACOBIAN_P). */
-static const double *jacobian(Instance *i, unsigned which) {
+static COLD const double *jacobian(Instance *i, unsigned which) {
     double *const nonzeros = which == JACOBIAN_XU ? i->jacobian_xu : i->jacobian_p;
     if ((i->valid & which) == 0) {
         const State *const s = &i->state;
@@ -315,14 +324,55 @@ static COLD Status check_settable(const Instance *i, unsigned reference) {
     return STATUS_OK;
 }
 
-static COLD Status refuse_value(const Instance *i, int reference, double value) {
+static COLD Status refuse_value(const Instance *i, unsigned reference, double value) {
     return report(i, STATUS_ERROR,
-                  "%g for the variable with value reference %d, expected a finite number. Nothing "
+                  "%g for the variable with value reference %u, expected a finite number. Nothing "
                   "was set; check where the value comes from.",
                   value, reference);
 }
 
-Status instance_set(Instance *i, const unsigned reference[], size_t n, const double value[]) {
+static COLD Status check_finite(const Instance *i, const unsigned reference[], int n,
+                                const double value[]) {
+    for (int k = 0; k < n; k++) {
+        if (!isfinite(value[k])) {
+            return refuse_value(i, reference[k], value[k]);
+        }
+    }
+    return STATUS_OK;
+}
+
+/* Writes a value; zero if these bits stood there before. */
+static inline uint64_t replace(double *target, double value) {
+    uint64_t before, after;
+    memcpy(&before, target, sizeof before);
+    memcpy(&after, &value, sizeof after);
+    memcpy(target, &after, sizeof after);
+    return before ^ after;
+}
+
+/* Sets `count` states and inputs from column `first` of the Jacobian on. Importers often set what has
+ * not changed. Inline, as its callers pass constant counts, of which compilers make short code. */
+static inline Status set_columns(Instance *i, int first, int count, const double value[]) {
+    double sum = 0.0;
+    for (int k = 0; k < count; k++) {
+        sum += value[k];
+    }
+    /* Finite only if all values are, so that mostly one check does; finite ones may overflow it. */
+    if (!isfinite(sum) && check_finite(i, i->columns + first, count, value) != STATUS_OK) {
+        return STATUS_ERROR;
+    }
+    uint64_t changed = 0;
+    for (int k = 0; k < count; k++) {
+        changed |= replace(&i->state.value[first + k], value[k]);
+    }
+    if (changed != 0) {
+        i->valid = 0;
+    }
+    return STATUS_OK;
+}
+
+/* Sets any variables that may be set. */
+static Status set_any(Instance *i, const unsigned reference[], size_t n, const double value[]) {
     if (n > 0 && (reference == NULL || value == NULL)) {
         return null_pointer(i);
     }
@@ -333,17 +383,26 @@ Status instance_set(Instance *i, const unsigned reference[], size_t n, const dou
             return STATUS_ERROR;
         }
         if (!isfinite(value[k])) {
-            return refuse_value(i, (int)reference[k], value[k]);
+            return refuse_value(i, reference[k], value[k]);
         }
     }
-    int changed = 0; /* importers often set what has not */
+    uint64_t changed = 0;
     for (size_t k = 0; k < n; k++) {
-        double *const target = &i->state.value[place_of(reference[k])];
-        changed |= *target != value[k];
-        *target = value[k];
+        changed |= replace(&i->state.value[place_of(reference[k])], value[k]);
     }
-    i->valid = changed ? 0 : i->valid;
+    if (changed != 0) {
+        i->valid = 0;
+    }
     return STATUS_OK;
+}
+
+Status instance_set(Instance *i, const unsigned reference[], size_t n, const double value[]) {
+    /* All inputs in their order; see above for their phases. */
+    if (n == NU && reference != NULL && value != NULL &&
+        memcmp(reference, i->columns + NX, NU * sizeof *reference) == 0) {
+        return set_columns(i, NX, NU, value);
+    }
+    return set_any(i, reference, n, value);
 }
 
 Status instance_set_time(Instance *i, double time) {
@@ -371,21 +430,7 @@ static Status check_length(const Instance *i, const double *array, size_t n) {
 
 Status instance_set_states(Instance *i, const double x[], size_t n) {
     const Status status = check_length(i, x, n);
-    if (status != STATUS_OK) {
-        return status;
-    }
-    for (int k = 0; k < NX; k++) {
-        if (!isfinite(x[k])) {
-            return refuse_value(i, REFERENCE_X + k, x[k]);
-        }
-    }
-    int changed = 0;
-    for (int k = 0; k < NX; k++) {
-        changed |= i->state.value[k] != x[k];
-        i->state.value[k] = x[k];
-    }
-    i->valid = changed ? 0 : i->valid;
-    return STATUS_OK;
+    return status == STATUS_OK ? set_columns(i, 0, NX, x) : status;
 }
 
 Status instance_get_states(Instance *i, double x[], size_t n) {
@@ -528,9 +573,10 @@ static Status directional_block(Instance *i, const unsigned unknown[], size_t un
     return STATUS_OK;
 }
 
-Status instance_directional(Instance *i, const unsigned unknown[], size_t unknowns,
-                            const unsigned known[], size_t knowns, const double seed[],
-                            double sensitivity[]) {
+/* The product with any knowns, for any unknowns. */
+static APART Status directional_any(Instance *i, const unsigned unknown[], size_t unknowns,
+                                    const unsigned known[], size_t knowns, const double seed[],
+                                    double sensitivity[]) {
     if ((unknowns > 0 && (unknown == NULL || sensitivity == NULL)) ||
         (knowns > 0 && (known == NULL || seed == NULL))) {
         return null_pointer(i);
@@ -572,6 +618,79 @@ Status instance_directional(Instance *i, const unsigned unknown[], size_t unknow
         sensitivity[k] = i->work[place];
     }
     return STATUS_OK;
+}
+
+/* The product with one column of the Jacobian, for unknowns that are `count` of its rows from `first`
+ * on. Returns 0 if they are others or a product is not finite. Inline, as for set_columns. */
+static inline int scale_column(const Instance *i, const unsigned unknown[], int first, int count,
+                               int column, double seed, double sensitivity[]) {
+    unsigned other = 0;
+    for (int k = 0; k < count; k++) {
+        other |= unknown[k] ^ i->rows[first + k];
+    }
+    if (other != 0) {
+        return 0;
+    }
+    const double zero = seed - seed; /* not a literal, of which compilers make a call of memset */
+    for (int k = 0; k < count; k++) {
+        sensitivity[k] = zero;
+    }
+    double sum = zero; /* not finite if the seed or a product is not, so one check does for all */
+    const int end = model_jacobian_xu_column[column + 1];
+    for (int n = model_jacobian_xu_column[column]; n < end; n++) {
+        const int k = model_jacobian_xu_row[n] - first;
+        if (k >= 0 && k < count) {
+            sensitivity[k] = i->jacobian_xu[n] * seed;
+            sum += sensitivity[k];
+        }
+    }
+    return isfinite(sum);
+}
+
+/* The product where the Jacobian is not known yet. */
+static COLD Status directional_first(Instance *i, const unsigned unknown[], size_t unknowns,
+                                     const unsigned known[], size_t knowns, const double seed[],
+                                     double sensitivity[]) {
+    if (jacobian(i, JACOBIAN_XU) == NULL) {
+        return STATUS_DISCARD;
+    }
+    return instance_directional(i, unknown, unknowns, known, knowns, seed, sensitivity);
+}
+
+/* Leads to directional_any. A cold call in between lets compilers lay out columns for speed, while
+ * directional_any itself is not cold. */
+static COLD Status directional_other(Instance *i, const unsigned unknown[], size_t unknowns,
+                                     const unsigned known[], size_t knowns, const double seed[],
+                                     double sensitivity[]) {
+    return directional_any(i, unknown, unknowns, known, knowns, seed, sensitivity);
+}
+
+Status instance_directional(Instance *i, const unsigned unknown[], size_t unknowns,
+                            const unsigned known[], size_t knowns, const double seed[],
+                            double sensitivity[]) {
+    /* One column of all derivatives, of all outputs and local variables, or of both is what
+     * importers ask for to build a Jacobian. */
+    if (knowns == 1 && known != NULL && seed != NULL) {
+        int64_t column = known[0]; /* signed, as groups may be empty */
+        if (column >= NX) {
+            column -= NX;
+            if (column < NX || column >= NX + NU) {
+                return directional_other(i, unknown, unknowns, known, knowns, seed, sensitivity);
+            }
+        }
+        if ((i->valid & JACOBIAN_XU) == 0) {
+            return directional_first(i, unknown, unknowns, known, knowns, seed, sensitivity);
+        }
+        const int c = (int)column;
+        if (unknown != NULL && sensitivity != NULL &&
+            ((unknowns == NX + NW &&
+              scale_column(i, unknown, 0, NX + NW, c, seed[0], sensitivity)) ||
+             (unknowns == NX && scale_column(i, unknown, 0, NX, c, seed[0], sensitivity)) ||
+             (unknowns == NW && scale_column(i, unknown, NX, NW, c, seed[0], sensitivity)))) {
+            return STATUS_OK;
+        }
+    }
+    return directional_other(i, unknown, unknowns, known, knowns, seed, sensitivity);
 }
 
 Status instance_adjoint(Instance *i, const unsigned unknown[], size_t unknowns,

@@ -76,6 +76,8 @@ struct Instance {
     double xdot[NX + 1], w[NW + 1];
     double jacobian_xu[NNZ_XU + 1], jacobian_p[NNZ_P + 1];
     double work[2 * NX + NW + 1];
+    /* Value references of the Jacobian's rows, der(x) and w, and of its columns, x and u. */
+    unsigned rows[NX + NW + 1], columns[NX + NU + 1];
     Rosenbrock integrator;
     char name[]; /* of the instance */
 };
