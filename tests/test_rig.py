@@ -1,4 +1,4 @@
-"""The virtual rig: stops, physics, sensors and files, against balances and the data sheet."""
+"""The virtual rig: stops, physics and files, against balances and the data sheet."""
 
 import json
 import os
@@ -17,15 +17,12 @@ from workbench.__main__ import main
 from workbench.case import read_case, read_cases
 from workbench.errors import InputError
 from workbench.rig import (
-    CONSTANT_PADS,
     ORDINARY_PADS,
     SCENARIOS,
     STANDARD,
-    Effects,
     Stop,
     check_files,
     measure,
-    plant,
     select,
     simulate,
 )
@@ -38,8 +35,8 @@ ROLLER_RADIUS, BRAKE_RADIUS = 0.70, 0.30  # m, data sheet
 
 
 @cache
-def make(name: str, effects: Effects = ORDINARY_PADS) -> Stop:
-    return simulate(SCENARIOS[name], SEED, effects, REFERENCE)
+def make(name: str) -> Stop:
+    return simulate(SCENARIOS[name], SEED, ORDINARY_PADS, REFERENCE)
 
 
 def braking_time(stop: Stop) -> float:
@@ -136,6 +133,18 @@ def test_patch_of_low_adhesion_makes_the_wheel_slide_and_recover() -> None:
     assert float(np.interp(12.0, t, force)) > before
 
 
+def test_load_cell_rings_with_the_structure_when_the_patch_begins() -> None:
+    """Between contact force and load cell lies the longitudinal mode of 21.6 Hz."""
+    stop = make("09_wet_160_4.2_wsp")
+    begin = int(np.searchsorted(stop.time, stop.drawn.coasting + 8.0))
+    ringing = (stop.truth["Fcell"] - stop.truth["Fx"])[begin : begin + 500]
+    spectrum = abs(np.fft.rfft(ringing * np.hanning(500), 8192))
+    frequency = np.fft.rfftfreq(8192, 1e-3)[spectrum.argmax()]
+    # Half a second resolves 2 Hz; the braked wheelset shifts the mode by as much.
+    assert frequency == pytest.approx(21.6, abs=4.0)
+    assert np.ptp(ringing) > 1e3
+
+
 @pytest.mark.parametrize("name", [name for name in STANDARD if not name.endswith("wsp")])
 def test_protection_leaves_a_wheel_alone_that_does_not_slide(name: str) -> None:
     """Without intervention the pressure only rises until standstill."""
@@ -174,136 +183,6 @@ def test_only_the_wet_disc_has_less_friction_and_stays_cooler() -> None:
     early = np.searchsorted(stop.time, stop.drawn.coasting + 1.5)
     assert stop.truth["muDC2"][early] < 0.6 * stop.truth["muDC1"][early]
     assert stop.truth["temperature2"][-1] < stop.truth["temperature1"][-1] - 5.0
-
-
-# --- effects ---
-
-
-def test_constant_pads_have_the_nominal_friction() -> None:
-    stop = make("02_dry_100_2.7", CONSTANT_PADS)
-    assert stop.truth["muDC2"] == pytest.approx(0.30 * stop.drawn.muDC, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("effect", "gain", "channels"),
-    [
-        ("torque_gain", 0.02, {"tauR"}),
-        ("fx_gain", 0.015, {"Fx"}),
-        ("fx_offset", 120.0, {"Fx"}),
-        ("speed_delay", 0.008, {"omegaW"}),
-        ("pole_ring", 0.002, {"omegaW"}),
-        ("time_skew", 0.020, {"omegaW", "omegaR"}),
-        ("pressure_offset", 2000.0, {"pB"}),
-    ],
-)
-def test_effect_of_a_sensor_shows_in_its_channels_alone(
-    effect: str, gain: float, channels: set[str]
-) -> None:
-    stop = make("02_dry_100_2.7")
-    time = stop.time[stop.time >= 0.0][::5]
-    without = measure(stop, ORDINARY_PADS, time)
-    planted = measure(stop, plant(ORDINARY_PADS, [f"{effect}={gain}"]), time)
-    changed = {name for name in without if not np.array_equal(without[name], planted[name])}
-    assert changed == channels
-
-
-@pytest.mark.parametrize(
-    ("effect", "gain"),
-    [
-        ("speed_friction", 0.1),
-        ("fade", 3e-4),
-        ("pressure_exponent", 0.03),
-        ("bedding_in", 0.08),
-        ("cylinder_lag", 0.03),
-        ("return_spring", 7e3),
-        ("wheel_radius", -0.0015),
-        ("wheel_load", 0.1),
-        ("wheelset_losses", 1.0),
-        ("roller_losses", 1.0),
-        ("wheel_inertia", 0.3),
-    ],
-)
-def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -> None:
-    nominal = make("03_dry_120_3.6", CONSTANT_PADS)
-    planted = simulate(
-        SCENARIOS["03_dry_120_3.6"], SEED, plant(CONSTANT_PADS, [f"{effect}={gain}"]), REFERENCE
-    )
-    assert planted.drawn == nominal.drawn
-    n = int(np.searchsorted(nominal.time, nominal.drawn.coasting + 5.0))
-    # The simulation repeats to the bit, so any difference is the effect's.
-    assert not np.array_equal(planted.truth["slip"][:n], nominal.truth["slip"][:n])
-
-
-def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
-    stop = make("04_dry_160_4.2")
-    time = stop.time[stop.time >= 0.0][::5]
-    measured = measure(stop, plant(ORDINARY_PADS, ["fx_gain=0.015"]), time)["Fx"]
-    cell = stop.at(time, "Fcell")
-    slope = cell @ measured / (cell @ cell)
-    # Four sigma of the noise of 80 N over the record: 2e-4.
-    assert slope == pytest.approx(1.015, abs=4.0 * 80.0 / np.sqrt(cell @ cell))
-
-
-def test_wheel_radius_shows_as_the_ratio_of_speeds_in_coasting() -> None:
-    stop = make("03_dry_120_3.6", plant(ORDINARY_PADS, ["wheel_radius=-0.0015"]))
-    coasting = (stop.time > 0.0) & (stop.time < stop.drawn.coasting)
-    ratio = stop.truth["omegaW"][coasting] / stop.truth["omegaR"][coasting]
-    # The drag of 260 N takes 2e-5 of slip.
-    assert ratio == pytest.approx(ROLLER_RADIUS / 0.4585, rel=3e-5)
-
-
-def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back() -> None:
-    """The drive knows the nominal losses: the other half slows the train."""
-    stop = make("04_dry_160_4.2", plant(ORDINARY_PADS, ["roller_losses=1"]))
-    coasting = (stop.time > 0.5) & (stop.time < stop.drawn.coasting)
-    omega, time = stop.truth["omegaR"][coasting], stop.time[coasting]
-    deceleration = -(omega[-1] - omega[0]) / (time[-1] - time[0])
-    mean = omega.mean()
-    loss = 40.0 + mean + 0.02 * mean**2
-    drag = ROLLER_RADIUS * stop.truth["Fx"][coasting].mean()
-    # JR's tolerance is 1e-3 of the train; the ripple of 1.6 N.m makes 5e-3 of 360 N.m.
-    assert TRAIN_INERTIA * deceleration == pytest.approx(loss + drag, rel=1e-2)
-
-
-# --- sensors ---
-
-
-@pytest.mark.parametrize(
-    ("name", "signal", "noise", "relative", "resolution"),
-    [
-        ("pB", "pB", 500.0, 0.0, 240.0),
-        ("tauR", "tauR", 40.0, 0.0, 5.0),
-        ("omegaW", "omegaW", 0.002, 3e-4, 1e-4),
-        ("omegaR", "omegaR", 0.003, 0.0, 1e-3),
-        ("Fx", "Fcell", 80.0, 0.0, 10.0),
-    ],
-)
-def test_sensor_has_the_white_noise_of_the_data_sheet(
-    name: str, signal: str, noise: float, relative: float, resolution: float
-) -> None:
-    stop = make("04_dry_160_4.2")
-    time = stop.time[stop.time >= 0.0][::5]
-    truth = stop.at(time, signal)
-    error = measure(stop, ORDINARY_PADS, time)[name] - truth
-    # Rounding adds a variance of resolution^2/12.
-    scaled = error / np.hypot(noise + relative * abs(truth), resolution / np.sqrt(12.0))
-    n = scaled.size
-    # Four sigma of the estimates, by the law of large numbers: 1 in 16000 draws falls outside.
-    assert scaled.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
-    assert scaled.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * n))
-    assert scaled[1:] @ scaled[:-1] / n == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
-
-
-def test_load_cell_rings_with_the_structure_when_the_patch_begins() -> None:
-    """Between contact force and load cell lies the longitudinal mode of 21.6 Hz."""
-    stop = make("09_wet_160_4.2_wsp")
-    begin = int(np.searchsorted(stop.time, stop.drawn.coasting + 8.0))
-    ringing = (stop.truth["Fcell"] - stop.truth["Fx"])[begin : begin + 500]
-    spectrum = abs(np.fft.rfft(ringing * np.hanning(500), 8192))
-    frequency = np.fft.rfftfreq(8192, 1e-3)[spectrum.argmax()]
-    # Half a second resolves 2 Hz; the braked wheelset shifts the mode by as much.
-    assert frequency == pytest.approx(21.6, abs=4.0)
-    assert np.ptp(ringing) > 1e3
 
 
 # --- files and command line ---

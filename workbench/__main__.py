@@ -7,6 +7,8 @@ from importlib.metadata import version
 
 from workbench.commands import (
     add_bench,
+    add_diagnose,
+    add_export,
     add_fmu,
     add_observability,
     add_rig,
@@ -42,8 +44,10 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_simulate(commands)
     add_tune(commands)
+    add_diagnose(commands)
     add_observability(commands)
     add_rig(commands)
+    add_export(commands)
     add_fmu(commands)
     add_bench(commands)
     return parser

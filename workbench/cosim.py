@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.case import Case
 from workbench.fmu import FMUError, Matrix, Vector
-from workbench.observers import ESTIMATE, Estimate, Estimator, PeakForce
+from workbench.observers import ESTIMATE, MODELLED_CONTACT, Estimate, Estimator, PeakForce
 
 
 class Outcome(enum.Enum):
@@ -35,7 +35,7 @@ class Run:
     message : what the FMU said, empty if nothing.
     seconds : wall time of the estimator.
     muWR_claimed : (n,) whether muWR is an estimate; elsewhere it is a guess that fits as well as
-        any other, see PeakForce.claims.
+        any other, see PeakForce.claims, or stands in for a contact that the model has not.
     """
 
     case: str
@@ -68,7 +68,8 @@ def observe(case: Case, estimator: Estimator) -> Run:
             outcome = Outcome.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
         seconds = time.perf_counter() - begin
-        claimed = PeakForce(estimator.fmu).claims(estimate.values)
+        if case.conditions.wheel_rail == MODELLED_CONTACT:
+            claimed = PeakForce(estimator.fmu).claims(estimate.values)
     except FMUError as error:
         seconds = time.perf_counter() - begin
         outcome, message = Outcome.FMU_FAILED, str(error)

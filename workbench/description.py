@@ -34,7 +34,7 @@ class Variable:
     Attributes
     ----------
     real : a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0).
-    nominal : typical size in `unit`, None where the description has none.
+    nominal, minimum, maximum : in `unit`, None where the description has none.
     """
 
     name: str
@@ -46,6 +46,8 @@ class Variable:
     unit: str | None
     start: str | None
     nominal: float | None
+    minimum: float | None
+    maximum: float | None
     text: str
 
 
@@ -232,6 +234,8 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         unit=variable.unit or (declared.unit if declared else None),
         start=None if variable.start is None else str(variable.start),
         nominal=_number(variable.nominal or (declared.nominal if declared else None)),
+        minimum=_number(variable.min or (declared.min if declared else None)),
+        maximum=_number(variable.max or (declared.max if declared else None)),
         text=variable.description or "",
     )
 

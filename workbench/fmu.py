@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -66,6 +67,15 @@ class Variables:
     names: tuple[str, ...]
     references: NDArray[np.uint32]
     values: Vector
+
+    @cached_property
+    def arguments(self) -> tuple[ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]:
+        """References, their number and values, as calls into the FMU take them."""
+        return (
+            ctypes.c_void_p(self.references.ctypes.data),
+            ctypes.c_size_t(self.references.size),
+            ctypes.c_void_p(self.values.ctypes.data),
+        )
 
 
 @dataclass(frozen=True)
@@ -227,18 +237,11 @@ class FMU:
         self._real("set", variables)
 
     def _real(self, use: str, variables: Variables) -> None:
-        count = variables.references.size
-        if not count:
+        references, count, values = variables.arguments
+        if not count.value:
             return
-        pointer = variables.values.ctypes.data
-        tail = (ctypes.c_size_t(count),) if self.version == "3.0" else ()
-        self._checked(
-            use,
-            ctypes.c_void_p(variables.references.ctypes.data),
-            ctypes.c_size_t(count),
-            ctypes.c_void_p(pointer),
-            *tail,
-        )
+        tail = (count,) if self.version == "3.0" else ()
+        self._checked(use, references, count, values, *tail)
 
     def _checked(self, use: str, *arguments: object) -> None:
         status = self._call[use](self._component, *arguments)

@@ -26,9 +26,12 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
   output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
   output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
+  output Units.Pressure pBRest = cylinder.rest "Measured pressure of an empty cylinder";
 
-  replaceable Brakes.LinearActuation actuation(pB=pB)
-    constrainedby Brakes.PartialActuation(pB=pB) "Brake actuation";
+  replaceable Brakes.DirectCylinder cylinder(pB=pB, restBefore=0.0)
+    constrainedby Brakes.PartialCylinder(pB=pB, restBefore=0.0) "Brake cylinder and its sensor";
+  replaceable Brakes.LinearActuation actuation(pB=cylinder.p)
+    constrainedby Brakes.PartialActuation(pB=cylinder.p) "Brake actuation";
   replaceable Brakes.ConstantPadFriction padFriction(
     level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW)
     constrainedby Brakes.PartialPadFriction(
@@ -41,6 +44,19 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
+  replaceable Quantities.Unchanged wheelRadius(nominal=rW, omega=omegaW)
+    constrainedby Quantities.PartialQuantity(nominal=rW, omega=omegaW) "Wheel radius";
+  replaceable Quantities.Unchanged wheelLoad(nominal=Fz, omega=omegaW)
+    constrainedby Quantities.PartialQuantity(nominal=Fz, omega=omegaW) "Wheel load";
+  replaceable Quantities.Unchanged creepStiffness(
+    nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
+    constrainedby Quantities.PartialQuantity(
+    nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
+    "Creep force per creepage at zero slip";
+  replaceable Quantities.Unchanged wheelInertia(nominal=JW, omega=omegaW)
+    constrainedby Quantities.PartialQuantity(nominal=JW, omega=omegaW) "Inertia of the wheelset";
+  replaceable Quantities.Unchanged driveTorque(nominal=tauR, omega=omegaW)
+    constrainedby Quantities.PartialQuantity(nominal=tauR, omega=omegaW) "Torque of the drive";
   replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
     constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
   replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
@@ -49,14 +65,15 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Sensors.PartialForceSensor(F=Fx) "Force sensor of the rig";
 
 protected
-  parameter Units.Force K = Contact.kalkerStiffness(Fz) "Creep force per creepage at zero slip";
   Units.Torque tauB "Torque of the pads on the wheelset";
 equation
-  slip = rR*omegaR - rW*omegaW;
-  Fx = 2.0*Contact.creepForce(slip, rR*omegaR, Fz, K, adhesion.mu0, polach);
+  slip = rR*omegaR - wheelRadius.actual*omegaW;
+  Fx = 2.0*Contact.creepForce(
+    slip, rR*omegaR, wheelLoad.actual, creepStiffness.actual, adhesion.mu0, polach);
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
-  JW*der(omegaW) = rW*Fx - tauB - wheelsetLoss.tau + JW*correctionW;
-  JR*der(omegaR) = tauR - rR*Fx - rollerLoss.tau + JR*correctionR;
+  wheelInertia.actual*der(omegaW) =
+    wheelRadius.actual*Fx - tauB - wheelsetLoss.tau + wheelInertia.actual*correctionW;
+  JR*der(omegaR) = driveTorque.actual - rR*Fx - rollerLoss.tau + JR*correctionR;
   annotation (
     experiment(StopTime=40.0, Tolerance=1e-6),
     Documentation(info="<html>
@@ -66,8 +83,9 @@ the model of the disturbance observer; the friction corrections <code>dmuWR</cod
 <code>tauR</code> is the torque of an inertia-simulating drive, <code>JR</code> the roller's own
 inertia.</p>
 <h4>Slots</h4>
-<p>Actuation, pad friction, contact friction, losses and sensors are replaceable: a new physical effect
-is a <code>redeclare</code>. A sensor changes its reading and nothing else.</p>
+<p>Cylinder, actuation, pad friction, contact friction, losses, quantities of the rig and sensors are
+replaceable: a new physical effect is a <code>redeclare</code>. A sensor changes its reading and nothing
+else. <code>Effects</code> holds a catalogue, and says how several effects share a slot.</p>
 <h4>References</h4>
 <p>C. Schwarz, J. Brembeck, B. Heckmann (2018), equations (1) to (3).</p>
 </html>"));

@@ -95,7 +95,7 @@ def add_rig(commands: Commands) -> None:
 
 def _epilog() -> str:
     effects = "\n".join(
-        f"  {field.name:<17} [{field.metadata['unit']}]".ljust(27) + field.metadata["text"]
+        f"  {field.name:<18} [{field.metadata['unit']}]".ljust(28) + field.metadata["text"]
         for field in dataclasses.fields(Effects)
     )
     pads = ", ".join(
@@ -113,6 +113,7 @@ scenarios, of which the first {len(STANDARD)} are standard:
 
 effects, zero if not given:
 {effects}
+  phiW is the angle of the wheelset; phases are drawn for each stop.
   Ordinary pads have {pads}."""
 
 

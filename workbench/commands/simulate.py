@@ -24,7 +24,13 @@ from workbench.commands.arguments import (
 from workbench.cosim import observe
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
-from workbench.observers import Settings, all_estimators, reasoned_settings
+from workbench.observers import (
+    ESTIMATORS,
+    STANDARD,
+    Settings,
+    make_estimators,
+    reasoned_settings,
+)
 from workbench.report import (
     CaseFigure,
     CaseResult,
@@ -51,7 +57,9 @@ def add_simulate(commands: Commands) -> None:
         "  python -m workbench simulate\n"
         "  python -m workbench simulate cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        "  python -m workbench simulate cases/03_dry_120_3.6 --live",
+        "  python -m workbench simulate cases/03_dry_120_3.6 --live\n"
+        "  python -m workbench simulate --estimator disturbance_observer "
+        "--estimator disturbance_observer_disc",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(simulate, out="results/simulate")
@@ -63,6 +71,16 @@ def add_simulate(commands: Commands) -> None:
         help="gains.toml of 'workbench tune' (default: gains reasoned from the linearised models)",
     )
     add_map(simulate)
+    simulate.add_argument(
+        "--estimator",
+        action="append",
+        default=[],
+        choices=ESTIMATORS,
+        metavar="NAME",
+        help="run this one, may be repeated (default: the standard ones): "
+        f"{', '.join(STANDARD)}; besides these disturbance_observer_disc, with a physical model "
+        "of disc temperature",
+    )
     simulate.add_argument(
         "--workers",
         type=positive,
@@ -86,11 +104,13 @@ class _Plan:
     ----------
     minimal, full : files of the two observer models.
     names : our names of variables to those in the FMUs.
+    estimators : names, in the order of the results.
     """
 
     minimal: Path
     full: Path
     names: Mapping[str, str]
+    estimators: Sequence[str]
     settings: Settings
     weights: Weights
     out: Path
@@ -99,6 +119,7 @@ class _Plan:
 def _simulate(options: argparse.Namespace) -> int:
     cases = read_cases(options.cases)
     names = model_names(options.map, cases)
+    chosen = [name for name in ESTIMATORS if name in (options.estimator or STANDARD)]
     window = LiveWindow() if options.live else None
     options.out.mkdir(parents=True, exist_ok=True)
     with FMU(options.fmu, names) as minimal, FMU(options.full_fmu, names) as full:
@@ -111,7 +132,7 @@ def _simulate(options: argparse.Namespace) -> int:
             tuned = next(key for key in sources if name in key)
             sources[tuned]["source"] = f"tuned, {options.gains.name}"
         print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
-        for estimator in all_estimators(minimal, full, settings):
+        for estimator in make_estimators(chosen, minimal, full, settings):
             estimator.run(cases[0].time[:2], cases[0].u[:2], cases[0].y[:2])
         provenance = {
             "workbench": version("wheelset-workbench"),
@@ -125,7 +146,7 @@ def _simulate(options: argparse.Namespace) -> int:
             **sources,
         }
     weights = Weights()
-    plan = _Plan(options.fmu, options.full_fmu, names, settings, weights, options.out)
+    plan = _Plan(options.fmu, options.full_fmu, names, chosen, settings, weights, options.out)
     done: list[tuple[CaseResult, CaseFigure]] = []
     begin = time.perf_counter()
     interrupted = False
@@ -176,7 +197,7 @@ def _run_case(
             stack.enter_context(FMU(path, plan.names)) for path in (plan.minimal, plan.full)
         )
         roller_radius = minimal.defaults["rR"]
-        estimators = all_estimators(minimal, full, plan.settings)
+        estimators = make_estimators(plan.estimators, minimal, full, plan.settings)
         if window is not None:
             window.show(case, estimators)
         runs = {e.name: observe(case, e) for e in estimators}

@@ -20,6 +20,7 @@ from workbench.compiler.archive import (
     digest,
     digest_file,
     library_sources,
+    native,
     pack,
     write_sources,
 )
@@ -29,7 +30,15 @@ from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError
 
-__all__ = ["BuiltFMU", "build", "build_all", "differences", "source_hash"]
+__all__ = [
+    "PLATFORMS",
+    "BuiltFMU",
+    "build",
+    "build_all",
+    "differences",
+    "native",
+    "source_hash",
+]
 
 # What `fmus/` holds: every model in both versions of FMI.
 MODELS = ("Reference", "FullObserver", "MinimalObserver")

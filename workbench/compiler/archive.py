@@ -6,6 +6,7 @@ paths, no build identifiers, files in a fixed order.
 
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -32,6 +33,15 @@ FLAGS = (
     *("-std=c99", "-O2", "-g0", "-fPIC", "-fvisibility=hidden"),
     *("-ffp-contract=off", "-fomit-frame-pointer"),
 )
+
+
+def native() -> str:
+    """Name in PLATFORMS of the machine that this runs on."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}[platform.system()]
+    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
+    return f"{system}-{processor}"
 
 
 def library_sources(fmi: int) -> list[str]:

@@ -12,11 +12,21 @@ from workbench.observers.disturbance import (
 )
 from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
 from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
-from workbench.observers.suite import Settings, all_estimators, reasoned_settings
-from workbench.observers.utilisation import PeakForce
+from workbench.observers.suite import (
+    ESTIMATORS,
+    STANDARD,
+    Settings,
+    all_estimators,
+    make_estimators,
+    reasoned_settings,
+)
+from workbench.observers.utilisation import MODELLED_CONTACT, PeakForce
 
 __all__ = [
     "ESTIMATE",
+    "ESTIMATORS",
+    "MODELLED_CONTACT",
+    "STANDARD",
     "DirectInversion",
     "DiscModel",
     "DisturbanceGains",
@@ -34,6 +44,7 @@ __all__ = [
     "Settings",
     "UnscentedKalmanFilter",
     "all_estimators",
+    "make_estimators",
     "pole_placed_gains",
     "reasoned_settings",
     "stationary_gains",

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
+from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import (
@@ -288,7 +289,13 @@ class DisturbanceObserver(Estimator):
     ----------
     fmu : minimal model, with two states.
     gains : see DisturbanceGains.
-    disc : physical trend of muDC; None for a constant. Needs the parameter JW of the model.
+    disc : physical trend of muDC; None for a constant. Needs the parameter JW of the model, the
+        wheelset's inertia [kg.m2].
+
+    Raises
+    ------
+    InputError
+        If the model lacks a variable of an estimator, or JW with a disc.
 
     Notes
     -----
@@ -307,7 +314,14 @@ class DisturbanceObserver(Estimator):
     def __init__(self, fmu: FMU, gains: DisturbanceGains, disc: DiscModel | None = None) -> None:
         super().__init__(fmu)
         if disc is not None:
-            self.name = "disturbance_observer_physical"
+            self.name = "disturbance_observer_disc"
+            if "JW" not in fmu.defaults:
+                raise InputError(
+                    where=f"{fmu.path}, {self.name}",
+                    found="no parameter 'JW' with a value",
+                    expected="the inertia of the wheelset, which tells the heat of the discs",
+                    remedy="add JW to the model, or leave this estimator out",
+                )
         low, high = (FRICTION_RANGE - self._nominal[:, None]).T
         decay = np.array([gains.T_WR, gains.T_DC])
         self._settings = _Settings(

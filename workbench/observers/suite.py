@@ -1,14 +1,31 @@
 """All estimators with reasoned settings, and what they are made of."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from workbench.fmu import FMU
 from workbench.observers.baselines import DirectInversion, OpenLoop
 from workbench.observers.contract import Estimator
-from workbench.observers.disturbance import DisturbanceGains, DisturbanceObserver, stationary_gains
+from workbench.observers.disturbance import (
+    DiscModel,
+    DisturbanceGains,
+    DisturbanceObserver,
+    stationary_gains,
+)
 from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
 from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
+
+# Baselines first, then observers.
+STANDARD = (
+    "open_loop",
+    "direct_inversion",
+    "disturbance_observer",
+    "parameter_estimator",
+    "ekf",
+    "ukf",
+)
+ESTIMATORS = (*STANDARD, "disturbance_observer_disc")
 
 
 @dataclass(frozen=True)
@@ -49,13 +66,30 @@ def reasoned_settings(minimal: FMU, full: FMU) -> Settings:
     return Settings(stationary_gains(minimal), pole_placed_gains(full), FilterNoise())
 
 
+def make_estimators(
+    names: Sequence[str], minimal: FMU, full: FMU, settings: Settings
+) -> list[Estimator]:
+    """Estimators by name; they share two FMU instances, so run one at a time.
+
+    Parameters
+    ----------
+    names : of ESTIMATORS, in the order of the result.
+    minimal, full : the two observer models.
+    """
+    make: dict[str, Callable[[], Estimator]] = {
+        "open_loop": lambda: OpenLoop(minimal),
+        "direct_inversion": lambda: DirectInversion(minimal),
+        "disturbance_observer": lambda: DisturbanceObserver(minimal, settings.disturbance),
+        "parameter_estimator": lambda: ParameterEstimator(full, settings.parameter),
+        "ekf": lambda: ExtendedKalmanFilter(minimal, settings.noise),
+        "ukf": lambda: UnscentedKalmanFilter(minimal, settings.noise),
+        "disturbance_observer_disc": lambda: DisturbanceObserver(
+            minimal, settings.disturbance, DiscModel()
+        ),
+    }
+    return [make[name]() for name in names]
+
+
 def all_estimators(minimal: FMU, full: FMU, settings: Settings) -> list[Estimator]:
-    """Baselines first, then observers; they share two FMU instances, so run one at a time."""
-    return [
-        OpenLoop(minimal),
-        DirectInversion(minimal),
-        DisturbanceObserver(minimal, settings.disturbance),
-        ParameterEstimator(full, settings.parameter),
-        ExtendedKalmanFilter(minimal, settings.noise),
-        UnscentedKalmanFilter(minimal, settings.noise),
-    ]
+    """The standard estimators, which run on any model that `check_model` accepts."""
+    return make_estimators(STANDARD, minimal, full, settings)

@@ -5,9 +5,9 @@ Nothing here reads an estimator, and no estimator reads the truth that is writte
 
 from workbench.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
 from workbench.rig.files import check_files, write_recording
-from workbench.rig.run import Drawn, Stop, simulate
+from workbench.rig.run import Drawn, Phases, Stop, simulate
 from workbench.rig.scenarios import SCENARIOS, STANDARD, Scenario, select
-from workbench.rig.sensors import MEASURED, measure
+from workbench.rig.sensors import MEASURED, measure, received
 
 __all__ = [
     "CONSTANT_PADS",
@@ -17,11 +17,13 @@ __all__ = [
     "STANDARD",
     "Drawn",
     "Effects",
+    "Phases",
     "Scenario",
     "Stop",
     "check_files",
     "measure",
     "plant",
+    "received",
     "select",
     "simulate",
     "write_recording",

@@ -9,6 +9,8 @@ PROTECTION_PERIOD = 0.010  # [s]
 # Valve and cylinder together lag by 0.9 s, as an electro-pneumatic brake does.
 _SUPPLY_LAG, _FILL_LAG, _VENT_LAG = 0.5, 0.4, 0.2  # [s]
 
+_PLAY = 20e3  # [Pa] the pressure turns back before the calipers change side; less than p0
+
 _REFERENCE_FALL = 2.2  # [m/s2] no train slows down faster: 1.75 at 4.2 bar, and hot or sharp pads
 _ACCELERATION_LAG = 0.03  # [s]
 _SLIDING = 0.08  # slip above which pressure is let out
@@ -32,17 +34,22 @@ class Brake:
     Parameters
     ----------
     pad_lag : [s] of the pads behind the cylinder pressure.
+    hysteresis : share of the force that friction of the calipers takes or gives.
     dt : [s] time between two steps.
 
     Attributes
     ----------
     cylinder : [Pa] gauge pressure where it is measured.
     pads : [Pa] gauge pressure that presses the pads.
+    efficiency : force of the calipers over that of calipers without friction.
     """
 
-    def __init__(self, pad_lag: float, dt: float) -> None:
+    def __init__(self, pad_lag: float, hysteresis: float, dt: float) -> None:
         self.cylinder = 0.0
         self.pads = 0.0
+        self.efficiency = 1.0 + hysteresis
+        self._hysteresis = hysteresis
+        self._side = -1.0  # of the play: 1 where pressure has risen, -1 where it has fallen
         self._supply = 0.0
         self._distribute = 1.0 - math.exp(-dt / _SUPPLY_LAG)
         self._fill = 1.0 - math.exp(-dt / _FILL_LAG)
@@ -56,7 +63,10 @@ class Brake:
             self.cylinder += self._fill * (self._supply - self.cylinder)
         elif valve is Valve.VENT:
             self.cylinder -= self._vent * self.cylinder
-        self.pads += self._press * (self.cylinder - self.pads)
+        rise = self._press * (self.cylinder - self.pads)
+        self.pads += rise
+        self._side = min(1.0, max(-1.0, self._side + 2.0 * rise / _PLAY))
+        self.efficiency = 1.0 - self._hysteresis * self._side
 
 
 class WheelSlideProtection:

@@ -15,26 +15,57 @@ def _gain(unit: str, text: str, *, least: float = -math.inf) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class Effects:
-    """Gains of all effects; the metadata of each field holds its unit and its meaning."""
+    """Gains of all effects; the metadata of each field holds its unit and its meaning.
+
+    phiW is the angle of the wheelset; phases are drawn for each stop and effect.
+    """
 
     speed_friction: float = _gain("1", "pad friction times 1 + gain*(1 - v/22 m/s)")
     fade: float = _gain("1/K", "pad friction times 1 - gain*(T - 100 degC), T of each disc")
     pressure_exponent: float = _gain("1", "pad friction times (normal force/35 kN)^-gain")
     bedding_in: float = _gain("1", "pad friction times 1 - gain*exp(-t/2 s) from first contact")
+    water_film: float = _gain("1", "pad friction times 1 - gain*exp(-E/0.45 MJ), E of each disc")
+    single_disc_film: float = _gain("1", "the same, of disc 2 alone")
+    disc_thickness: float = _gain("1", "pad friction times 1 + gain*cos(phiW + phase)")
+    caliper_hysteresis: float = _gain(
+        "1", "pad force less by gain as pressure rises, more as it falls"
+    )
     cylinder_lag: float = _gain("s", "lag of the pads behind the measured pressure", least=0.0)
     return_spring: float = _gain("Pa", "added to the pressure that balances the return spring")
     wheel_radius: float = _gain("m", "added to the wheel radius", least=-0.1)
+    out_of_round: float = _gain("m", "wheel radius plus gain*cos(phiW + phase)")
+    roller_radius: float = _gain("m", "added to the roller radius", least=-0.1)
     wheel_load: float = _gain("1", "wheel load times 1 + gain", least=-0.5)
+    creep_stiffness: float = _gain("1", "Polach's kA and kS times 1 + gain", least=-0.9)
+    adhesion_recovery: float = _gain(
+        "1", "contact friction times 1 + gain*(1 - exp(-E/250 kJ)), E of slip"
+    )
     wheelset_losses: float = _gain("1", "losses of the wheelset times 1 + gain", least=-1.0)
     roller_losses: float = _gain("1", "losses of the roller times 1 + gain", least=-1.0)
     wheel_inertia: float = _gain("1", "inertia of the wheelset times 1 + gain", least=-0.9)
     torque_gain: float = _gain("1", "measured torque times 1 + gain")
     fx_gain: float = _gain("1", "load cell times 1 + gain")
     fx_offset: float = _gain("N", "added to the load cell, in either direction")
+    apex_offset: float = _gain("m", "wheel off the roller's crest: 138 N/mm more on the load cell")
     speed_delay: float = _gain("s", "delay of the measured wheel speed")
-    pole_ring: float = _gain("1", "measured wheel speed times 1 + gain*cos(wheel angle)")
+    pole_ring: float = _gain("1", "measured wheel speed times 1 + gain*cos(phiW + phase)")
     time_skew: float = _gain("s", "delay of both measured speeds, of a second logger")
     pressure_offset: float = _gain("Pa", "added to the measured pressure")
+    # Outside the catalogue: a diagnosis should find no name for these.
+    friction_step: float = _gain(
+        "1", "not in the catalogue: pad friction times 1 + gain over 90 degC"
+    )
+    friction_ripple: float = _gain(
+        "1", "not in the catalogue: pad friction times 1 + gain*sin(2 pi 0.3 Hz t)"
+    )
+    drive_beat: float = _gain(
+        "1", "not in the catalogue: measured torque times 1 + gain*sin(2 pi 0.2 Hz t)"
+    )
+    force_drift: float = _gain("N/s", "not in the catalogue: added to the load cell times t")
+    # Faults of the acquisition.
+    spikes: float = _gain("1/s", "corrupts: isolated wrong samples in each channel", least=0.0)
+    dropouts: float = _gain("1/s", "corrupts: samples that are missing", least=0.0)
+    fx_limit: float = _gain("N", "corrupts: reading at which the load cell saturates", least=0.0)
 
 
 # Organic pads: measured ranges are 0.1..0.4, 0..1e-3 /K and 0..0.10.

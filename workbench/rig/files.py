@@ -12,7 +12,7 @@ from workbench.fmu import Vector
 from workbench.rig.effects import Effects
 from workbench.rig.run import RATE, TRUTH, Stop
 from workbench.rig.scenarios import Scenario
-from workbench.rig.sensors import measure
+from workbench.rig.sensors import measure, received
 
 # Column of the recording, unit, factor from SI, digits that hold the resolution.
 _COLUMNS = {
@@ -66,12 +66,20 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> No
     recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
     time = stop.time[recorded]
     channels = measure(stop, effects, time)
+    kept = received(stop, effects, time)
     measured = {
-        f"{name} [{unit}]": (channels[name] * factor, f"%.{digits}f")
+        f"{name} [{unit}]": (channels[name][kept] * factor, f"%.{digits}f")
         for name, (unit, factor, digits) in _COLUMNS.items()
     }
     truth = {
-        f"{name} [{unit}]": (stop.truth[name][recorded], "%.7g") for name, unit in TRUTH.items()
+        f"{name} [{unit}]": (stop.truth[name][recorded][kept], "%.7g")
+        for name, unit in TRUTH.items()
+    }
+    planted = {name: gain for name, gain in dataclasses.asdict(effects).items() if gain}
+    phases = {
+        f"{name}_phase": phase
+        for name, phase in dataclasses.asdict(stop.phases).items()
+        if name in planted
     }
     made = {
         "seed": stop.seed,
@@ -79,13 +87,13 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> No
         "fmu_sha256": stop.model,
         "demand": stop.drawn.coasting,
         "standstill": round(stop.standstill, 3),
-        "drawn": dataclasses.asdict(stop.drawn),
-        "effects": {name: gain for name, gain in dataclasses.asdict(effects).items() if gain},
+        "drawn": dataclasses.asdict(stop.drawn) | phases,
+        "effects": planted,
     }
     folder.mkdir(parents=True, exist_ok=True)
     _write(folder / "truth.json", json.dumps(made, indent=2) + "\n")
-    _write(folder / "truth.csv", _table(time, truth))
-    _write(folder / "measured.csv", _table(time, measured))
+    _write(folder / "truth.csv", _table(time[kept], truth))
+    _write(folder / "measured.csv", _table(time[kept], measured))
     _write(folder / "case.toml", _case(stop.scenario))
 
 

@@ -13,6 +13,8 @@ _LEAST_FORCE = 1e3  # [N] below, the power law of the force is not followed
 _BEDDING_TIME = 2.0  # [s]
 _WET_FRICTION = 0.12
 _DRYING_ENERGY = 0.45e6  # [J] of friction on one disc leaves 1/e of its film
+_STEP_AT, _STEP_WIDTH = 90.0, 5.0  # [degC], [K] of friction_step
+_RIPPLE = 2.0 * math.pi * 0.3  # [rad/s] of friction_ripple
 
 _INITIAL, _AMBIENT = 60.0, 20.0  # [degC]
 _HEAT_CAPACITY = 75.0 * 500.0  # [J/K] friction ring of 75 kg
@@ -30,38 +32,51 @@ class Pads:
     effects : gains of the dependences.
     level : friction over FRICTION, from rig to rig.
     discs : state of each disc at the start.
+    phase : [rad] of the discs' thickness.
     dt : [s] time between two steps.
 
     Attributes
     ----------
     temperature : [degC] of each disc.
-    film : water on each disc, 1 at the start if wet, 0 if dry.
+    film : water on each disc, 1 at the start if wet, 0 if dry; not what is planted.
     """
 
-    def __init__(self, effects: Effects, level: float, discs: Sequence[Surface], dt: float) -> None:
+    def __init__(
+        self, effects: Effects, level: float, discs: Sequence[Surface], phase: float, dt: float
+    ) -> None:
         self.temperature = [_INITIAL] * len(discs)
         self.film = [1.0 if disc == "wet" else 0.0 for disc in discs]
         self._effects = effects
         self._level = level
+        self._phase = phase
         self._dt = dt
+        # Share of friction lost to films that are planted, whatever the conditions say.
+        self._lost = [effects.water_film] * len(discs)
+        self._lost[1] += effects.single_disc_film
         self._contact = 0.0  # [s] since first contact
 
-    def friction(self, speed: float, force: float) -> list[float]:
+    def friction(self, speed: float, force: float, turn: float) -> list[float]:
         """Friction coefficient of each disc.
 
         Parameters
         ----------
         speed : [m/s] of the wheel's circumference; pads slide at a fixed share of it.
         force : [N] normal force of one unit.
+        turn : [rad] angle of the discs.
         """
         e = self._effects
         common = FRICTION * (1.0 + e.speed_friction * (1.0 - speed / _SPEED))
         common *= (max(force, _LEAST_FORCE) / _FORCE) ** -e.pressure_exponent
         common *= 1.0 - e.bedding_in * math.exp(-self._contact / _BEDDING_TIME)
+        varied = 1.0 + e.disc_thickness * math.cos(turn + self._phase)
+        varied *= 1.0 + e.friction_ripple * math.sin(_RIPPLE * self._contact)
         return [
             self._level
             * (common * (1.0 - e.fade * (T - _TEMPERATURE)) * (1.0 - film) + _WET_FRICTION * film)
-            for T, film in zip(self.temperature, self.film, strict=True)
+            * varied
+            * (1.0 - lost)
+            * (1.0 + e.friction_step * _step(T))
+            for T, film, lost in zip(self.temperature, self.film, self._lost, strict=True)
         ]
 
     def heat(self, powers: Sequence[float], speed: float, force: float) -> None:
@@ -76,6 +91,13 @@ class Pads:
         for i, power in enumerate(powers):
             cooled = cooling * (self.temperature[i] - _AMBIENT)
             self.temperature[i] += self._dt * (_INTO_DISC * power - cooled) / _HEAT_CAPACITY
-            self.film[i] *= math.exp(-self._dt * power / _DRYING_ENERGY)
+            dried = math.exp(-self._dt * power / _DRYING_ENERGY)
+            self.film[i] *= dried
+            self._lost[i] *= dried
         if force > 0.0 or self._contact > 0.0:
             self._contact += self._dt
+
+
+def _step(temperature: float) -> float:
+    """From 0 below _STEP_AT [degC] to 1 above."""
+    return 0.5 + 0.5 * math.tanh(2.0 * (temperature - _STEP_AT) / _STEP_WIDTH)

@@ -1,5 +1,6 @@
 """One stop on the virtual rig: the multibody model beside drive, brake and pads at 1 kHz."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from workbench.rig.drive import Drive, Losses
 from workbench.rig.effects import Effects
 from workbench.rig.pads import FRICTION, Pads
 from workbench.rig.scenarios import Scenario
+from workbench.rig.wheel import CleanedContact, OutOfRoundWheel
 
 RATE = 1000  # [Hz] of the co-simulation
 
@@ -33,7 +35,10 @@ TRUTH = {
 }
 
 _OUTPUTS = ("Fx", "FcellL", "FcellR", "slip", *(f"discPower[{i}]" for i in (1, 2, 3)))
-_INPUTS = ("pB", "tauR", "dmuWR", *(f"muDCunit[{i}]" for i in (1, 2, 3)))
+_INPUTS = (
+    *("pB", "tauR", "dmuWR", "actuation.kappa", "wheelsetLoss.c0"),
+    *(f"muDCunit[{i}]" for i in (1, 2, 3)),
+)
 _POLACH = {
     "dry": {"polach.kA": 1.0, "polach.kS": 0.4, "polach.A": 0.4, "polach.B": 0.6},
     "wet": {"polach.kA": 0.3, "polach.kS": 0.1, "polach.A": 0.4, "polach.B": 0.2},
@@ -62,6 +67,15 @@ class Drawn:
     coasting: float
 
 
+@dataclass(frozen=True)
+class Phases:
+    """Where the wheel of this stop starts, [rad] by the effects that turn with it."""
+
+    disc_thickness: float
+    out_of_round: float
+    pole_ring: float
+
+
 @dataclass(frozen=True, eq=False)
 class Stop:
     """The truth of one stop.
@@ -70,6 +84,7 @@ class Stop:
     ----------
     scenario, seed : what was asked for.
     drawn : deviations of this stop.
+    phases : of this stop.
     time : (n,) [s] in steps of 1/RATE, negative before the recording.
     truth : (n,) each, by the names of TRUTH.
     standstill : [s] when wheelset and roller stood.
@@ -79,6 +94,7 @@ class Stop:
     scenario: Scenario
     seed: int
     drawn: Drawn
+    phases: Phases
     time: Vector
     truth: Mapping[str, Vector]
     standstill: float
@@ -104,12 +120,13 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
         If the FMU is not a model of the rig, or the wheelset does not stop in 300 s.
     """
     drawn = _draw(np.random.default_rng([seed, scenario.number, 0]))
+    phases = _phases(np.random.default_rng([seed, scenario.number, 6]))
     with CoSimulation(fmu_path) as fmu:
-        rows, standstill = _brake_to_standstill(fmu, scenario, drawn, effects)
+        rows, standstill = _brake_to_standstill(fmu, scenario, drawn, phases, effects)
         model = fmu.sha256
     time = np.arange(len(rows)) / RATE - _RUN_IN
     truth = dict(zip(TRUTH, np.array(rows).T.copy(), strict=True))
-    return Stop(scenario, seed, drawn, time, truth, standstill, model)
+    return Stop(scenario, seed, drawn, phases, time, truth, standstill, model)
 
 
 def _draw(rng: np.random.Generator) -> Drawn:
@@ -119,12 +136,17 @@ def _draw(rng: np.random.Generator) -> Drawn:
     return Drawn(float(JW), float(JR), float(Fz), float(muDC), float(muWR), coasting)
 
 
+def _phases(rng: np.random.Generator) -> Phases:
+    return Phases(*rng.uniform(-np.pi, np.pi, 3).tolist())
+
+
 def _parameters(
     nominal: Mapping[str, float], scenario: Scenario, drawn: Drawn, effects: Effects
 ) -> dict[str, float]:
     """Parameters of the FMU that are not nominal; all of them are constant during a stop."""
     changed = {
         "rW": nominal["rW"] + effects.wheel_radius,
+        "rR": nominal["rR"] + effects.roller_radius,
         "JW": nominal["JW"] * drawn.JW * (1.0 + effects.wheel_inertia),
         "JR": nominal["JR"] * drawn.JR,
         "Fz": nominal["Fz"] * drawn.Fz * (1.0 + effects.wheel_load),
@@ -137,29 +159,35 @@ def _parameters(
             1.0 + effects.wheelset_losses
         )
         changed[f"rollerLoss.{c}"] = nominal[f"rollerLoss.{c}"] * (1.0 + effects.roller_losses)
-    return changed | _POLACH[scenario.conditions.wheel_rail]
+    changed |= _POLACH[scenario.conditions.wheel_rail]
+    for k in ("polach.kA", "polach.kS"):
+        changed[k] *= 1.0 + effects.creep_stiffness
+    return changed
 
 
 def _brake_to_standstill(
-    fmu: CoSimulation, scenario: Scenario, drawn: Drawn, effects: Effects
+    fmu: CoSimulation, scenario: Scenario, drawn: Drawn, phases: Phases, effects: Effects
 ) -> tuple[list[tuple[float, ...]], float]:
     """Rows of the truth, and the time of standstill [s]."""
     inputs, outputs = fmu.variables(_INPUTS), fmu.variables(_OUTPUTS)
     nominal = fmu.defaults
     parameters = _parameters(nominal, scenario, drawn, effects)
-    rW, rR = parameters["rW"], nominal["rR"]
+    rW, rR = parameters["rW"], parameters["rR"]
     kappa, p0 = nominal["actuation.kappa"], parameters["actuation.p0"]
+    drag = parameters["wheelsetLoss.c0"]
     conditions, patch = scenario.conditions, scenario.patch
     velocity = conditions.initial_speed * conditions.direction
-    omegaW, omegaR, phiW = velocity / rW, velocity / rR, 0.0
+    omegaW, omegaR, phiW, Fx = velocity / rW, velocity / rR, 0.0, 0.0
     states = [fmu.states.index(name) for name in ("omegaW", "omegaR", "wheelset.phi")]
     fmu.start({"omegaW": omegaW, "omegaR": omegaR}, parameters)
 
     dt = 1.0 / RATE
     losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
     drive = Drive(nominal["JR"], losses, omegaR, dt)
-    brake = Brake(effects.cylinder_lag, dt)
-    pads = Pads(effects, drawn.muDC, conditions.discs, dt)
+    brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
+    pads = Pads(effects, drawn.muDC, conditions.discs, phases.disc_thickness, dt)
+    wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
+    contact = CleanedContact(effects.adhesion_recovery, dt)
     protection = WheelSlideProtection(conditions.initial_speed)
     valve = Valve.FILL
     every = round(PROTECTION_PERIOD * RATE)
@@ -179,15 +207,22 @@ def _brake_to_standstill(
             valve = protection.step(abs(omegaW) * nominal["rW"])
 
         brake.step(conditions.brake_pressure if braking >= DEAD_TIME else 0.0, valve)
-        force = kappa * max(0.0, brake.pads - p0)
-        mu = pads.friction(speed, force)
+        ratio = kappa * brake.efficiency
+        force = ratio * max(0.0, brake.pads - p0)
+        turn = phiW + 0.5 * dt * omegaW  # in the middle of the time for which inputs are held
+        mu = pads.friction(speed, force, turn)
         tauR = drive.step(omegaR, stopped=standstill is not None)
         low = patch is not None and patch.begin <= braking < patch.end
         muWR = (patch.muWR if patch is not None and low else scenario.muWR) * drawn.muWR
+        muWR *= contact.friction
+        # A torque on the wheelset enters the model as a change of its loss.
+        push = math.copysign(1.0, omegaW) * wheel.torque(omegaW, turn, Fx)
         inputs.values[:] = (
             brake.pads,
             tauR,
             muWR - parameters["muWR"],
+            ratio,
+            drag - push,
             *(value / FRICTION for value in mu),
         )
         fmu.set(inputs, inputs.values)
@@ -199,7 +234,9 @@ def _brake_to_standstill(
             )
         )
         pads.heat(powers, speed, force)
-        omegaW, omegaR, phiW = fmu.step(dt)[states].tolist()
+        contact.rub(0.5 * abs(Fx * slip))
+        rim, omegaR, phiW = fmu.step(dt)[states].tolist()
+        omegaW = wheel.speed(rim, phiW)
     raise InputError(
         where=scenario.name,
         found=f"{abs(omegaR) * rR:.1f} m/s after {_LONGEST:g} s",

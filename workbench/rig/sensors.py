@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.fmu import Vector
 from workbench.rig.effects import Effects
@@ -35,12 +36,19 @@ MEASURED = {
 }
 
 
+_CREST = 160e3 / 1.16  # [N/m] both wheel loads over rW + rR: slope of the contact off the crest
+_BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
+
+# Streams of random numbers: 0 tolerances, 1 to 5 noise, 6 phases.
+_NOISE, _SPIKES, _DROPOUTS = 1, 7, 12
+
+
 def measure(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
     """Sample all channels.
 
     Channels have noise of their own, so that what happens to one leaves the others alone. The
     noise is that of a sample at any rate. There is no filter: structure modes lie below 200 Hz
-    and are wanted.
+    and are wanted. Spikes come last, on the way to the logger.
 
     Parameters
     ----------
@@ -50,21 +58,60 @@ def measure(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
     -------
     channels : pB, tauR, omegaW, omegaR, Fx, each (n,) in SI units.
     """
-    e, number = effects, stop.scenario.number
+    e, drawn = effects, stop.drawn
     wheel = time - e.speed_delay - e.time_skew
-    ring = 1.0 + e.pole_ring * np.cos(stop.at(wheel, "phiW"))
+    ring = 1.0 + e.pole_ring * np.cos(stop.at(wheel, "phiW") + stop.phases.pole_ring)
+    beat = 1.0 + e.drive_beat * np.sin(_BEAT * time)
+    # The wheel load presses against the slope: in the same direction, wherever the wheel turns.
+    crest = _CREST * e.apex_offset * drawn.Fz * (1.0 + e.wheel_load)
     ideal = {
         "pB": stop.at(time, "pB") + e.pressure_offset,
-        "tauR": stop.at(time, "tauR") * (1.0 + e.torque_gain),
+        "tauR": stop.at(time, "tauR") * (1.0 + e.torque_gain) * beat,
         "omegaW": stop.at(wheel, "omegaW") * ring,
         "omegaR": stop.at(time - e.time_skew, "omegaR"),
-        "Fx": stop.at(time, "Fcell") * (1.0 + e.fx_gain) + e.fx_offset,
+        "Fx": (stop.at(time, "Fcell") + crest) * (1.0 + e.fx_gain)
+        + (e.fx_offset + e.force_drift * time),
     }
-    # Stream 0 has drawn the tolerances.
-    return {
-        name: _read(ideal[name], sensor, np.random.default_rng([stop.seed, number, stream]))
-        for stream, (name, sensor) in enumerate(MEASURED.items(), start=1)
+    readings = {
+        name: _read(ideal[name], sensor, _rng(stop, _NOISE + i))
+        for i, (name, sensor) in enumerate(MEASURED.items())
     }
+    if e.fx_limit:
+        readings["Fx"] = np.clip(readings["Fx"], -e.fx_limit, e.fx_limit)
+    if e.spikes:
+        for i, name in enumerate(MEASURED):
+            readings[name] = _corrupt(readings[name], e.spikes, time, _rng(stop, _SPIKES + i))
+    return readings
+
+
+def received(stop: Stop, effects: Effects, time: Vector) -> NDArray[np.bool_]:
+    """Which samples reach the file, (n,).
+
+    Parameters
+    ----------
+    time : as in `measure`.
+    """
+    return ~_struck(effects.dropouts, time, _rng(stop, _DROPOUTS))
+
+
+def _rng(stop: Stop, stream: int) -> np.random.Generator:
+    return np.random.default_rng([stop.seed, stop.scenario.number, stream])
+
+
+def _struck(rate: float, time: Vector, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Samples that something strikes at a mean `rate` [1/s], (n,)."""
+    period = (time[-1] - time[0]) / (time.size - 1)
+    struck: NDArray[np.bool_] = rng.random(time.size) < rate * period
+    return struck
+
+
+def _corrupt(reading: Vector, rate: float, time: Vector, rng: np.random.Generator) -> Vector:
+    """Move single samples by 0.5 to 1.5 times the largest reading, up or down."""
+    struck = _struck(rate, time, rng)
+    struck[1:] &= ~struck[:-1]  # isolated
+    size = rng.uniform(0.5, 1.5, time.size) * rng.choice([-1.0, 1.0], time.size)
+    corrupted: Vector = reading + struck * size * np.abs(reading).max()
+    return corrupted
 
 
 def _read(ideal: Vector, sensor: Sensor, rng: np.random.Generator) -> Vector:

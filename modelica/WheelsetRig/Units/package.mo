@@ -19,6 +19,8 @@ package Units "Types with SI units"
   type Pressure = Real(final quantity="Pressure", final unit="Pa", displayUnit="bar");
   type Power = Real(final quantity="Power", final unit="W");
   type Energy = Real(final quantity="Energy", final unit="J");
+  type Temperature =
+    Real(final quantity="ThermodynamicTemperature", final unit="K", min=0);
   type FrictionCoefficient = Real(final quantity="CoefficientOfFriction", final unit="1", min=0);
   annotation (Documentation(info="<html>
 <p>The library stands on its own: these types replace <code>Modelica.Units.SI</code>, with the

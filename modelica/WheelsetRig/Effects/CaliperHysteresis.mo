@@ -1,0 +1,31 @@
+within WheelsetRig.Effects;
+model CaliperHysteresis "Caliper whose friction opposes the motion of the pads"
+  extends Brakes.PartialCylinder;
+  parameter Real share(unit="1", min=0.0, max=0.15) = 0.0
+    "Share of force lost after a rise of pressure, gained after a fall";
+  parameter Units.Pressure play(min=0.01e5, max=0.5e5) = 0.1e5
+    "Change of pressure from the middle to one side";
+  parameter Units.Pressure p0(min=0.0) = 25000.0 "Pressure that balances the return spring";
+  parameter Real tau(unit="s", min=1e-3) = 0.01
+    "Time in which the caliper follows at the end of its play";
+  Units.Pressure centre(start=0.0, fixed=true, nominal=1e5) "Middle of the play";
+protected
+  Real side(unit="1") "Place within the play, -1 to 1";
+equation
+  tau*der(centre) =
+    noEvent(max(0.0, pB - centre - play)) + noEvent(min(0.0, pB - centre + play));
+  side = noEvent(max(-1.0, min(1.0, (pB - centre)/play)));
+  p = pB - share*side*noEvent(max(0.0, pB - p0));
+  rest = restBefore;
+  annotation (Documentation(info="<html>
+<p><code>p - p0 = (pB - p0)*(1 - share*side)</code>. <code>side</code> is the place within a play of
+width <code>2*play</code>: 1 after a rise, -1 after a fall, kept while the pressure holds, and kept
+under noise that is small against <code>play</code>. share is 0.02 to 0.08.</p>
+<h4>Limits</h4>
+<p>One play; inner loops need more of them (Preisach). While pressure only rises this is a change of
+the level.</p>
+<h4>References</h4>
+<p>M. A. Krasnosel'skii, A. V. Pokrovskii (1989), <em>Systems with Hysteresis</em>, Springer: the
+play operator.</p>
+</html>"));
+end CaliperHysteresis;

@@ -1,0 +1,13 @@
+within WheelsetRig.Effects;
+model ReturnSpringPressure "Pads that touch at a higher pressure than nominal"
+  extends Brakes.PartialCylinder;
+  parameter Units.Pressure increase(min=-0.2e5, max=0.3e5) = 0.0
+    "Of the pressure of the return spring";
+equation
+  p = pB - increase;
+  rest = restBefore;
+  annotation (Documentation(info="<html>
+<p><code>p = pB - increase</code>: a constant loss of force while the pads touch. The contact
+pressure is 0.1 to 0.4 bar.</p>
+</html>"));
+end ReturnSpringPressure;

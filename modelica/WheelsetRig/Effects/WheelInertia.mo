@@ -1,0 +1,11 @@
+within WheelsetRig.Effects;
+model WheelInertia "Inertia of the wheelset other than nominal"
+  extends Quantities.PartialQuantity;
+  parameter Real gain(unit="1", min=-0.5, max=0.5) = 0.0 "Relative change";
+equation
+  actual = nominal*(1.0 + gain);
+  annotation (Documentation(info="<html>
+<p><code>actual = nominal*(1 + gain)</code>. A stop moves by 0.3 % of the brake torque per 10 %; a
+slide shows it.</p>
+</html>"));
+end WheelInertia;

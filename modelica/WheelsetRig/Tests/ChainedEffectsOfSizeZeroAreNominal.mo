@@ -1,0 +1,80 @@
+within WheelsetRig.Tests;
+model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are the nominal model"
+  model PadFriction "Chain of all effects on pad friction"
+    extends Brakes.PartialPadFriction;
+    Effects.SpeedDependentPadFriction speed(level=level, Fperp=Fperp, v=v);
+    Effects.PressureDependentPadFriction force(level=speed.mu, Fperp=Fperp, v=v);
+    Effects.BeddingIn bedding(level=force.mu, Fperp=Fperp, v=v);
+    Effects.DiscThicknessVariation thickness(level=bedding.mu, Fperp=Fperp, v=v);
+    Effects.WaterFilm film(level=thickness.mu, Fperp=Fperp, v=v);
+    Effects.SingleDiscWaterFilm single(level=film.mu, Fperp=Fperp, v=v);
+    Effects.BrakeFade heat(level=single.mu, Fperp=Fperp, v=v);
+  equation
+    mu = heat.mu;
+  end PadFriction;
+
+  model Cylinder "Chain of all effects on pressure"
+    extends Brakes.PartialCylinder;
+    Effects.PressureSensorOffset sensor(pB=pB, restBefore=restBefore);
+    Effects.CylinderLag late(pB=sensor.p, restBefore=sensor.rest);
+    Effects.ReturnSpringPressure spring(pB=late.p, restBefore=late.rest);
+    Effects.CaliperHysteresis caliper(pB=spring.p, restBefore=spring.rest);
+  equation
+    p = caliper.p;
+    rest = caliper.rest;
+  end Cylinder;
+
+  model WheelRadius "Chain of all effects on the wheel radius"
+    extends Quantities.PartialQuantity;
+    Effects.WheelRadius wear(nominal=nominal, omega=omega);
+    Effects.OutOfRoundWheel shape(nominal=wear.actual, omega=omega);
+  equation
+    actual = shape.actual;
+  end WheelRadius;
+
+  model SpeedSensor "Chain of all errors of a speed sensor"
+    extends Sensors.PartialSpeedSensor;
+    Sensors.PoleRingEccentricity ring(omega=omega);
+    Sensors.SpeedSignalDelay late(omega=ring.reading);
+    Sensors.LoggerTimeSkew logger(omega=late.reading);
+  equation
+    reading = logger.reading;
+  end SpeedSensor;
+
+  model ForceSensor "Chain of all errors of the load cells"
+    extends Sensors.PartialForceSensor;
+    Effects.ApexOffset apex(F=F);
+    Sensors.FxGain gain(F=apex.reading);
+    Sensors.FxOffset zero(F=gain.reading);
+  equation
+    reading = zero.reading;
+  end ForceSensor;
+
+  model AllEffects "Observer model with all effects"
+    extends MinimalObserver(
+      redeclare PadFriction padFriction, redeclare Cylinder cylinder,
+      redeclare WheelRadius wheelRadius, redeclare Effects.WheelLoad wheelLoad,
+      redeclare Effects.CreepStiffness creepStiffness,
+      redeclare Effects.WheelInertia wheelInertia, redeclare Effects.DriveTorqueGain driveTorque,
+      redeclare Effects.AdhesionRecovery adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
+      redeclare Effects.RollerLosses rollerLoss, redeclare SpeedSensor speedSensorW,
+      redeclare Sensors.LoggerTimeSkew speedSensorR, redeclare ForceSensor forceSensor);
+  end AllEffects;
+
+  Units.Pressure p = 1.35e5*(1.0 + tanh(4.0*(time - 0.5))) "Brake pressure";
+  MinimalObserver nominal(
+    pB=p, tauR=500.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
+    omegaW(start=20.0*0.70/0.46), omegaR(start=20.0));
+  AllEffects zero(
+    pB=p, tauR=500.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
+    omegaW(start=20.0*0.70/0.46), omegaR(start=20.0));
+  output Units.Force dFx = zero.Fx - nominal.Fx "Change of the creep force";
+equation
+  // Equal equations in one system: rounding, enlarged by the stiff slip, stays below 1e-6.
+  assert(abs(dFx) < 0.01, "The creep force changes");
+  assert(abs(zero.FxReading - nominal.FxReading) < 0.01, "The reading of the force changes");
+  assert(abs(zero.omegaWReading - nominal.omegaWReading) < 1e-6
+    and abs(zero.omegaRReading - nominal.omegaRReading) < 1e-6, "A reading of a speed changes");
+  assert(abs(zero.pBRest) < 1e-9, "An empty cylinder does not read zero");
+  annotation (experiment(StopTime=1.0, Tolerance=1e-8));
+end ChainedEffectsOfSizeZeroAreNominal;

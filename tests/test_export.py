@@ -1,0 +1,355 @@
+"""Observers as products: the FMU against the Python observer, and the package in an SSP tool."""
+
+import json
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.ssp.simulation import simulate_ssp
+from fmpy.ssp.ssd import read_ssd, read_ssv
+from fmpy.validation import validate_fmu
+
+from workbench.__main__ import main
+from workbench.case import Case, read_cases
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers import (
+    ESTIMATE,
+    DisturbanceObserver,
+    Estimator,
+    FilterNoise,
+    ParameterEstimator,
+    ParameterGains,
+)
+from workbench.tuning import format_gains, reasoned_gains
+from workbench.tuning.space import build
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.compiler.archive import PLATFORMS
+from workbench.export import OBSERVERS, ObserverModel, build_observer, observer, write_package
+
+NAMES = tuple(OBSERVERS)
+MODELS = {DisturbanceObserver.name: "MinimalObserver", ParameterEstimator.name: "FullObserver"}
+INPUTS = ("pB", "tauR", "omegaW", "omegaR")
+# Outputs of the FMU and the columns of a Python estimate that they are.
+OUTPUTS = {
+    "omegaWEstimate": "omegaW",
+    "omegaREstimate": "omegaR",
+    "muWR": "muWR",
+    "muDC": "muDC",
+    "Fx": "Fx",
+    "slip": "slip",
+}
+# Of the largest value in a stop. Measured: 1e-10 or less; the law is the same, so rounding is all.
+AGREEMENT = 1e-6
+
+
+@dataclass(frozen=True)
+class Exported:
+    """An FMU for this machine and the Python observer with the same gains."""
+
+    path: Path
+    python: Estimator
+
+
+def write_fmu(root: Path, folder: Path, name: str, gains: observer.Gains, fmi: int = 2) -> Path:
+    package = root / "modelica" / "WheelsetRig" / "package.mo"
+    model = ObserverModel(package, f"WheelsetRig.Observers.{OBSERVERS[name]}", gains, "")
+    path = folder / f"fmi{fmi}" / f"{OBSERVERS[name]}.fmu"
+    build_observer(model, path, fmi, lambda _: None, platforms=["linux-x86_64"])
+    return path
+
+
+def with_all_gains(name: str, gains: observer.Gains) -> observer.Gains:
+    """Reasoned gains with those that are zero filled in, on dy and on its integral."""
+    L = gains.L.copy()
+    if isinstance(gains, ParameterGains):
+        L[:, :2] = [[0.2, -0.3], [0.1, -2.0]]
+        L[1, 2] = -1.0
+    else:
+        L[:, 2:] = 0.3 * L[:, :2]
+    return replace(gains, L=L)
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def exported(
+    request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Exported]:
+    name = request.param
+    with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
+        gains = with_all_gains(name, reasoned_gains(name, fmu))
+        path = write_fmu(root, tmp_path_factory.mktemp(name), name, gains)
+        yield Exported(path, build(name, fmu, gains))
+
+
+@pytest.fixture(scope="module")
+def cases(root: Path) -> list[Case]:
+    return read_cases([root / "cases"])
+
+
+@contextmanager
+def instance(path: Path) -> Iterator[tuple[FMU2Slave, Callable[[Sequence[str]], list[int]]]]:
+    """The FMU in Co-Simulation, ready to step, and the references of names."""
+    description = fmpy.read_model_description(str(path))
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    folder = fmpy.extract(str(path))
+    fmu = FMU2Slave(
+        guid=description.guid,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        unzipDirectory=folder,
+        instanceName="observer",
+    )
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    yield fmu, lambda names: [references[name] for name in names]
+    fmu.terminate()
+    fmu.freeInstance()
+    shutil.rmtree(folder)
+
+
+def run_fmu(path: Path, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Outputs after each sample, (n, 6): one communication step for each."""
+    rows = []
+    samples = np.hstack([u, y])
+    with instance(path) as (fmu, references):
+        inputs, outputs = references(INPUTS), references(tuple(OUTPUTS))
+        # The last step has no sample after it; any size will do.
+        ends = np.append(time[1:], time[-1] + 0.005) - time[0]
+        for sample, start, end in zip(samples, time - time[0], ends, strict=True):
+            fmu.setReal(inputs, sample.tolist())
+            fmu.doStep(currentCommunicationPoint=start, communicationStepSize=end - start)
+            rows.append(fmu.getReal(outputs))
+    return np.array(rows)
+
+
+def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
+    columns = [list(ESTIMATE).index(name) for name in OUTPUTS.values()]
+    return estimator.run(time, u, y).values[:, columns]
+
+
+def disagreement(found: np.ndarray, expected: np.ndarray) -> float:
+    """Largest deviation of any output, of its largest value in the stop."""
+    return float((abs(found - expected).max(axis=0) / abs(expected).max(axis=0)).max())
+
+
+def test_fmu_reproduces_python_on_all_recorded_stops(exported: Exported, cases: list[Case]) -> None:
+    for case in cases:
+        recording = case.time, case.u, case.y
+        found = run_fmu(exported.path, *recording)
+        assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT, case.name
+
+
+def test_fmu_reproduces_python_on_samples_that_are_not_even(
+    exported: Exported, dry_case: Case
+) -> None:
+    keep = np.flatnonzero(np.random.default_rng(1).random(dry_case.time.size) < 0.7)
+    recording = dry_case.time[keep], dry_case.u[keep], dry_case.y[keep]
+    found = run_fmu(exported.path, *recording)
+    assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT
+
+
+def test_limits_of_friction_are_kept_and_reached(exported: Exported, dry_case: Case) -> None:
+    """A pressure sensor that reads 0.4 of the pressure wants more friction than pads have."""
+    recording = dry_case.time, dry_case.u * [0.4, 1.0], dry_case.y
+    found = run_fmu(exported.path, *recording)
+    assert found[:, list(OUTPUTS).index("muDC")].max() == 0.45
+    assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tool_without_python_of_ours_gets_the_same(
+    root: Path, tmp_path: Path, dry_case: Case, name: str, fmi: int
+) -> None:
+    """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
+    with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
+        gains = reasoned_gains(name, fmu)
+        path = write_fmu(root, tmp_path, name, gains, fmi)
+        estimator = build(name, fmu, gains)
+        expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
+    assert validate_fmu(str(path)) == []
+    time = np.arange(dry_case.time.size) * 0.005
+    signals = np.column_stack([time, dry_case.u, dry_case.y])
+    recorded = np.array([tuple(row) for row in signals], [(n, float) for n in ("time", *INPUTS)])
+    description = fmpy.read_model_description(str(path))
+    result = fmpy.simulate_fmu(
+        str(path),
+        input=recorded,
+        stop_time=time[-1],
+        output=[*OUTPUTS],
+        output_interval=float(description.defaultExperiment.stepSize),
+    )
+    found = np.column_stack([result[output] for output in OUTPUTS])
+    assert disagreement(found[1:], expected[:-1]) < AGREEMENT
+
+
+def test_a_restored_state_repeats_the_steps(exported: Exported, dry_case: Case) -> None:
+    samples = np.hstack([dry_case.u, dry_case.y])
+    with instance(exported.path) as (fmu, references):
+        inputs, outputs = references(INPUTS), references(tuple(OUTPUTS))
+
+        def steps(numbers: range) -> list[list[float]]:
+            rows = []
+            for k in numbers:
+                fmu.setReal(inputs, samples[k].tolist())
+                fmu.doStep(currentCommunicationPoint=0.005 * k, communicationStepSize=0.005)
+                rows.append(list(fmu.getReal(outputs)))
+            return rows
+
+        steps(range(800))
+        state = fmu.getFMUState()
+        first = steps(range(800, 1000))
+        fmu.setFMUState(state)
+        assert steps(range(800, 1000)) == first
+        fmu.freeFMUState(state)
+
+
+def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones(root: Path) -> None:
+    for name in NAMES:
+        with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
+            gains = reasoned_gains(name, fmu)
+        package = root / "modelica" / "WheelsetRig" / "package.mo"
+        flat = observer.flatten(package, f"WheelsetRig.Observers.{OBSERVERS[name]}")
+        defaults = {v.name: v.start for v in flat.parameters}
+        for parameter, value in observer.parameter_values(gains).items():
+            # The classes give nine digits.
+            assert defaults[parameter] == pytest.approx(value, rel=1e-8, abs=1e-9), parameter
+
+
+@pytest.fixture(scope="module")
+def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that the command writes, with gains from a file."""
+    folder = tmp_path_factory.mktemp("export")
+    with FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as fmu:
+        gains = reasoned_gains(DisturbanceObserver.name, fmu)
+    halved = replace(gains, L=0.5 * gains.L)
+    (folder / "gains.toml").write_text(format_gains(DisturbanceObserver.name, halved, {"z": 0.3}))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        command = ["export", "--gains", str(folder / "gains.toml"), "--out", str(folder / "out")]
+        assert main(command) == 0
+    return folder
+
+
+def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
+    out = package / "out"
+    names = ["DisturbanceObserver.fmu", "DisturbanceObserver.ssp", "summary.json"]
+    assert sorted(file.name for file in out.iterdir()) == names
+    summary = json.loads((out / "summary.json").read_text())
+    description = fmpy.read_model_description(str(out / names[0]))
+    start = {v.name: v.start for v in description.modelVariables}
+    assert {n: float(start[n]) for n in summary["gains"]} == summary["gains"]
+    assert float(start["L42"]) == pytest.approx(-0.5 * 228.993134)
+    assert description.coSimulation is not None
+    assert description.modelExchange is None
+    with zipfile.ZipFile(out / names[0]) as archive:
+        held = archive.read("resources/gains.toml")
+        libraries = [n for n in archive.namelist() if n.startswith("binaries/")]
+    assert held == (package / "gains.toml").read_bytes()
+    assert len(libraries) == len(PLATFORMS)
+
+
+def test_the_same_gains_give_the_same_bytes(root: Path, package: Path, tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        assert main(["export", "--gains", str(package / "gains.toml"), "--out", str(tmp_path)]) == 0
+    for file in tmp_path.iterdir():
+        assert file.read_bytes() == (package / "out" / file.name).read_bytes(), file.name
+
+
+def test_the_package_follows_the_schemas_and_names_what_its_fmus_have(
+    package: Path, tmp_path: Path
+) -> None:
+    ssp = package / "out" / "DisturbanceObserver.ssp"
+    system = read_ssd(str(ssp), validate=True).system
+    start = read_ssv(str(ssp), resource="resources/start.ssv", validate=True)
+    variables = {}
+    with zipfile.ZipFile(ssp) as archive:
+        for component in system.elements:
+            file = archive.extract(component.source, tmp_path)
+            found = fmpy.read_model_description(file).modelVariables
+            variables[component.name] = {v.name: v for v in found}
+            for connector in component.connectors:
+                variable = variables[component.name][connector.name]
+                assert variable.causality == connector.kind
+    for parameter in start.parameters:
+        component, _, name = parameter.name.partition(".")
+        assert variables[component][name].start is not None
+        assert variables[component][name].unit == parameter.unit
+
+
+def test_in_an_ssp_tool_the_estimate_follows_the_reference(package: Path) -> None:
+    """A stop at 2.7 bar; the pads of the rig have 0.33, of the observer's model nominally 0.30."""
+    ssp = str(package / "out" / "DisturbanceObserver.ssp")
+    result = simulate_ssp(
+        ssp,
+        stop_time=6.0,
+        step_size=0.005,
+        parameter_set=read_ssv(ssp, resource="resources/start.ssv"),
+        input={
+            "pB": lambda t: 2.7e5 * np.clip((t - 1.0) / 0.5, 0.0, 1.0),
+            "tauR": lambda t: 8000.0 * (t > 1.2),
+        },
+    )
+    late = result["time"] > 4.0
+    assert result["Fx"][late].min() > 16e3
+    # Once settled, wheel load and vibration of the reference leave 1e-3, as in a recorded stop.
+    error = abs(result["FxEstimate"] - result["Fx"])[late]
+    assert error.max() < 1e-3 * result["Fx"][late].mean()
+    assert result["muDCEstimate"][late] == pytest.approx(0.33, abs=1e-3)
+
+
+def test_gains_of_an_estimator_without_a_model_are_refused(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    (tmp_path / "gains.toml").write_text(format_gains("ekf", FilterNoise(), {}))
+    command = ["export", "--gains", str(tmp_path / "gains.toml"), "--out", str(tmp_path / "out")]
+    assert main(command) == 2
+    assert (
+        "found estimator = 'ekf'; expected one of disturbance_observer" in capsys.readouterr().err
+    )
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["nothing.toml", "cases"])
+def test_a_file_of_gains_that_cannot_be_read_is_refused(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(root)
+    assert main(["export", "--gains", name, "--out", str(tmp_path / "out")]) == 2
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("fmu", "match"),
+    [
+        ("fmi3/Reference.fmu", "found FMI 3.0, .*; expected FMI 2.0"),
+        ("fmi2/Missing.fmu", "found no such file"),
+    ],
+)
+def test_only_a_reference_with_the_connectors_goes_into_a_package(
+    root: Path, package: Path, tmp_path: Path, fmu: str, match: str
+) -> None:
+    ssp = tmp_path / "out.ssp"
+    observer_fmu = package / "out" / "DisturbanceObserver.fmu"
+    with pytest.raises(InputError, match=match):
+        write_package(observer_fmu, root / "fmus" / fmu, ssp)
+    assert not ssp.exists()
+
+
+def test_a_model_without_the_readings_is_refused(package: Path, tmp_path: Path) -> None:
+    fmu = package / "out" / "DisturbanceObserver.fmu"
+    with pytest.raises(InputError, match="no output 'omegaWReading'"):
+        write_package(fmu, fmu, tmp_path / "out.ssp")

@@ -1,0 +1,194 @@
+"""The sensors of the virtual rig: their noise, what can be planted in them, corrupted samples."""
+
+import dataclasses
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from workbench.case import read_case
+from workbench.rig import CONSTANT_PADS, SCENARIOS, Stop, measure, plant, simulate, write_recording
+
+REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
+SEED = 1
+ROLLER_RADIUS, WHEEL_RADIUS = 0.70, 0.46  # m, data sheet
+CHANNELS = ("pB", "tauR", "omegaW", "omegaR", "Fx")
+
+
+@cache
+def make(speed: float = 40.0, direction: int = 1) -> Stop:
+    """A stop from a speed [km/h] on constant pads, of ten seconds unless said otherwise."""
+    usual = SCENARIOS["03_dry_120_3.6"]
+    conditions = dataclasses.replace(
+        usual.conditions, initial_speed=speed / 3.6, direction=direction
+    )
+    scenario = dataclasses.replace(usual, conditions=conditions)
+    return simulate(scenario, SEED, CONSTANT_PADS, REFERENCE)
+
+
+def recorded(stop: Stop) -> np.ndarray:
+    """Times [s] of the samples at 200 Hz."""
+    return stop.time[stop.time >= 0.0][::5]
+
+
+def added(planted: str, stop: Stop) -> dict[str, np.ndarray]:
+    """What an effect of the sensors adds to each channel."""
+    time = recorded(stop)
+    without = measure(stop, CONSTANT_PADS, time)
+    changed = measure(stop, plant(CONSTANT_PADS, [planted]), time)
+    return {name: changed[name] - without[name] for name in CHANNELS}
+
+
+# --- noise ---
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "noise", "relative", "resolution"),
+    [
+        ("pB", "pB", 500.0, 0.0, 240.0),
+        ("tauR", "tauR", 40.0, 0.0, 5.0),
+        ("omegaW", "omegaW", 0.002, 3e-4, 1e-4),
+        ("omegaR", "omegaR", 0.003, 0.0, 1e-3),
+        ("Fx", "Fcell", 80.0, 0.0, 10.0),
+    ],
+)
+def test_sensor_has_the_white_noise_of_the_data_sheet(
+    name: str, signal: str, noise: float, relative: float, resolution: float
+) -> None:
+    stop = make(speed=160.0)
+    time = stop.time[stop.time >= 0.0][::5]
+    truth = stop.at(time, signal)
+    error = measure(stop, CONSTANT_PADS, time)[name] - truth
+    # Rounding adds a variance of resolution^2/12.
+    scaled = error / np.hypot(noise + relative * abs(truth), resolution / np.sqrt(12.0))
+    n = scaled.size
+    # Four sigma of the estimates, by the law of large numbers: 1 in 16000 draws falls outside.
+    assert scaled.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
+    assert scaled.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * n))
+    assert scaled[1:] @ scaled[:-1] / n == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
+
+
+# --- effects ---
+
+
+@pytest.mark.parametrize(
+    ("effect", "gain", "channels"),
+    [
+        ("torque_gain", 0.02, {"tauR"}),
+        ("drive_beat", 0.02, {"tauR"}),
+        ("fx_gain", 0.015, {"Fx"}),
+        ("fx_offset", 120.0, {"Fx"}),
+        ("fx_limit", 15e3, {"Fx"}),
+        ("apex_offset", 1e-3, {"Fx"}),
+        ("force_drift", 2.0, {"Fx"}),
+        ("speed_delay", 0.008, {"omegaW"}),
+        ("pole_ring", 0.002, {"omegaW"}),
+        ("time_skew", 0.020, {"omegaW", "omegaR"}),
+        ("pressure_offset", 2000.0, {"pB"}),
+        ("spikes", 1.0, set(CHANNELS)),
+    ],
+)
+def test_effect_of_a_sensor_shows_in_its_channels_alone(
+    effect: str, gain: float, channels: set[str]
+) -> None:
+    differences = added(f"{effect}={gain}", make())
+    assert {name for name, difference in differences.items() if difference.any()} == channels
+
+
+def test_pole_ring_ripples_with_the_phase_of_its_stop() -> None:
+    stop = make()
+    time = recorded(stop)
+    reading = measure(stop, plant(CONSTANT_PADS, ["pole_ring=0.01"]), time)["omegaW"]
+    t = (time > 0.5) & (time < stop.drawn.coasting)
+    ripple = (reading / stop.at(time, "omegaW"))[t]
+    angle = stop.at(time, "phiW")[t] + stop.phases.pole_ring
+    columns = np.column_stack([np.cos(angle), np.sin(angle), np.ones(angle.size)])
+    cosine, sine, _ = np.linalg.lstsq(columns, ripple)[0]
+    # Four sigma of a noise of 4e-4 in 700 samples.
+    assert cosine == pytest.approx(0.01, abs=9e-5)
+    assert sine == pytest.approx(0.0, abs=9e-5)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_apex_offset_adds_the_same_force_in_both_directions(direction: int) -> None:
+    stop = make(speed=20.0, direction=direction)
+    slope = 2.0 * 80e3 * stop.drawn.Fz / (WHEEL_RADIUS + ROLLER_RADIUS)
+    # Readings are rounded to 10 N: the mean of 1500 differences to 0.3 N.
+    assert added("apex_offset=0.002", stop)["Fx"].mean() == pytest.approx(0.002 * slope, abs=0.5)
+    assert slope == pytest.approx(138e3, rel=0.01)
+
+
+def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
+    stop = make()
+    time = recorded(stop)
+    measured = measure(stop, plant(CONSTANT_PADS, ["fx_gain=0.015"]), time)["Fx"]
+    cell = stop.at(time, "Fcell")
+    slope = cell @ measured / (cell @ cell)
+    # Four sigma of the noise of 80 N over the record.
+    assert slope == pytest.approx(1.015, abs=4.0 * 80.0 / np.sqrt(cell @ cell))
+
+
+def test_beat_of_the_drive_multiplies_the_measured_torque() -> None:
+    stop = make()
+    time = recorded(stop)
+    expected = 0.02 * stop.at(time, "tauR") * np.sin(2.0 * np.pi * 0.2 * time)
+    # Both readings are rounded to 5 N.m.
+    assert added("drive_beat=0.02", stop)["tauR"] == pytest.approx(expected, abs=5.0)
+
+
+def test_load_cell_drifts_in_time_in_both_directions() -> None:
+    for direction in (1, -1):
+        stop = make(speed=20.0, direction=direction)
+        # Both readings are rounded to 10 N.
+        drift = added("force_drift=20", stop)["Fx"]
+        assert drift == pytest.approx(20.0 * recorded(stop), abs=10.0)
+
+
+# --- corrupted samples ---
+
+
+def test_spikes_are_rare_isolated_and_large() -> None:
+    stop = make()
+    time = recorded(stop)
+    without = measure(stop, CONSTANT_PADS, time)
+    spikes = added("spikes=3", stop)
+    expected = 3.0 * (time[-1] - time[0])
+    struck = {name: np.flatnonzero(spikes[name]) for name in CHANNELS}
+    for name, where in struck.items():
+        # Poisson: four sigma of the mean.
+        assert where.size == pytest.approx(expected, abs=4.0 * np.sqrt(expected))
+        assert np.diff(where).min() > 1
+        assert abs(spikes[name][where]).min() > 0.49 * abs(without[name]).max()
+    assert len({tuple(where) for where in struck.values()}) == len(CHANNELS)
+
+
+def test_dropouts_leave_out_rows_and_nothing_else(tmp_path: Path) -> None:
+    stop = make()
+    rate = 5.0
+    lossy = plant(CONSTANT_PADS, [f"dropouts={rate}", "spikes=1"])
+    write_recording(stop, lossy, 200, tmp_path / "lossy")
+    spiky = plant(CONSTANT_PADS, ["spikes=1"])
+    write_recording(stop, spiky, 200, tmp_path / "spiky")
+    full, kept = (
+        (tmp_path / f / "measured.csv").read_text().splitlines() for f in ("spiky", "lossy")
+    )
+    assert set(kept) < set(full)
+    expected = rate * stop.time[-1]
+    assert len(full) - len(kept) == pytest.approx(expected, abs=4.0 * np.sqrt(expected))
+    case = read_case(tmp_path / "lossy")
+    assert np.diff(case.time).max() > 0.009
+    truth = pd.read_csv(tmp_path / "lossy" / "truth.csv")
+    assert np.array_equal(truth["time [s]"], case.time)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_load_cell_saturates_at_its_limit(direction: int) -> None:
+    stop = make(direction=direction)
+    time = recorded(stop)
+    without = measure(stop, CONSTANT_PADS, time)["Fx"]
+    limited = measure(stop, plant(CONSTANT_PADS, ["fx_limit=15000"]), time)["Fx"]
+    within = abs(without) <= 15e3
+    assert np.array_equal(limited[within], without[within])
+    assert set(limited[~within]) == {15e3 * direction}

@@ -1,0 +1,212 @@
+"""Diagnosis: what a simulation gets wrong, the physical cause, and a better model.
+
+    recordings -> samples -> prediction errors -> evidence -> fit -> search -> verdict -> extension
+
+One FMU holds the observer model with every effect of the catalogue at size zero; an effect is
+switched on by a parameter.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis.catalogue import CATALOGUE, Effect, choose
+from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Court
+from workbench.diagnosis.extension import BASE, LIBRARY, build, source, variables
+from workbench.diagnosis.fit import TOLERANCES, Fit
+from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.search import Reporter
+from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, judge
+from workbench.errors import InputError
+from workbench.fmu import FMU
+
+__all__ = [
+    "BASE",
+    "CATALOGUE",
+    "LIBRARY",
+    "TOLERANCES",
+    "Cause",
+    "Dependence",
+    "Diagnosis",
+    "Effect",
+    "Extension",
+    "Gain",
+    "Interval",
+    "Outcome",
+    "Residuals",
+    "choose",
+    "diagnose",
+]
+
+EXTENDED = "Extended"
+
+_ASKED = ("rW", "rR", "rB", "JW", "JR", "Fz", "muDC", "actuation.kappa", "actuation.p0")
+
+
+@dataclass(frozen=True)
+class Extension:
+    """The extended model: its source, its FMU, and how far its predictions are from the fit's.
+
+    Attributes
+    ----------
+    difference : largest, in standard deviations of the noise of a sample mean.
+    """
+
+    modelica: Path
+    fmu: Path
+    difference: float
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A diagnosis and all that shows it.
+
+    Attributes
+    ----------
+    levels : calibrated values by quantity and surface, such as ("muDC", "dry"): (value, unit).
+    deviations : by stop and quantity, in standard deviations of its tolerance.
+    set_aside : number of samples by stop and reason.
+    has_force : whether Fx was measured.
+    """
+
+    diagnosis: Diagnosis
+    residuals: Sequence[Residuals]
+    dependences: Sequence[Dependence]
+    levels: dict[tuple[str, str], tuple[float, str]]
+    deviations: dict[str, dict[str, float]]
+    set_aside: dict[str, dict[str, int]]
+    has_force: bool
+    extension: Extension | None
+
+
+def diagnose(
+    cases: Sequence[Case],
+    effects: Sequence[Effect],
+    package: Path,
+    model: Path,
+    out: Path,
+    workers: int,
+    report: Reporter,
+) -> Outcome:
+    """Find what an observer model lacks, from recorded stops; write the extended model.
+
+    Parameters
+    ----------
+    cases : Fx is used if all of them have it.
+    effects : of the catalogue, that are considered.
+    package : `package.mo` of the Modelica library.
+    model : FMU of the minimal observer model, or of an extension of it: its values are kept.
+    out : folder of the extended model.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If the library cannot be compiled.
+    """
+    if any(case.Fx is None for case in cases):
+        cases = [replace(case, Fx=None) for case in cases]
+    with tempfile.TemporaryDirectory() as scratch:
+        everything = Path(scratch) / "AllEffects.fmu"
+        report(f"compiling {len(effects)} effects")
+        text = source("AllEffects", effects, {}, {}, "Observer model with every effect, at zero")
+        build(package, "AllEffects", text, everything, every_platform=False)
+        given = _given(everything, model)
+        with Court(everything, given, cases, workers) as court:
+            fit = Fit(court, effects)
+            diagnosis = judge(fit, effects, report)
+            best = diagnosis.best
+            found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
+            extension = _extend(court, fit, diagnosis, effects, package, out, report)
+            units = {"muDC": "1", "muWR": "1", FORCE_DELAY: "s"}
+            return Outcome(
+                diagnosis=diagnosis,
+                residuals=found,
+                dependences=dependences(court, found),
+                levels={
+                    key: (float(value), units[key[0]]) for key, value in best.point.levels.items()
+                },
+                deviations={
+                    name: dict(zip(TOLERANCES, map(float, row), strict=True))
+                    for name, row in zip(fit.names, best.point.deviations, strict=True)
+                },
+                set_aside={stop.name: stop.set_aside for stop in court.stops},
+                has_force=cases[0].Fx is not None,
+                extension=extension,
+            )
+
+
+def _given(everything: Path, model: Path) -> dict[str, float]:
+    """Parameters of the diagnosed model that differ from the library's defaults.
+
+    Raises
+    ------
+    InputError
+        If the model is no observer model of this library.
+    """
+    with FMU(everything) as library, FMU(model) as diagnosed:
+        if missing := [name for name in _ASKED if name not in diagnosed.defaults]:
+            raise InputError(
+                where=str(model),
+                found=f"no parameter '{missing[0]}'",
+                expected=f"the FMU of {BASE}, or of a model that extends it",
+                remedy="give such an FMU with --model",
+            )
+        return {
+            name: value
+            for name, value in diagnosed.defaults.items()
+            if name in library.parameters and value != library.defaults[name]
+        }
+
+
+def _extend(
+    court: Court,
+    fit: Fit,
+    diagnosis: Diagnosis,
+    effects: Sequence[Effect],
+    package: Path,
+    out: Path,
+    report: Reporter,
+) -> Extension | None:
+    """Write the extended model, compile it, compare its predictions with those of the fit."""
+    if not diagnosis.causes:
+        return None
+    report("compiling the extended model")
+    point = diagnosis.best.point
+    values: dict[str, dict[str, float]] = {}
+    for effect in effects:
+        for variable, value in court.given.items():
+            slot, _, parameter = variable.rpartition(".")
+            if slot == variables(effect, parameter)[0].rpartition(".")[0]:
+                values.setdefault(effect.name, {})[parameter] = value
+    for (name, parameter), value in point.sizes.items():
+        # An order-locked effect has another phase in each stop; the model turns from angle zero.
+        known = values.setdefault(name, {})
+        part = "cosine" if parameter == "amplitude" else parameter
+        is_size = part in next(one for one in effects if one.name == name).sizes
+        known[part] = (known.get(part, 0.0) if is_size else 0.0) + value
+    present = [effect for effect in effects if effect.name in values]
+    own = {name: value for name, value in court.given.items() if "." not in name}
+    about = f"{BASE} with {', '.join(effect.name for effect in present)}"
+    text = source(EXTENDED, present, values, own, about)
+    folder = out / "model"
+    folder.mkdir(parents=True, exist_ok=True)
+    modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
+    modelica.write_text(text)
+    build(package, EXTENDED, text, path, every_platform=True)
+    bench = Bench(path, court.stops)
+    difference = 0.0
+    for k, evidence in enumerate(diagnosis.best.linearised.evidence):
+        given = {
+            name: value
+            for name, value in fit.values(point)[k].items()
+            if name in bench.parameters or name == FORCE_DELAY
+        }
+        errors, _ = bench.errors(k, given)
+        difference = max(difference, float(np.abs(errors - evidence.errors).max()))
+    bench.close()
+    return Extension(modelica, path, difference)

@@ -1,0 +1,314 @@
+"""Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.fit import Fit, Joint, Linearised, Point, Quadratic, add, minimum, variant
+from workbench.fmu import Matrix, Vector
+
+Reporter = Callable[[str], None]
+Candidate = tuple[Effect, Mapping[str, float]]
+
+_MOST = 4  # causes; more than that is not a diagnosis
+_SIGNIFICANT = 4.0  # standard deviations of a size
+_HELD_OUT = 15.0  # fall of chi-squared on held-out stops
+_RIVALS = 5  # effects that are fitted in full before one is named
+_NEAR = 0.4  # share of the best score from which on an effect is a rival
+_IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
+_ROUNDS = 4  # of Gauss-Newton
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What one effect would explain, linearised.
+
+    Attributes
+    ----------
+    effect, shape : the candidate, and the shape it was tried with.
+    size, sigma : estimate of its size and standard deviation, SI.
+    gain : fall of chi-squared when it is fitted to all stops.
+    held_out : (K,) fall of chi-squared of each stop when it is fitted to the others.
+    phases : (K,) [rad] of an order-locked effect.
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+    size: float
+    sigma: float
+    gain: float
+    held_out: Vector
+    phases: Vector
+
+
+def shapes(effect: Effect) -> list[dict[str, float]]:
+    """Shapes with which an effect is tried."""
+    tried: list[dict[str, float]] = [{}]
+    for name, values in effect.shapes:
+        tried = [{**one, name: value} for one in tried for value in values]
+    return tried
+
+
+def tried(fit: Fit, lin: Linearised, candidates: Sequence[Candidate]) -> "Trial":
+    """Put candidates to the trial about a point that is fitted."""
+    extra = [
+        (variant(effect, shape), parameter)
+        for effect, shape in candidates
+        for parameter in effect.sizes
+    ]
+    return Trial(fit, fit.quadratics(lin, extra), candidates)
+
+
+class Trial:
+    """All candidates about one point.
+
+    Each may be present at a size that does not matter, as part of the baseline: a candidate must
+    explain what all others together, too small to matter, do not.
+    """
+
+    def __init__(
+        self,
+        fit: Fit,
+        joint: Joint,
+        candidates: Sequence[Candidate],
+    ) -> None:
+        self._fit, self.joint, self._candidates = fit, joint, candidates
+        self._stops = joint.stops()
+        self._known = list(range(len(joint.known)))
+        self.levels = joint.levels
+        middle: dict[str, tuple[int, float]] = {}
+        for effect, shape in candidates:
+            if not effect.order_locked:
+                at = joint.shared.index((variant(effect, shape), effect.size))
+                middle[effect.name] = (at, effect.matters)
+        self._immaterial = middle
+        base = self._select({})
+        self._without = _held_out(*base)
+        total = add([*base[0], base[1]])
+        self._reference = total.at(minimum(total))
+
+    def _select(
+        self, own: Mapping[int, Matrix], name: str = ""
+    ) -> tuple[list[Quadratic], Quadratic]:
+        """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
+        others = [one for key, one in self._immaterial.items() if key != name]
+        columns = [*self._known, *(at for at, _ in others)]
+        count = len(columns) + bool(own)
+        transforms = []
+        for k in range(len(self._stops)):
+            transform = np.zeros((len(self.joint.shared), count))
+            transform[columns, range(len(columns))] = 1.0
+            for at, direction in own.items():
+                transform[at, -1] = direction[k]
+            transforms.append(transform)
+        stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
+        prior = self.joint.prior.columns(transforms[0])
+        for j, (_, matters) in enumerate(others, start=len(self._known)):
+            prior.N[j, j] += (_IMMATERIAL / matters) ** 2
+        return stops, prior
+
+    def covariance(self) -> Matrix:
+        """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
+        stops, prior = self._select({})
+        count = len(self._known)
+        covariance: Matrix = np.linalg.pinv(add([*stops, prior]).N)[:count, :count]
+        return covariance
+
+    def scores(self) -> list[Score]:
+        """All candidates, best first."""
+        found = [self._score(effect, shape) for effect, shape in self._candidates]
+        return sorted(found, key=lambda one: -one.held_out.sum())
+
+    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Score:
+        at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
+        phases = np.zeros(len(self._stops))
+        own = {at[0]: np.ones(len(self._stops))}
+        if effect.order_locked:
+            phases = np.array([_phase(stop, at) for stop in self._stops])
+            own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
+        stops, prior = self._select(own, effect.name)
+        total = add([*stops, prior])
+        best = minimum(total)
+        size, (low, high) = float(best[-1]), self._fit.bounds(effect, effect.size)
+        sigma = float(np.sqrt(max(np.linalg.pinv(total.N)[-1, -1], 0.0)))
+        if not low <= size <= high:
+            # What its bounds allow of it: the rest of the unknowns do their best beside that.
+            size = float(np.clip(size, low, high))
+            stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
+            total = add([*stops, prior])
+            best = minimum(total)
+        return Score(
+            effect=effect,
+            shape=shape,
+            size=size,
+            sigma=sigma,
+            gain=self._reference - total.at(best),
+            held_out=self._without - _held_out(stops, prior),
+            phases=phases,
+        )
+
+
+def _phase(stop: Quadratic, at: Sequence[int]) -> float:
+    """Phase of an order-locked effect in one stop [rad], everything else as it is."""
+    amplitude = -np.linalg.lstsq(stop.N[np.ix_(at, at)], stop.g[at], rcond=None)[0]
+    return float(np.arctan2(amplitude[1], amplitude[0]))
+
+
+def _fixed(one: Quadratic, last: float) -> Quadratic:
+    """Chi-squared over the other unknowns, the last one held."""
+    N = one.N[:-1, :-1]
+    g = one.g[:-1] + last * one.N[:-1, -1]
+    c = one.c + 2.0 * last * one.g[-1] + last**2 * one.N[-1, -1]
+    return Quadratic(N, g, float(c), one.rows)
+
+
+def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
+    """Chi-squared of each stop at the optimum of the others, (K,)."""
+    total = add([*stops, prior])
+    result = np.zeros(len(stops))
+    for k, stop in enumerate(stops):
+        others = Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0)
+        result[k] = stop.at(minimum(others))
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A set of effects, fitted in full.
+
+    Attributes
+    ----------
+    misfit : chi-squared of all stops at the point, in units of the noise.
+    lasting : variance of errors that last a second, mean over channels, 1 if only noise is left.
+    """
+
+    active: tuple[Effect, ...]
+    point: Point
+    linearised: Linearised
+    misfit: float
+    lasting: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of the search: what was tried, and what came out.
+
+    Attributes
+    ----------
+    scores : of all candidates, linearised, best first.
+    rivals : fitted in full, best first; the first was taken.
+    """
+
+    before: Fitted
+    scores: tuple[Score, ...]
+    rivals: tuple[Fitted, ...]
+
+
+def search(
+    fit: Fit, catalogue: Sequence[Effect], best: Fitted, report: Reporter
+) -> tuple[Fitted, list[Step], Trial]:
+    """Find what is missing.
+
+    Parameters
+    ----------
+    best : the nominal model, fitted.
+
+    Returns
+    -------
+    best : the effects that are needed, fitted.
+    steps : how they were found.
+    trial : all other effects about the best point.
+    """
+    steps: list[Step] = []
+    while True:
+        trial = examine(fit, best, catalogue, report)
+        scores = tuple(trial.scores())
+        rivals = _rivals(scores) if len(best.active) < _MOST else []
+        if not rivals:
+            return best, steps, trial
+        report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
+        fits = sorted(
+            (
+                fitted(fit, joined(best.point, rival), (*best.active, rival.effect))
+                for rival in rivals
+            ),
+            key=lambda one: one.misfit,
+        )
+        if best.misfit - fits[0].misfit < _HELD_OUT * fits[0].lasting:
+            return best, steps, trial
+        steps.append(Step(best, scores, tuple(fits)))
+        best = fits[0]
+
+
+def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter) -> Trial:
+    """Try every effect that the data can show and the point does not have."""
+    candidates: list[Candidate] = [
+        (effect, shape)
+        for effect in catalogue
+        if effect not in best.active and not effect.hidden
+        for shape in shapes(effect)
+    ]
+    report(f"signatures of {len(candidates)} candidates")
+    return tried(fit, fit.linearise(best.point, best.active, candidates), candidates)
+
+
+def pruned(
+    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+) -> tuple[Fitted, Trial]:
+    """Drop effects that, beside the others, do not matter or are not significant."""
+    while best.active:
+        sigma = np.sqrt(np.diag(trial.covariance()))
+        ratios = {}
+        for effect in best.active:
+            key = (effect.name, effect.label)
+            size = abs(best.point.sizes[key])
+            clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
+            ratios[effect] = min(clear, size / effect.matters)
+        weakest = min(ratios, key=lambda effect: ratios[effect])
+        if ratios[weakest] >= 1.0:
+            break
+        kept = tuple(effect for effect in best.active if effect is not weakest)
+        report(f"dropping {weakest.name}")
+        best = fitted(fit, without(best.point, weakest), kept)
+        trial = examine(fit, best, catalogue, report)
+    return best, trial
+
+
+def without(point: Point, effect: Effect) -> Point:
+    """The point without one effect."""
+    return replace(
+        point,
+        sizes={key: value for key, value in point.sizes.items() if key[0] != effect.name},
+        phases={name: value for name, value in point.phases.items() if name != effect.name},
+    )
+
+
+def fitted(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
+    """Fit a set of effects in full, from a point that has them."""
+    lin = fit.refine(point, active, _ROUNDS)
+    return Fitted(active, lin.point, lin, lin.misfit, float(lin.inflation.mean()))
+
+
+def joined(point: Point, rival: Score) -> Point:
+    """The point with one more effect."""
+    name = rival.effect.name
+    sizes = {**point.sizes, (name, rival.effect.label): rival.size}
+    sizes |= {(name, parameter): value for parameter, value in rival.shape.items()}
+    phases = dict(point.phases)
+    if rival.effect.order_locked:
+        phases[name] = rival.phases
+    return Point(sizes, point.levels, point.deviations, phases)
+
+
+def _rivals(scores: Sequence[Score]) -> list[Score]:
+    """The best variant of each effect that is large, significant and nearly as good as the best."""
+    able: dict[str, Score] = {}
+    for one in scores:
+        large = abs(one.size) >= one.effect.matters
+        clear = abs(one.size) > _SIGNIFICANT * one.sigma and one.held_out.sum() > _HELD_OUT
+        if large and clear:
+            able.setdefault(one.effect.name, one)
+    ranked = list(able.values())[:_RIVALS]
+    return [one for one in ranked if one.held_out.sum() > _NEAR * ranked[0].held_out.sum()]

@@ -1,0 +1,273 @@
+"""From fitted effects to a verdict: what was found, how sure, and what cannot be told apart."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.fit import Fit, Quadratic, add, minimum, seconds, variant
+from workbench.diagnosis.search import (
+    Fitted,
+    Reporter,
+    Score,
+    Step,
+    Trial,
+    fitted,
+    pruned,
+    search,
+    shapes,
+    without,
+)
+from workbench.fmu import Matrix, Vector
+
+Verdict = Literal["nothing", "found", "unexplained"]
+
+_QUANTILE = 1.96  # of a normal distribution, 95 %
+_TWIN = 0.98  # cosine of signatures from which on two effects are told as one
+_CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
+_CLOSE_SHARE = 0.01  # of what the effect explains: a rival may owe that to its exact form
+_LASTING = 6.0  # variance of errors that last a second, over noise, that real models leave
+_EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
+_DRAWS = 2000  # of the bootstrap over stops
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with its 95 % interval, in `unit`."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One effect that was found.
+
+    Attributes
+    ----------
+    parameters : by name.
+    confusable_with : names of effects that explain these data as well.
+    explained : share of the explainable that this effect explains on held-out stops.
+    phases : (K,) [rad] in each stop, of an order-locked effect, else None.
+    """
+
+    effect: Effect
+    parameters: Mapping[str, Interval]
+    confusable_with: tuple[str, ...]
+    explained: float
+    phases: Vector | None
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Prediction error on held-out stops; 1 is noise alone.
+
+    Root mean square of the errors that last a second, in units of the noise of such a mean.
+
+    Attributes
+    ----------
+    before, after : of the nominal and of the extended model, with levels calibrated alike.
+    low, high : 95 % interval of `after`, from drawing stops with replacement.
+    stops : (before, after) by name of the stop.
+    """
+
+    before: float
+    after: float
+    low: float
+    high: float
+    stops: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """All that was found out.
+
+    Attributes
+    ----------
+    verdict : see `Verdict`.
+    causes : strongest first; empty unless something was found.
+    gain : None when nothing was extended.
+    partial : effects that explain a part of what remains unexplained.
+    base, best : the nominal model and the last one, fitted.
+    steps : how the causes were found.
+    scores : of the candidates about the nominal model, best first.
+    names, cosines : effects, and the similarity of their signatures in these data, (e, e).
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    gain: Gain | None
+    partial: tuple[str, ...]
+    base: Fitted
+    best: Fitted
+    steps: tuple[Step, ...]
+    scores: tuple[Score, ...]
+    names: tuple[str, ...]
+    cosines: Matrix
+
+
+def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
+    """Diagnose a set of stops."""
+    report("nominal model, levels calibrated")
+    base = fitted(fit, fit.start(), ())
+    best, steps, trial = search(fit, catalogue, base, report)
+    best, trial = pruned(fit, catalogue, best, trial, report)
+    clean = float(best.linearised.inflation.max()) < _LASTING
+    verdict: Verdict = "found" if best.active else "nothing"
+    if not clean and not (best.active and _share(base, best) > _EXPLAINED):
+        verdict = "unexplained"
+    names, cosines = _confusability(trial, catalogue)
+    causes: list[Cause] = []
+    gain = None
+    if verdict == "found":
+        report("held-out stops")
+        gain = _gain(fit.names, held_out(fit, base), held_out(fit, best))
+        causes = _causes(fit, best, steps, trial, names, cosines)
+    return Diagnosis(
+        verdict=verdict,
+        causes=tuple(causes),
+        gain=gain,
+        partial=tuple(effect.name for effect in best.active) if not causes else (),
+        base=base,
+        best=best,
+        steps=tuple(steps),
+        scores=steps[0].scores if steps else tuple(trial.scores()),
+        names=names,
+        cosines=cosines,
+    )
+
+
+def _share(before: Fitted, after: Fitted) -> float:
+    """Share of lasting errors, over noise, that is gone; of the channel that fares worst."""
+    was, left = before.linearised.inflation - 1.0, after.linearised.inflation - 1.0
+    return float(1.0 - left.max() / max(was.max(), 1e-9))
+
+
+def held_out(fit: Fit, one: Fitted) -> Vector:
+    """Mean square of lasting errors of each stop, fitted to the others, (K,); noise leaves 1."""
+    joint = fit.quadratics(one.linearised)
+    stops = joint.stops()
+    total = add([*stops, joint.prior])
+    result = np.zeros(len(stops))
+    for k, (stop, system) in enumerate(zip(stops, joint.systems, strict=True)):
+        z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
+        errors = system.r + system.J @ z + system.P @ system.local(z)
+        shape = one.linearised.evidence[k].errors.shape
+        whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
+        result[k] = seconds(whitened).mean()
+    return result
+
+
+def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
+    draws = np.random.default_rng(0).integers(0, len(after), (_DRAWS, len(after)))
+    low, high = np.percentile(np.sqrt(after[draws].mean(axis=1)), [2.5, 97.5])
+    return Gain(
+        before=float(np.sqrt(before.mean())),
+        after=float(np.sqrt(after.mean())),
+        low=float(low),
+        high=float(high),
+        stops={
+            name: (float(np.sqrt(b)), float(np.sqrt(a)))
+            for name, b, a in zip(names, before, after, strict=True)
+        },
+    )
+
+
+def _causes(
+    fit: Fit,
+    best: Fitted,
+    steps: Sequence[Step],
+    trial: Trial,
+    names: Sequence[str],
+    cosines: Matrix,
+) -> list[Cause]:
+    sigma = np.sqrt(np.diag(trial.covariance()))
+    after = held_out(fit, best).mean()
+    causes, lacking = [], {}
+    for effect in best.active:
+        others = tuple(other for other in best.active if other is not effect)
+        before = held_out(fit, fitted(fit, without(best.point, effect), others)).mean()
+        lacking[effect.name] = before
+        parameters = {}
+        for key, value in best.point.sizes.items():
+            if key[0] != effect.name:
+                continue
+            parameter = effect.size if key[1] == effect.label else key[1]
+            low, high = fit.bounds(effect, parameter)
+            reach = _QUANTILE * sigma[trial.joint.known.index(key)]
+            parameters[key[1]] = Interval(
+                value,
+                max(value - reach, low),
+                min(value + reach, high),
+                fit.unit(effect, parameter),
+            )
+        causes.append(
+            Cause(
+                effect=effect,
+                parameters=parameters,
+                confusable_with=_twins(effect, best, steps, names, cosines),
+                explained=float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)),
+                phases=best.point.phases.get(effect.name),
+            )
+        )
+    # The strongest is the one without which most would go unexplained.
+    return sorted(causes, key=lambda cause: -lacking[cause.effect.name])
+
+
+def _twins(
+    effect: Effect,
+    best: Fitted,
+    steps: Sequence[Step],
+    names: Sequence[str],
+    cosines: Matrix,
+) -> tuple[str, ...]:
+    """Effects that explain the data as well, by a full fit or by their signature."""
+    found: list[str] = []
+    for step in steps:
+        winner = step.rivals[0]
+        if winner.active[-1] is not effect:
+            continue
+        close = max(_CLOSE * winner.lasting, _CLOSE_SHARE * (step.before.misfit - winner.misfit))
+        found += [
+            rival.active[-1].name
+            for rival in step.rivals[1:]
+            if rival.misfit - winner.misfit < close
+        ]
+    row = cosines[names.index(effect.name)]
+    found += [name for name, cosine in zip(names, row, strict=True) if cosine > _TWIN]
+    active = {one.name for one in best.active}
+    return tuple(name for name in dict.fromkeys(found) if name not in active)
+
+
+def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
+    """Cosines of the signatures of all effects, beside levels and tolerances; 1 is a twin."""
+    joint = trial.joint
+    total = joint.total().N
+    levels = [j for j, key in enumerate(joint.shared) if key in trial.levels]
+    own: dict[str, list[int]] = {}
+    for effect in catalogue:
+        middle = variant(effect, shapes(effect)[len(shapes(effect)) // 2])
+        keys = [(effect.name, effect.label), *((middle, name) for name in effect.sizes)]
+        at = [joint.shared.index(key) for key in keys if key in joint.shared]
+        if at:
+            own[effect.name] = at
+    solved = np.linalg.lstsq(total[np.ix_(levels, levels)], total[levels], rcond=None)[0]
+    rest = total - total[:, levels] @ solved
+    roots = {name: _inverse_root(rest[np.ix_(at, at)]) for name, at in own.items()}
+    cosines = np.eye(len(own))
+    for i, (a, at_a) in enumerate(own.items()):
+        for j, (b, at_b) in enumerate(own.items()):
+            coupling = roots[a] @ rest[np.ix_(at_a, at_b)] @ roots[b]
+            cosines[i, j] = np.linalg.norm(coupling, 2)
+    return tuple(own), np.clip(cosines, 0.0, 1.0)
+
+
+def _inverse_root(matrix: Matrix) -> Matrix:
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > 1e-9 * max(values[-1], 1e-300)
+    root: Matrix = (vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T
+    return root
