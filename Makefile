@@ -5,11 +5,15 @@ RUN := $(VENV)/bin/python
 # Modelica compiler of `make fmus`: workbench, or omc (OpenModelica, writes to build/omc)
 COMPILER ?= workbench
 
-.PHONY: help simulate tune fmus bench test check clean
+.PHONY: help simulate tune diagnose power cases fmus bench test check clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
 	@echo "make tune       find the gains whose worst case is best, results in results/tune"
+	@echo "make diagnose   what the observer model lacks in all cases, results in results/diagnose"
+	@echo "make power      how often the diagnosis is right, results in results/power; takes hours,"
+	@echo "                and again goes on where it was ended"
+	@echo "make cases      make the recordings of cases/ anew on the virtual rig, byte for byte"
 	@echo "make fmus       build the FMUs from modelica/ (Modelica compiler, C cross-compiler);"
 	@echo "                COMPILER=omc: with OpenModelica where it is installed, into build/omc"
 	@echo "make bench      time calls into the FMUs against plain C, results in results/bench"
@@ -31,6 +35,15 @@ simulate: $(VENV)/run.stamp
 tune: $(VENV)/run.stamp
 	$(RUN) -m workbench tune parameter_estimator --out results/tune/parameter_estimator
 	$(RUN) -m workbench tune disturbance_observer --out results/tune/disturbance_observer
+
+diagnose: $(VENV)/dev.stamp
+	$(RUN) -m workbench diagnose --out results/diagnose
+
+power: $(VENV)/dev.stamp
+	$(RUN) -m workbench power --resume --out results/power
+
+cases: $(VENV)/run.stamp
+	$(RUN) -m workbench rig --seed 1 --truth-every 4 --out cases
 
 fmus: $(VENV)/dev.stamp
 	$(RUN) -m workbench fmu build --all --compiler $(COMPILER)

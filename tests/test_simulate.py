@@ -78,6 +78,21 @@ def test_the_minimum_of_the_force_in_the_slide_is_reached(
     assert abs(reached - measured) < 0.15 * (level - measured)
 
 
+def test_chosen_estimators_alone_are_run(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The physical model of the discs lowers the error where discs dry under way."""
+    chosen = ["disturbance_observer", "disturbance_observer_disc"]
+    monkeypatch.chdir(root)
+    options = [word for name in reversed(chosen) for word in ("--estimator", name)]
+    assert main(["simulate", "cases/12_brakewet_160_4.2", *options, "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    values = summary["cases"]["12_brakewet_160_4.2"]["estimators"]
+    assert list(values) == chosen
+    assert values[chosen[1]]["Fx_nrmse"] < values[chosen[0]]["Fx_nrmse"]
+    assert "slope" in summary["provenance"]["disturbance_observer_disc"]["disc"]
+
+
 def test_summary_keeps_its_contract(results: Path) -> None:
     summary = json.loads((results / "summary.json").read_text())
     assert set(summary["weights"]) == {"cW", "cR", "cF"}

@@ -1,6 +1,7 @@
 """Friction wheel-rail is claimed where the creep force shows it, and nowhere else."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from workbench.observers import (
 )
 
 RR, NOMINAL = 0.70, 0.15
+Slide = tuple[Case, Run]
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +118,7 @@ def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
 
 
 @pytest.fixture(scope="module")
-def slide(root: Path, fmu: FMU) -> tuple[Case, Run]:
+def slide(root: Path, fmu: FMU) -> Slide:
     case = read_case(root / "cases" / "09_wet_160_4.2_wsp")
     return case, observe(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
 
@@ -132,17 +134,29 @@ def test_a_dry_stop_claims_nothing(fmu: FMU, dry_case: Case) -> None:
         assert not observe(dry_case, estimator).muWR_claimed.any(), estimator.name
 
 
-def test_a_recorded_slide_is_claimed_throughout(slide: tuple[Case, Run]) -> None:
+def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slide) -> None:
     """Slip beyond 2 m/s is beyond the peak of any contact (at most 1 m/s with this law)."""
     case, run = slide
     sliding = RR * case.omegaR - 0.46 * case.omegaW > 2.0
+    claimed = peak_force.claims(run.estimate)
     assert sliding.sum() > 50  # a quarter of a second of the recording
-    assert run.muWR_claimed[sliding].all()
-    assert not run.muWR_claimed[case.time < 2.0].any()  # coasting
+    assert claimed[sliding].all()
+    assert not claimed[case.time < 2.0].any()  # coasting
+
+
+def test_on_a_wet_rail_a_model_of_the_dry_contact_claims_nothing(slide: Slide) -> None:
+    assert not slide[1].muWR_claimed.any()
+
+
+def called_dry(case: Case) -> Case:
+    return replace(case, conditions=replace(case.conditions, wheel_rail="dry"))
+
+
+def test_the_same_recording_from_a_dry_rail_would_be_claimed(slide: Slide, fmu: FMU) -> None:
+    observer = DisturbanceObserver(fmu, stationary_gains(fmu))
+    assert observe(called_dry(slide[0]), observer).muWR_claimed.any()
 
 
 @pytest.mark.parametrize("kind", [OpenLoop, DirectInversion])
-def test_methods_that_estimate_no_friction_claim_none(
-    fmu: FMU, slide: tuple[Case, Run], kind: type
-) -> None:
-    assert not observe(slide[0], kind(fmu)).muWR_claimed.any()
+def test_methods_that_estimate_no_friction_claim_none(fmu: FMU, slide: Slide, kind: type) -> None:
+    assert not observe(called_dry(slide[0]), kind(fmu)).muWR_claimed.any()

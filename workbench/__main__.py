@@ -11,6 +11,7 @@ from workbench.commands import (
     add_export,
     add_fmu,
     add_observability,
+    add_power,
     add_rig,
     add_simulate,
     add_tune,
@@ -45,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     add_simulate(commands)
     add_tune(commands)
     add_diagnose(commands)
+    add_power(commands)
     add_observability(commands)
     add_rig(commands)
     add_export(commands)

@@ -11,7 +11,7 @@
 enum { WIDTH = 8 }; /* of an estimate: omegaW, omegaR, dmuWR, dmuDC, muWR, muDC, Fx, slip */
 
 typedef struct {
-    double L[4][4], decay[2], effect[2], low[2], high[2], nominal[2], radius, fading_speed;
+    double L[4][4], decay[2], effect[2], low[2], high[2], nominal[2], radius, ratio, fading_speed;
 } Settings;
 
 /* Value references of pB, tauR, dmuWR, dmuDC and of Fx, slip. */
@@ -122,10 +122,15 @@ int c_loop(int n, const double *steps, const double (*u_measured)[2], const doub
             if (solve(system, change)) {
                 return 1;
             }
+            const double before = s->ratio * z[1] - z[0];
             for (int i = 0; i < 2; i++) {
                 z[i] += change[i];
                 integral[i] += h * (y[k][i] - z[i]);
                 z[2 + i] = clip(z[2 + i] + change[2 + i], s->low[i], s->high[i]);
+            }
+            if (fabs(s->radius * z[1]) < s->fading_speed &&
+                before * (s->ratio * z[1] - z[0]) < 0.0) {
+                z[0] = s->ratio * z[1];
             }
             u[input[2]] = z[2];
             u[input[3]] = z[3];

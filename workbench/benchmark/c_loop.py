@@ -38,7 +38,8 @@ class CLoop:
         nominal = np.array([fmu.defaults[name] for name in ("muWR", "muDC")])
         low, high = (FRICTION_RANGE - nominal[:, None]).T
         rates = [gains.T_WR, gains.T_DC]
-        tail = [fmu.defaults["rR"], FADING_SPEED]
+        rR, rW = (fmu.defaults[name] for name in ("rR", "rW"))
+        tail = [rR, rR / rW, FADING_SPEED]
         self._settings = np.concatenate(
             [gains.L.ravel(), rates, gains.effect, low, high, nominal, tail]
         )

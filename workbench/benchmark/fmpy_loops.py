@@ -40,6 +40,7 @@ class FMPyModel:
         self.n = len(states)
         self.speeds = [names.index("omegaW"), names.index("omegaR")]
         self.radius = float(variables["rR"].start)
+        self.ratio = self.radius / float(variables["rW"].start)
         self.nominal = np.array([float(variables[name].start) for name in ("muWR", "muDC")])
         self.low, self.high = (FRICTION_RANGE - self.nominal[:, None]).T
         self.measured = references("pB", "tauR")
@@ -108,6 +109,14 @@ def _fading(speed: float) -> float:
     return speed**2 / (speed**2 + FADING_SPEED**2)
 
 
+def _stick(model: FMPyModel, before: Vector, x: Vector) -> None:
+    """Let the wheelset roll where a step would reverse its slip close to standstill."""
+    wheelset, roller = model.speeds
+    slips = [model.ratio * states[roller] - states[wheelset] for states in (before, x)]
+    if abs(model.radius * x[roller]) < FADING_SPEED and slips[0] * slips[1] < 0.0:
+        x[wheelset] = model.ratio * x[roller]
+
+
 def _without_sigma(values: list[Vector]) -> Estimate:
     rows = np.array(values)
     return Estimate(rows, np.full_like(rows, np.nan), np.full(len(rows), np.nan))
@@ -142,8 +151,9 @@ def disturbance_observer(
         system = np.eye(4) - h * A
         system[:, :2] += h * feedback
         rates += feedback @ (y[k] - z[:2]) + L[:, 2:] @ integral
-        z = z + np.linalg.solve(system, h * rates)
+        before, z = z, z + np.linalg.solve(system, h * rates)
         integral = integral + h * (y[k] - z[:2])
+        _stick(model, before, z)
         z[2:] = np.clip(z[2:], model.low, model.high)
         rows.append(model.estimate(z[:2], z[2:]))
     return _without_sigma(rows)
@@ -183,7 +193,9 @@ def _predict(model: FMPyModel, z: Vector, h: float) -> tuple[Vector, Matrix]:
     rates = np.concatenate([model.derivatives(), np.zeros(2)])
     system = np.eye(n + 2)
     system[:n] -= h * model.jacobian()
-    return z + np.linalg.solve(system, h * rates), system
+    after = z + np.linalg.solve(system, h * rates)
+    _stick(model, z, after)
+    return after, system
 
 
 def _correct(

@@ -77,6 +77,13 @@ def add_rig(commands: Commands) -> None:
         help="of the recording, a divisor of 1000 (default: %(default)s)",
     )
     rig.add_argument(
+        "--truth-every",
+        type=positive,
+        default=1,
+        metavar="N",
+        help="write the truth of every Nth sample only (default: %(default)s)",
+    )
+    rig.add_argument(
         "--fmu",
         type=Path,
         default=_REFERENCE,
@@ -141,7 +148,15 @@ def _rig(options: argparse.Namespace) -> int:
     workers = min(options.workers, len(scenarios))
     with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignore) as pool:
         tasks = [
-            pool.submit(_make, s, effects, options.seed, options.rate, options.fmu, folders[s.name])
+            pool.submit(
+                _make,
+                s,
+                effects,
+                options.seed,
+                (options.rate, options.truth_every),
+                options.fmu,
+                folders[s.name],
+            )
             for s in scenarios
         ]
         try:
@@ -163,10 +178,16 @@ def _rig(options: argparse.Namespace) -> int:
 
 
 def _make(
-    scenario: Scenario, effects: Effects, seed: int, rate: int, fmu: Path, folder: Path
+    scenario: Scenario,
+    effects: Effects,
+    seed: int,
+    sampling: tuple[int, int],
+    fmu: Path,
+    folder: Path,
 ) -> str:
     """Make and write one case, in a process of its own; returns a line for people."""
+    rate, every = sampling
     stop = simulate(scenario, seed, effects, fmu)
-    write_recording(stop, effects, rate, folder)
+    write_recording(stop, effects, rate, folder, every)
     seconds = stop.standstill - stop.drawn.coasting
     return f"{scenario.name:<26} stopped in {seconds:5.1f} s"

@@ -129,8 +129,9 @@ def _simulate(options: argparse.Namespace) -> int:
             name, gains = read_gains(options.gains)
             settings = with_tuned(settings, gains)
             sources = settings.summary()
-            tuned = next(key for key in sources if name in key)
-            sources[tuned]["source"] = f"tuned, {options.gains.name}"
+            for key in sources:
+                if name in key:
+                    sources[key]["source"] = f"tuned, {options.gains.name}"
         print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
         for estimator in make_estimators(chosen, minimal, full, settings):
             estimator.run(cases[0].time[:2], cases[0].u[:2], cases[0].y[:2])
@@ -143,7 +144,7 @@ def _simulate(options: argparse.Namespace) -> int:
                 key: {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
                 for key, fmu in (("fmu", minimal), ("full_fmu", full))
             },
-            **sources,
+            **{key: sources[key] for key in sources if set(key.split(", ")) & set(chosen)},
         }
     weights = Weights()
     plan = _Plan(options.fmu, options.full_fmu, names, chosen, settings, weights, options.out)

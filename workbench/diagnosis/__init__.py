@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.case import Case
+from workbench.cosim import observe
 from workbench.diagnosis.catalogue import CATALOGUE, Effect, choose
 from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Court
 from workbench.diagnosis.extension import BASE, LIBRARY, build, source, variables
@@ -23,6 +24,10 @@ from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, judge
 from workbench.errors import InputError
 from workbench.fmu import FMU
+from workbench.objective import Weights, score
+from workbench.observers import DisturbanceObserver, ExtendedKalmanFilter
+from workbench.observers.disturbance import stationary_gains
+from workbench.observers.kalman import FilterNoise
 
 __all__ = [
     "BASE",
@@ -71,6 +76,9 @@ class Outcome:
     deviations : by stop and quantity, in standard deviations of its tolerance.
     set_aside : number of samples by stop and reason.
     has_force : whether Fx was measured.
+    observers : by observer and stop, error of the creep force (rms over mean [1]) with the model
+        before and after; empty where nothing was extended or Fx was not measured, and for effects
+        that turn with the wheel, whose phase an observer does not know.
     """
 
     diagnosis: Diagnosis
@@ -80,6 +88,7 @@ class Outcome:
     deviations: dict[str, dict[str, float]]
     set_aside: dict[str, dict[str, int]]
     has_force: bool
+    observers: dict[str, dict[str, tuple[float, float]]]
     extension: Extension | None
 
 
@@ -106,8 +115,16 @@ def diagnose(
     Raises
     ------
     InputError
-        If the library cannot be compiled.
+        If there are too few stops, or one has too little that counts; if the library cannot be
+        compiled, or the model is none of this library.
     """
+    if len(cases) < 2:
+        raise InputError(
+            where="recorded stops",
+            found=str(len(cases)),
+            expected="two or more, because a cause is judged on stops it was not fitted to",
+            remedy="give the folder that holds all stops of one rig",
+        )
     if any(case.Fx is None for case in cases):
         cases = [replace(case, Fx=None) for case in cases]
     with tempfile.TemporaryDirectory() as scratch:
@@ -122,6 +139,11 @@ def diagnose(
             best = diagnosis.best
             found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
             extension = _extend(court, fit, diagnosis, effects, package, out, report)
+            observers: dict[str, dict[str, tuple[float, float]]] = {}
+            turning = any(effect.order_locked for effect in best.active)
+            if extension is not None and cases[0].Fx is not None and not turning:
+                report("observers with both models")
+                observers = _observers(cases, model, extension.fmu)
             units = {"muDC": "1", "muWR": "1", FORCE_DELAY: "s"}
             return Outcome(
                 diagnosis=diagnosis,
@@ -136,6 +158,7 @@ def diagnose(
                 },
                 set_aside={stop.name: stop.set_aside for stop in court.stops},
                 has_force=cases[0].Fx is not None,
+                observers=observers,
                 extension=extension,
             )
 
@@ -191,6 +214,11 @@ def _extend(
         known[part] = (known.get(part, 0.0) if is_size else 0.0) + value
     present = [effect for effect in effects if effect.name in values]
     own = {name: value for name, value in court.given.items() if "." not in name}
+    own |= {
+        name: value
+        for (name, surface), value in point.levels.items()
+        if surface == "dry" and name == "muDC"
+    }
     about = f"{BASE} with {', '.join(effect.name for effect in present)}"
     text = source(EXTENDED, present, values, own, about)
     folder = out / "model"
@@ -210,3 +238,26 @@ def _extend(
         difference = max(difference, float(np.abs(errors - evidence.errors).max()))
     bench.close()
     return Extension(modelica, path, difference)
+
+
+def _observers(
+    cases: Sequence[Case], before: Path, after: Path
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Errors of the creep force, with the gains of the nominal model in both."""
+    errors: dict[str, dict[str, list[float]]] = {}
+    with FMU(before) as nominal, FMU(after) as extended:
+        gains = stationary_gains(nominal)
+        for fmu in (nominal, extended):
+            for estimator in (
+                DisturbanceObserver(fmu, gains),
+                ExtendedKalmanFilter(fmu, FilterNoise()),
+            ):
+                by_stop = errors.setdefault(estimator.name, {})
+                for case in cases:
+                    run = observe(case, estimator)
+                    error = score(case, run, fmu.defaults["rR"], Weights()).Fx_nrmse
+                    by_stop.setdefault(case.name, []).append(np.nan if error is None else error)
+    return {
+        name: {stop: (pair[0], pair[1]) for stop, pair in by_stop.items()}
+        for name, by_stop in errors.items()
+    }

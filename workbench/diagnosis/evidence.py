@@ -21,7 +21,7 @@ from workbench.fmu import FMU, Matrix, Vector
 
 REST = "pBRest"
 
-# Not of the FMU: by how much the load cell, behind springs and a filter, is late [s].
+# Not of the FMU: by how much the load cell is late beyond the mode that it sits behind [s].
 FORCE_DELAY = "FxDelay"
 
 
@@ -92,8 +92,9 @@ class Bench:
         known = {name: value for name, value in values.items() if name != FORCE_DELAY}
         errors = self._predictor.errors(stop, known)
         if errors.shape[1] == 3:
-            predicted = stop.y[:, 2] - errors[:, 2]
-            errors[:, 2] += values[FORCE_DELAY] * np.gradient(predicted, stop.time)
+            read = stop.behind_structure(stop.y[:, 2] - errors[:, 2])
+            late = read - values[FORCE_DELAY] * np.gradient(read, stop.time)
+            errors[:, 2] = stop.y[:, 2] - late
         means = stop.channels(errors, nominal["rW"], nominal["rR"])
         rest = (stop.rest - float(self._fmu.get(self._rest)[0])) / stop.rest_noise
         return np.einsum("bij,bj->bi", stop.whitening, means), rest
@@ -131,7 +132,7 @@ def _work(number: int, values: Mapping[str, float], columns: Sequence[Column]) -
 
 
 class Court:
-    """Worker processes that gather evidence.
+    """Gathers evidence, in worker processes if there are more than one.
 
     Parameters
     ----------
@@ -160,9 +161,9 @@ class Court:
         self.given = dict(given)
         self.stops = [prepare(case, self.nominal) for case in cases]
         self.cases = list(cases)
-        self._pool = ProcessPoolExecutor(
-            min(workers, len(cases)), initializer=_begin, initargs=(path, self.stops)
-        )
+        workers = min(workers, len(cases))
+        self._own = Bench(path, self.stops) if workers == 1 else None
+        self._pool = ProcessPoolExecutor(workers, initializer=_begin, initargs=(path, self.stops))
 
     def __enter__(self) -> Self:
         return self
@@ -174,6 +175,8 @@ class Court:
         trace: TracebackType | None,
     ) -> None:
         self._pool.shutdown(cancel_futures=True)
+        if self._own is not None:
+            self._own.close()
 
     def hear(
         self, points: Sequence[Mapping[str, float]], columns: Sequence[Sequence[Column]]
@@ -185,6 +188,8 @@ class Court:
         points : values of the FMU's variables, one mapping for each stop.
         columns : what is varied, one list for each stop.
         """
+        if self._own is not None:
+            return [self._own.evidence(k, points[k], columns[k]) for k in range(len(self.stops))]
         # Long stops first: the last one to finish leaves the other processors idle.
         order = np.argsort([-stop.time.size for stop in self.stops])
         tasks = {int(k): self._pool.submit(_work, int(k), points[k], columns[k]) for k in order}

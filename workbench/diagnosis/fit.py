@@ -27,12 +27,12 @@ _RAIL: Mapping[Surface, Mapping[str, float]] = {
     "wet": {"muWR": 0.28, "polach.kA": 0.3, "polach.kS": 0.1, "polach.A": 0.4, "polach.B": 0.2},
 }
 _RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
-_FORCE_DELAY = 1e-3  # [s] of a structure mode at 20 Hz with a few percent of damping
+_FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
 _WORSE = 1.0  # of chi-squared, which no step is worth
 _SECOND = 20  # blocks
 _FURTHEST = 3.0  # standard deviations that a tolerance may explain
 
-_WATER = ("WaterFilm", "SingleDiscWaterFilm")
+_FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
 
 
 # (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
@@ -143,12 +143,18 @@ class Fit:
             levels["muWR", rail] = _RAIL[rail]["muWR"]
         return Point({}, levels, np.zeros((self.count, len(TOLERANCES))), {})
 
-    def share(self, effect: Effect, k: int) -> float:
-        """How much of an effect stop k has: water is where the conditions say so, if they do."""
-        if effect.name not in _WATER or not self._soaked:
-            return 1.0
+    def present(self, effect: Effect, k: int) -> bool:
+        """Whether stop k can have an effect: water is where the conditions say so, if they do."""
+        return effect.name != _FILM or not self._soaked or self._wet(k) > 0.0
+
+    def _wet(self, k: int) -> float:
+        """Share of the discs that are wet, by the conditions of stop k."""
         discs = self._court.cases[k].conditions.discs
         return discs.count("wet") / len(discs)
+
+    def possible(self, effect: Effect) -> bool:
+        """Whether an effect can be at all: which discs are wet may be known."""
+        return not (self._soaked and effect.name == _SINGLE)
 
     def values(self, point: Point) -> list[dict[str, float]]:
         """Values of the FMU's variables in each stop."""
@@ -163,13 +169,16 @@ class Fit:
         for j, (name, tolerance) in enumerate(TOLERANCES.items()):
             common = self._common(point, name, case)
             values[name] = common * (1.0 + tolerance * point.deviations[k, j])
+        if self._soaked and _FILM in self._effects:
+            for name in variables(self._effects[_FILM], "wet"):
+                values[name] = self._wet(k)
         for (name, parameter), size in point.sizes.items():
             effect = self._effects[name]
             if parameter == "amplitude":
                 phase = point.phases[name][k]
                 parts = {"cosine": size * np.cos(phase), "sine": size * np.sin(phase)}
             elif parameter == effect.size:
-                parts = {parameter: size * self.share(effect, k)}
+                parts = {parameter: size if self.present(effect, k) else 0.0}
             else:
                 parts = {parameter: size}
             for part, value in parts.items():
@@ -265,7 +274,7 @@ class Fit:
                 P.append(point.sizes[key] * (np.cos(phase) * sine - np.sin(phase) * cosine))
             else:
                 effect = self._effects[key[0].partition(" ")[0]]
-                J[:, j] = at[key] * (self.share(effect, k) if key[1] == effect.size else 1.0)
+                J[:, j] = at[key] * float(self.present(effect, k))
         tolerances = [
             at[_STOP, name] * tolerance * self._common(point, name, case)
             for name, tolerance in TOLERANCES.items()
@@ -372,16 +381,17 @@ class StopSystem:
     def eliminated(self) -> Quadratic:
         """Chi-squared over z alone."""
         normal, coupling, gradient = self._local()
-        solved = np.linalg.solve(normal, np.column_stack([coupling, gradient]))
-        N = self.J.T @ self.J - coupling.T @ solved[:, :-1]
-        g = self.J.T @ self.r - coupling.T @ solved[:, -1]
+        both = np.column_stack([coupling, gradient])
+        solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
+        N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
+        g: Vector = self.J.T @ self.r - coupling.T @ solved[:, -1]
         c = self.r @ self.r + self.deviations @ self.deviations - gradient @ solved[:, -1]
         return Quadratic(N, g, float(c), self.r.size)
 
     def local(self, z: Vector) -> Vector:
         """Best l for a step z of the common unknowns."""
         normal, coupling, gradient = self._local()
-        step: Vector = -np.linalg.solve(normal, coupling @ z + gradient)
+        step: Vector = np.asarray(np.linalg.solve(normal, -coupling @ z - gradient), np.float64)
         return step
 
 
@@ -425,11 +435,23 @@ def add(parts: Sequence[Quadratic]) -> Quadratic:
     )
 
 
+def covariance(N: Matrix) -> Matrix:
+    """Inverse of a normal matrix, (p, p); large where the data do not show an unknown."""
+    scale, values, vectors = _spectrum(N)
+    inverse: Matrix = (vectors / np.maximum(values, 1e-12)) @ vectors.T
+    return inverse * scale[:, None] * scale[None, :]
+
+
+def _spectrum(N: Matrix) -> tuple[Vector, Vector, Matrix]:
+    """Scale of each unknown, whatever its unit; eigenvalues and eigenvectors of what remains."""
+    scale: Vector = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-100))
+    values, vectors = np.linalg.eigh(N * scale[:, None] * scale[None, :])
+    return scale, values, vectors
+
+
 def minimum(total: Quadratic) -> Vector:
     """Where chi-squared is least; unknowns that the data do not show stay."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(total.N), 1e-300))
-    scaled = total.N * scale[:, None] * scale[None, :]
-    values, vectors = np.linalg.eigh(scaled)
+    scale, values, vectors = _spectrum(total.N)
     kept = values > 1e-10 * values[-1]
     along = vectors[:, kept]
     step: Vector = -scale * (along @ ((along.T @ (scale * total.g)) / values[kept]))
@@ -451,7 +473,8 @@ def slowness(evidence: Sequence[Evidence]) -> Vector:
     against that, not against the noise.
     """
     lasting = np.concatenate([seconds(one.errors) for one in evidence])
-    return np.maximum(1.0, lasting.mean(axis=0))
+    slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
+    return slow
 
 
 def _between(one: Point, other: Point) -> Point:

@@ -17,7 +17,7 @@ from workbench.diagnosis.fit import Fit, Linearised
 from workbench.diagnosis.samples import CHANNELS, Samples
 from workbench.fmu import Matrix, Vector
 
-# Residuals with units; what is positive is torque or slip that the measurement has beyond the model.
+# Residuals with units: torque or slip that the measurement has beyond the model.
 RESIDUALS = {"wheelset": "N.m", "roller": "N.m", "slip": "m/s"}
 
 # What errors may go with. Angles are those of one turn; a phase belongs to one stop.
@@ -75,11 +75,10 @@ def residuals(court: Court, fit: Fit, before: Linearised, after: Linearised) -> 
     values = fit.values(before.point)
     found = []
     for k, (case, stop) in enumerate(zip(court.cases, court.stops, strict=True)):
-        unwhitened = [
-            np.linalg.solve(stop.whitening, lin.evidence[k].errors[:, :, None])[:, :, 0]
-            for lin in (before, after)
-        ]
         inverse = np.linalg.inv(stop.whitening)
+        unwhitened: list[Matrix] = [
+            np.einsum("bij,bj->bi", inverse, lin.evidence[k].errors) for lin in (before, after)
+        ]
         found.append(
             Residuals(
                 name=case.name,
@@ -144,7 +143,8 @@ def _losses(nominal: Mapping[str, float], slot: str) -> list[str]:
 def _stiffness(case: Case, nominal: Mapping[str, float]) -> float:
     """Creep force of both wheels per creepage at small slip [N]."""
     reduction = {"dry": 0.5 * (1.0 + 0.4), "wet": 0.5 * (0.3 + 0.1)}[case.conditions.wheel_rail]
-    return 2.0 * 9.68e6 * (nominal["Fz"] / 80e3) ** (2.0 / 3.0) * reduction
+    # Of one wheel at 80 kN, by Kalker's linear theory; it grows with the contact area (Hertz).
+    return 2.0 * 9.68e6 * float((nominal["Fz"] / 80e3) ** (2.0 / 3.0)) * reduction
 
 
 def dependences(court: Court, found: Sequence[Residuals]) -> list[Dependence]:
@@ -153,30 +153,14 @@ def dependences(court: Court, found: Sequence[Residuals]) -> list[Dependence]:
     channels = CHANNELS[: found[0].before.shape[1]]
     # Speeds and force change sign with the direction: what the model lacks goes with their size.
     signs = [case.conditions.direction for case in court.cases]
-    table = [
-        Dependence(
-            channel,
-            name,
-            _explained(
-                [
-                    s * one.before[:, c] / one.sigma[:, c]
-                    for s, one in zip(signs, found, strict=True)
-                ],
-                influences,
-                name,
-            ),
-            _explained(
-                [
-                    s * one.after[:, c] / one.sigma[:, c]
-                    for s, one in zip(signs, found, strict=True)
-                ],
-                influences,
-                name,
-            ),
-        )
-        for c, channel in enumerate(channels)
-        for name in INFLUENCES
-    ]
+    pairs = list(zip(signs, found, strict=True))
+    table = []
+    for c, channel in enumerate(channels):
+        before = [sign * one.before[:, c] / one.sigma[:, c] for sign, one in pairs]
+        after = [sign * one.after[:, c] / one.sigma[:, c] for sign, one in pairs]
+        for name in INFLUENCES:
+            shares = (_explained(errors, influences, name) for errors in (before, after))
+            table.append(Dependence(channel, name, *shares))
     return sorted(table, key=lambda one: -one.before)
 
 
@@ -230,5 +214,5 @@ def _explained(
     within = float(np.sum((value - means[group]) ** 2))
     if total <= 0.0:
         return 0.0
-    degrees = (value.size - 1) / max(1, value.size - counts.size)
-    return float(max(0.0, 1.0 - degrees * within / total))
+    chance: float = (len(value) - 1) / max(1, len(value) - len(counts))
+    return max(0.0, float(1.0 - chance * within / total))

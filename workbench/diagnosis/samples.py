@@ -1,4 +1,4 @@
-"""A recorded stop made ready for statistics: what counts, what is set aside, how large the noise is.
+"""A recorded stop made ready for statistics: what counts, what is set aside, how large noise is.
 
 Blocks of 50 ms are the unit of all statistics: short against everything that brakes do, long
 enough to average most of the 20 Hz ringing of a load cell.
@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.optimize import nnls
+from scipy.signal import lfilter, lfiltic
 
 from workbench.case import Case, Matrix, Vector
+from workbench.errors import InputError
 
 BLOCK = 0.05  # [s]
 
+_FEWEST = 100  # blocks, 5 s: less does not tell noise from cause
 _SETTLING = 1.0  # [s] at the start, in which the simulation finds its slip
 _SLOWEST = 1.0  # [m/s] below, slip is a small difference of uncertain speeds
 _SLIDE = 0.03  # [1] creepage from which on a wheel slides: friction then depends on the rail only
@@ -23,6 +26,9 @@ _ABREAST = 11  # samples of the running median
 _SPIKE = 8.0  # standard deviations that no noise reaches
 _UNMODELLED = 1.2  # ripple and the like, over the noise of torque and pressure
 _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat itself
+
+# The load cell sits behind the wheelset's longitudinal mode on its cylinders.
+_MODE, _DAMPING = 21.6, 0.05  # [Hz], [1]
 
 CHANNELS = ("slip", "omegaR", "Fx")  # in m/s, rad/s, N
 
@@ -62,6 +68,22 @@ class Samples:
     speed: Vector
     set_aside: dict[str, int]
 
+    def behind_structure(self, force: Vector) -> Vector:
+        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
+        h = float(np.median(np.diff(self.time)))
+        omega = 2.0 * np.pi * _MODE
+        if omega * h > 2.0:
+            return force  # sampled too slowly to show the mode
+        poles = omega * (-_DAMPING + 1j * np.sqrt(1.0 - _DAMPING**2)) * np.array([1.0, 1.0])
+        poles[1] = np.conj(poles[0])
+        z = np.exp(h * poles)
+        denominator = np.real(np.poly(z))
+        # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below 15 Hz.
+        numerator = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0
+        begin = lfiltic(numerator, denominator, force[:1].repeat(2), force[:1].repeat(2))
+        read: Vector = lfilter(numerator, denominator, force, zi=begin)[0]
+        return read
+
     def channels(self, errors: Matrix, rW: float, rR: float) -> Matrix:
         """Means of prediction errors over each block, (b, m), in CHANNELS.
 
@@ -81,6 +103,11 @@ def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
     Parameters
     ----------
     nominal : defaults of the model's parameters.
+
+    Raises
+    ------
+    InputError
+        If the stop has too little that counts.
     """
     rW, rR = nominal["rW"], nominal["rR"]
     time, h = case.time, float(np.median(np.diff(case.time)))
@@ -102,6 +129,14 @@ def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
     }
     usable = ~np.logical_or.reduce(list(excluded.values()))
     blocks = _blocks(usable, time, round(BLOCK / h))
+    if len(blocks) < _FEWEST:
+        lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
+        raise InputError(
+            where=str(case.source),
+            found=f"{BLOCK * len(blocks):.1f} s that count; samples set aside: {lost}",
+            expected=f"{BLOCK * _FEWEST:.0f} s or more of rolling above {_SLOWEST:g} m/s",
+            remedy="leave this stop out, or repair its recording",
+        )
     steps = np.diff(time)
 
     deviation = {name: _deviation(clean[name]) for name in ("pB", "tauR", "omegaR")}

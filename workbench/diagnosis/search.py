@@ -6,7 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, Joint, Linearised, Point, Quadratic, add, minimum, variant
+from workbench.diagnosis.fit import (
+    Fit,
+    Joint,
+    Linearised,
+    Point,
+    Quadratic,
+    add,
+    covariance,
+    minimum,
+    variant,
+)
 from workbench.fmu import Matrix, Vector
 
 Reporter = Callable[[str], None]
@@ -14,10 +24,15 @@ Candidate = tuple[Effect, Mapping[str, float]]
 
 _MOST = 4  # causes; more than that is not a diagnosis
 _SIGNIFICANT = 4.0  # standard deviations of a size
+_HINT = 2.0  # of those, while much is wrong
+WRONG = 6.0  # variance of errors that last a second, over noise, from which on much is wrong
 _HELD_OUT = 15.0  # fall of chi-squared on held-out stops
+_NEEDED = 60.0  # fall of chi-squared by an effect beside others, which may bend to its form
 _RIVALS = 5  # effects that are fitted in full before one is named
 _NEAR = 0.4  # share of the best score from which on an effect is a rival
 _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
+_BEGUN = 2  # rounds after which a rival that is far behind is given up
+_BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 4  # of Gauss-Newton
 
 
@@ -113,8 +128,8 @@ class Trial:
         """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
         stops, prior = self._select({})
         count = len(self._known)
-        covariance: Matrix = np.linalg.pinv(add([*stops, prior]).N)[:count, :count]
-        return covariance
+        known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
+        return known
 
     def scores(self) -> list[Score]:
         """All candidates, best first."""
@@ -132,7 +147,7 @@ class Trial:
         total = add([*stops, prior])
         best = minimum(total)
         size, (low, high) = float(best[-1]), self._fit.bounds(effect, effect.size)
-        sigma = float(np.sqrt(max(np.linalg.pinv(total.N)[-1, -1], 0.0)))
+        sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
         if not low <= size <= high:
             # What its bounds allow of it: the rest of the unknowns do their best beside that.
             size = float(np.clip(size, low, high))
@@ -225,21 +240,29 @@ def search(
     while True:
         trial = examine(fit, best, catalogue, report)
         scores = tuple(trial.scores())
-        rivals = _rivals(scores) if len(best.active) < _MOST else []
+        rivals = _rivals(scores, best) if len(best.active) < _MOST else []
         if not rivals:
             return best, steps, trial
         report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
-        fits = sorted(
-            (
-                fitted(fit, joined(best.point, rival), (*best.active, rival.effect))
-                for rival in rivals
-            ),
-            key=lambda one: one.misfit,
-        )
+        fits = _fits(fit, best, rivals)
         if best.misfit - fits[0].misfit < _HELD_OUT * fits[0].lasting:
             return best, steps, trial
         steps.append(Step(best, scores, tuple(fits)))
         best = fits[0]
+
+
+def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
+    """Fits with one more effect, best first; those that fall far behind are not finished."""
+    begun = sorted(
+        (
+            fitted(fit, joined(best.point, rival), (*best.active, rival.effect), _BEGUN)
+            for rival in rivals
+        ),
+        key=lambda one: one.misfit,
+    )
+    near = [one for one in begun if one.misfit < _BEHIND * begun[0].misfit]
+    finished = [fitted(fit, one.point, one.active, _ROUNDS) for one in near]
+    return sorted([*finished, *begun[len(near) :]], key=lambda one: one.misfit)
 
 
 def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter) -> Trial:
@@ -247,7 +270,7 @@ def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporte
     candidates: list[Candidate] = [
         (effect, shape)
         for effect in catalogue
-        if effect not in best.active and not effect.hidden
+        if effect not in best.active and not effect.hidden and fit.possible(effect)
         for shape in shapes(effect)
     ]
     report(f"signatures of {len(candidates)} candidates")
@@ -266,14 +289,22 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
             ratios[effect] = min(clear, size / effect.matters)
+            if len(best.active) > 1:
+                needed = lesser(fit, best, effect).misfit - best.misfit
+                ratios[effect] = min(ratios[effect], needed / (_NEEDED * best.lasting))
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
-        kept = tuple(effect for effect in best.active if effect is not weakest)
         report(f"dropping {weakest.name}")
-        best = fitted(fit, without(best.point, weakest), kept)
+        best = lesser(fit, best, weakest)
         trial = examine(fit, best, catalogue, report)
     return best, trial
+
+
+def lesser(fit: Fit, one: Fitted, effect: Effect) -> Fitted:
+    """The best fit without one effect."""
+    kept = tuple(other for other in one.active if other is not effect)
+    return fitted(fit, without(one.point, effect), kept)
 
 
 def without(point: Point, effect: Effect) -> Point:
@@ -285,9 +316,9 @@ def without(point: Point, effect: Effect) -> Point:
     )
 
 
-def fitted(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
-    """Fit a set of effects in full, from a point that has them."""
-    lin = fit.refine(point, active, _ROUNDS)
+def fitted(fit: Fit, point: Point, active: tuple[Effect, ...], rounds: int = _ROUNDS) -> Fitted:
+    """Fit a set of effects, from a point that has them."""
+    lin = fit.refine(point, active, rounds)
     return Fitted(active, lin.point, lin, lin.misfit, float(lin.inflation.mean()))
 
 
@@ -302,13 +333,19 @@ def joined(point: Point, rival: Score) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _rivals(scores: Sequence[Score]) -> list[Score]:
-    """The best variant of each effect that is large, significant and nearly as good as the best."""
+def _rivals(scores: Sequence[Score], best: Fitted) -> list[Score]:
+    """The best variant of each effect that is large, significant and nearly as good as the best.
+
+    While much is wrong, all is weighed against that, and little is significant: then a hint makes
+    a rival, and its fit decides.
+    """
+    clear, needed = _SIGNIFICANT, _HELD_OUT
+    if best.linearised.inflation.max() > WRONG:
+        clear, needed = _HINT, 0.0
     able: dict[str, Score] = {}
     for one in scores:
-        large = abs(one.size) >= one.effect.matters
-        clear = abs(one.size) > _SIGNIFICANT * one.sigma and one.held_out.sum() > _HELD_OUT
-        if large and clear:
+        significant = abs(one.size) > clear * one.sigma and one.held_out.sum() > needed
+        if significant and abs(one.size) >= one.effect.matters:
             able.setdefault(one.effect.name, one)
     ranked = list(able.values())[:_RIVALS]
     return [one for one in ranked if one.held_out.sum() > _NEAR * ranked[0].held_out.sum()]

@@ -9,16 +9,17 @@ import numpy as np
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit, Quadratic, add, minimum, seconds, variant
 from workbench.diagnosis.search import (
+    WRONG,
     Fitted,
     Reporter,
     Score,
     Step,
     Trial,
     fitted,
+    lesser,
     pruned,
     search,
     shapes,
-    without,
 )
 from workbench.fmu import Matrix, Vector
 
@@ -28,7 +29,6 @@ _QUANTILE = 1.96  # of a normal distribution, 95 %
 _TWIN = 0.98  # cosine of signatures from which on two effects are told as one
 _CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
 _CLOSE_SHARE = 0.01  # of what the effect explains: a rival may owe that to its exact form
-_LASTING = 6.0  # variance of errors that last a second, over noise, that real models leave
 _EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
 _DRAWS = 2000  # of the bootstrap over stops
 
@@ -66,7 +66,8 @@ class Cause:
 class Gain:
     """Prediction error on held-out stops; 1 is noise alone.
 
-    Root mean square of the errors that last a second, in units of the noise of such a mean.
+    Root mean square of means over a second, or over 50 ms where a cause turns with the wheel, in
+    units of the noise of such a mean.
 
     Attributes
     ----------
@@ -116,7 +117,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     base = fitted(fit, fit.start(), ())
     best, steps, trial = search(fit, catalogue, base, report)
     best, trial = pruned(fit, catalogue, best, trial, report)
-    clean = float(best.linearised.inflation.max()) < _LASTING
+    clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
     if not clean and not (best.active and _share(base, best) > _EXPLAINED):
         verdict = "unexplained"
@@ -125,7 +126,9 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     gain = None
     if verdict == "found":
         report("held-out stops")
-        gain = _gain(fit.names, held_out(fit, base), held_out(fit, best))
+        fast = any(effect.order_locked for effect in best.active)
+        before, after = (held_out(fit, one, fast=fast) for one in (base, best))
+        gain = _gain(fit.names, before, after)
         causes = _causes(fit, best, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
@@ -147,8 +150,13 @@ def _share(before: Fitted, after: Fitted) -> float:
     return float(1.0 - left.max() / max(was.max(), 1e-9))
 
 
-def held_out(fit: Fit, one: Fitted) -> Vector:
-    """Mean square of lasting errors of each stop, fitted to the others, (K,); noise leaves 1."""
+def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
+    """Mean square of errors of each stop, fitted to the others, (K,); noise leaves 1.
+
+    Parameters
+    ----------
+    fast : of means over 50 ms instead of a second.
+    """
     joint = fit.quadratics(one.linearised)
     stops = joint.stops()
     total = add([*stops, joint.prior])
@@ -158,7 +166,7 @@ def held_out(fit: Fit, one: Fitted) -> Vector:
         errors = system.r + system.J @ z + system.P @ system.local(z)
         shape = one.linearised.evidence[k].errors.shape
         whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
-        result[k] = seconds(whitened).mean()
+        result[k] = (whitened**2 if fast else seconds(whitened)).mean()
     return result
 
 
@@ -186,11 +194,12 @@ def _causes(
     cosines: Matrix,
 ) -> list[Cause]:
     sigma = np.sqrt(np.diag(trial.covariance()))
-    after = held_out(fit, best).mean()
     causes, lacking = [], {}
     for effect in best.active:
-        others = tuple(other for other in best.active if other is not effect)
-        before = held_out(fit, fitted(fit, without(best.point, effect), others)).mean()
+        before, after = (
+            float(held_out(fit, one, fast=effect.order_locked).mean())
+            for one in (lesser(fit, best, effect), best)
+        )
         lacking[effect.name] = before
         parameters = {}
         for key, value in best.point.sizes.items():

@@ -93,7 +93,8 @@ def build_observer(
         If the sources have errors.
     """
     space = _with_gains(make_explicit(flatten(observer.package, observer.model)), observer.gains)
-    tables = _tables(space)
+    # As in Python: the parameter estimator is quiet at standstill without it.
+    tables = _tables(space, sticks=isinstance(observer.gains, DisturbanceGains))
     draft = generate(space, "")
     runtime = [file.read_bytes() for file in [*sorted(RUNTIME.glob("*.[ch]")), _LAW]]
     digits = digest([draft.header, draft.source, tables, *runtime, str(fmi)])
@@ -145,9 +146,13 @@ def _with_gains(space: StateSpace, gains: Gains) -> StateSpace:
     return replace(space, parameters=parameters)
 
 
-def _tables(space: StateSpace) -> str:
+def _tables(space: StateSpace, sticks: bool) -> str:
     """Text of sampled_data.h: what the law must know of each state."""
     inputs = {variable.name: i for i, variable in enumerate(space.inputs)}
+    states = [variable.name for variable in space.states]
+    parameters = [variable.name for variable in space.parameters]
+    speeds = [str(states.index(f"plant.{name}")) for name in ("omegaW", "omegaR")]
+    radii = [str(parameters.index(f"plant.{name}")) for name in ("rW", "rR")]
     kinds, first, low, high = [], [], [], []
     for state in space.states:
         component, _, name = state.name.rpartition(".")
@@ -162,6 +167,10 @@ def _tables(space: StateSpace) -> str:
             f"static const int sampled_first[] = {{{', '.join(first)}}};",
             f"static const double sampled_low[] = {{{', '.join(low)}}};",
             f"static const double sampled_high[] = {{{', '.join(high)}}};",
+            f"static const int sampled_sticks = {int(sticks)};",
+            f"static const int sampled_speeds[] = {{{', '.join(speeds)}}};",
+            f"static const int sampled_radii[] = {{{', '.join(radii)}}};",
+            f"static const int sampled_fading = {parameters.index('fadingSpeed')};",
             "",
         ]
     )

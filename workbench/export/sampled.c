@@ -7,7 +7,8 @@
  *
  * over the time h since the sample before, which is the size of the communication step before.
  * States of kind TAKEN get their value before the step and keep it, also in df/dx; states of kind
- * APPLIED have no inertia, M = 0. States stay within their limits. Source of the method:
+ * APPLIED have no inertia, M = 0. States stay within their limits. Where sampled_sticks, a step may
+ * not reverse the slip close to standstill. Source of the method:
  * P. Deuflhard, E. Hairer, J. Zugck (1987), Numerische Mathematik 51, 501-516.
  */
 #include "integrator.h"
@@ -18,7 +19,8 @@
 enum { DYNAMIC, TAKEN, APPLIED };
 
 /* sampled_kind, sampled_first (number of the input that the first sample is in, or -1),
- * sampled_low, sampled_high: NX values each. */
+ * sampled_low, sampled_high: NX values each. sampled_sticks; sampled_speeds (states of wheelset and
+ * roller), sampled_radii (their parameters), sampled_fading (parameter, a rolling velocity). */
 #include "sampled_data.h"
 
 int first_violated(double t, const double *x, const double *u, const double *p, double *holds) {
@@ -78,6 +80,23 @@ static void limit(Rosenbrock *r) {
     }
 }
 
+/* Speed of a wheelset that rolls minus that of this one. */
+static double slipping(const double *x, const double *p) {
+    const double ratio = p[sampled_radii[1]] / p[sampled_radii[0]];
+    return ratio * x[sampled_speeds[1]] - x[sampled_speeds[0]];
+}
+
+/* Lets the wheelset roll where a step has reversed its slip close to standstill: creep is saturated
+ * there from 1 mm/s on, and a tangent to the saturated force leads to the other side, and back in
+ * the next step. */
+static void stick(double *x, const double *p, double before) {
+    const double speed = p[sampled_radii[1]] * x[sampled_speeds[1]];
+    const double after = slipping(x, p);
+    if (fabs(speed) < p[sampled_fading] && before * after < 0.0) {
+        x[sampled_speeds[0]] += after;
+    }
+}
+
 /* Solves matrix * f = f in place, by Gaussian elimination with partial pivoting; 0 if singular. */
 static int solve(double *matrix, double *f) {
     for (int column = 0; column < NX; column++) {
@@ -131,12 +150,16 @@ static Outcome take_sample(Rosenbrock *r, double t, double h, const double *u, c
     if (!solve(r->matrix, r->f)) {
         return OUTCOME_STEP_TOO_SMALL;
     }
+    const double before = slipping(r->x, p);
     for (int n = 0; n < NX; n++) {
         r->x[n] += r->f[n];
         if (!isfinite(r->x[n])) {
             r->bad = REFERENCE_X + n;
             return OUTCOME_NOT_FINITE;
         }
+    }
+    if (sampled_sticks) {
+        stick(r->x, p, before);
     }
     limit(r);
     if (!settle(r, APPLIED, t, u, p)) {

@@ -174,6 +174,24 @@ def check_model(fmu: FMU) -> None:
             )
 
 
+def rolling_ratio(fmu: FMU) -> float:
+    """Speed of a wheelset that rolls over that of the roller [1], by the model's own slip.
+
+    It is rR/rW, unless the radius that acts in the model is another. The FMU is started anew.
+    """
+    slip = fmu.variables(["slip"])
+    fmu.start({"omegaW": 0.0, "omegaR": 0.0})
+    rest = fmu.get_states()
+    slips = []
+    for name in ("omegaR", "omegaW"):
+        turning = rest.copy()
+        turning[fmu.states.index(name)] = 1.0
+        fmu.set_states(turning)
+        slips.append(float(fmu.get(slip)[0]))
+    fmu.set_states(rest)
+    return -slips[0] / slips[1]
+
+
 def _split(rows: Any) -> Estimate:
     return Estimate(rows[..., :WIDTH], rows[..., WIDTH : 2 * WIDTH], rows[..., -1])
 
@@ -188,6 +206,29 @@ def fading(speed):  # type: ignore[no-untyped-def]
 def clip(value, low, high):  # type: ignore[no-untyped-def]
     """Limit to low..high; a NaN stays."""
     return min(max(value, low), high)
+
+
+@inlined
+def slipping(x, wheelset, roller, ratio):  # type: ignore[no-untyped-def]
+    """Speed of a wheelset that rolls minus that of this one [rad/s]; ratio: `rolling_ratio`."""
+    return ratio * x[roller] - x[wheelset]
+
+
+@inlined
+def stick(x, wheelset, roller, ratio, radius, before):  # type: ignore[no-untyped-def]
+    """Let the wheelset roll where a step would reverse its slip close to standstill.
+
+    Creep is saturated there from 1 mm/s on, and a tangent to the saturated force leads to the other
+    side, and back in the next step.
+
+    Parameters
+    ----------
+    before : `slipping` before the step.
+    """
+    if abs(radius * x[roller]) < FADING_SPEED and (
+        before * slipping(x, wheelset, roller, ratio) < 0.0
+    ):
+        x[wheelset] = ratio * x[roller]
 
 
 @inlined

@@ -21,6 +21,9 @@ from workbench.observers.contract import (
     fading,
     measure,
     report,
+    rolling_ratio,
+    slipping,
+    stick,
 )
 
 # Distance of sigma points, as a share of the cubature rule's: a friction that nothing is known of
@@ -66,6 +69,7 @@ class _Settings(NamedTuple):
     floor: Vector
     walk: Vector
     radius: float
+    ratio: float
 
 
 class _Memory(NamedTuple):
@@ -86,7 +90,7 @@ def _copy(source, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict_mean(plant, memory, z, h):  # type: ignore[no-untyped-def]
+def _predict_mean(plant, settings, memory, z, h):  # type: ignore[no-untyped-def]
     """Advance z by one linearly implicit step; leaves I - h*A in memory.system; a status."""
     n = plant.x.size
     for i in range(n):
@@ -102,8 +106,11 @@ def _predict_mean(plant, memory, z, h):  # type: ignore[no-untyped-def]
         memory.system[i, i] += 1.0
     _copy(memory.system, memory.work)
     status = status or solve(memory.work, memory.change)
+    wheelset, roller = settings.order
+    before = slipping(z, wheelset, roller, settings.ratio)
     for i in range(n + 2):
         z[i] += memory.change[i, 0]
+    stick(z, wheelset, roller, settings.ratio, settings.radius, before)
     return status
 
 
@@ -187,7 +194,7 @@ def _ekf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
         status = _start(plant, settings, memory, u, y)
         return status or _conclude(plant, settings, memory, row)
     P, size = memory.P, memory.z.size
-    status = measure(plant, u) or _predict_mean(plant, memory, memory.z, h)
+    status = measure(plant, u) or _predict_mean(plant, settings, memory, memory.z, h)
     # P <- (I - hA)^-1 (P + hQ) (I - hA)^-T: two solutions with the matrix of the step.
     fade = fading(settings.radius * y[1])
     for i in range(size):
@@ -312,7 +319,7 @@ def _ukf_law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-
                 point[j] = z[j] + (1 - 2 * side) * spread * root[i, j]
             for j in range(2):
                 point[n + j] = clip(point[n + j], settings.low[j], settings.high[j])
-            status = status or _predict_mean(plant, memory, point, h)
+            status = status or _predict_mean(plant, settings, memory, point, h)
     if status:
         return status
     for j in range(size):
@@ -383,6 +390,7 @@ class ExtendedKalmanFilter(Estimator):
             floor=np.array([noise.omegaW, noise.omegaR]),
             walk=np.array([noise.model] * n + [noise.muWR, noise.muDC]),
             radius=self._radius,
+            ratio=rolling_ratio(fmu),
         )
         self._memory: _Memory | _PointMemory = _Memory(*_buffers(n + 2))
 

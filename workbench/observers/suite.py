@@ -38,15 +38,17 @@ class Settings:
 
     def summary(self) -> dict[str, Any]:
         """The same as plain numbers and lists, keyed by estimator."""
-        disturbance, parameter = self.disturbance, self.parameter
+        parameter = self.parameter
+        disturbance = {
+            "L": self.disturbance.L.tolist(),
+            "T_WR": self.disturbance.T_WR,
+            "T_DC": self.disturbance.T_DC,
+            "effect": self.disturbance.effect.tolist(),
+            "source": "stationary Kalman gain of the linearised model",
+        }
         return {
-            "disturbance_observer": {
-                "L": disturbance.L.tolist(),
-                "T_WR": disturbance.T_WR,
-                "T_DC": disturbance.T_DC,
-                "effect": disturbance.effect.tolist(),
-                "source": "stationary Kalman gain of the linearised model",
-            },
+            "disturbance_observer": disturbance,
+            "disturbance_observer_disc": {**disturbance, "disc": DiscModel()._asdict()},
             "parameter_estimator": {
                 "L": parameter.L.tolist(),
                 "effect": parameter.effect.tolist(),

@@ -1,5 +1,6 @@
 """Results of a diagnosis: summary.json, the text for the terminal, data and figures, the page."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,14 +9,26 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
-from workbench.diagnosis import CATALOGUE, Cause, Outcome
+from workbench.diagnosis import CATALOGUE, Cause, Outcome, Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import CHANNELS
+from workbench.report.diagnosis_figures import (
+    FAST,
+    LASTING,
+    at_blocks,
+    draw_confusability,
+    draw_dependences,
+    draw_gain,
+    lasting,
+    stop_figure,
+)
+from workbench.report.diagnosis_page import write_diagnosis_page
+from workbench.report.figures import draw_case
 from workbench.report.results import _write, write_summary
 
 _MEASURE = (
-    "root mean square of the prediction errors that last a second, on stops that were held out, "
-    "in units of the noise; 1 is noise alone"
+    "root mean square of prediction errors, in means over {span}, on stops that were held out, "
+    "in units of the noise of such a mean; 1 is noise alone"
 )
 _UNITS = ("m/s", "rad/s", "N")
 
@@ -39,7 +52,7 @@ def summarise_diagnosis(
         "gain": None
         if gain is None
         else {
-            "measure": _MEASURE,
+            "measure": _MEASURE.format(span="50 ms" if _turns(outcome) else "a second"),
             "before": gain.before,
             "after": gain.after,
             "low": gain.low,
@@ -79,11 +92,21 @@ def summarise_diagnosis(
                 "effect": score.effect.name,
                 "shape": dict(score.shape),
                 "size": score.size,
-                "sigma": score.sigma,
+                "sigma": _known(score.sigma),
                 "gain": score.gain,
                 "held_out": float(score.held_out.sum()),
             }
             for score in found.scores
+        ],
+        "steps": [
+            {
+                "before": step.before.misfit,
+                "rivals": [
+                    {"effect": rival.active[-1].name, "misfit": rival.misfit}
+                    for rival in step.rivals
+                ],
+            }
+            for step in found.steps
         ],
         "not_visible": {effect.name: effect.hidden for effect in CATALOGUE if effect.hidden},
         "levels": {
@@ -93,9 +116,26 @@ def summarise_diagnosis(
         "deviations": outcome.deviations,
         "set_aside": outcome.set_aside,
         "has_force": outcome.has_force,
+        "observers": {
+            name: {
+                stop: {"before": _known(before), "after": _known(after)}
+                for stop, (before, after) in by_stop.items()
+            }
+            for name, by_stop in outcome.observers.items()
+        },
         "cases": [case.name for case in cases],
         "provenance": provenance,
     }
+
+
+def _turns(outcome: Outcome) -> bool:
+    """Whether a cause turns with the wheel, so that its errors do not last."""
+    return any(cause.effect.order_locked for cause in outcome.diagnosis.causes)
+
+
+def _known(value: float) -> float | None:
+    """JSON has neither NaN nor infinity."""
+    return value if np.isfinite(value) else None
 
 
 def _cause(cause: Cause) -> dict[str, Any]:
@@ -119,15 +159,13 @@ def sentence(outcome: Outcome) -> str:
     cost = (
         ""
         if outcome.has_force
-        else (
-            " Without a measured force, brake and drive are told apart by their course in time only."
-        )
+        else " Without a measured force, brake and drive differ only in their course in time."
     )
     if found.verdict == "nothing":
         return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
     if found.verdict == "unexplained":
-        strongest = next((one for one in outcome.dependences if one.after > 0.0), None)
-        goes = f"; it goes with {strongest.influence}" if strongest else ""
+        strongest = max(outcome.dependences, key=lambda one: one.after)
+        goes = f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
         part = f", though {' and '.join(found.partial)} would explain a part" * bool(found.partial)
         return f"Something is missing that no effect of the catalogue explains{part}{goes}.{cost}"
     names = []
@@ -170,22 +208,79 @@ def format_diagnosis(summary: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def write_diagnosis(outcome: Outcome, summary: Mapping[str, Any], out: Path) -> Path:
-    """Write summary.json and the data of each stop; returns the file to read."""
+def write_diagnosis(
+    outcome: Outcome, cases: Sequence[Case], summary: Mapping[str, Any], out: Path
+) -> Path:
+    """Write summary.json, data and figures, and the page that shows them; returns the page.
+
+    Parameters
+    ----------
+    cases : as diagnosed, in the order of the outcome's residuals.
+    summary : of this outcome.
+    """
     write_summary(summary, out / "summary.json")
-    for one in outcome.residuals:
-        columns = {"time [s]": one.block_time}
-        for c, (channel, unit) in enumerate(zip(CHANNELS, _UNITS, strict=True)):
-            if c < one.before.shape[1]:
-                columns[f"before.{channel} [{unit}]"] = one.before[:, c]
-                columns[f"after.{channel} [{unit}]"] = one.after[:, c]
-                columns[f"sigma.{channel} [{unit}]"] = one.sigma[:, c]
-        for name, unit in RESIDUALS.items():
-            if name in one.values:
-                known = np.isfinite(one.values[name])
-                columns[f"residual.{name} [{unit}]"] = np.interp(
-                    one.block_time, one.time[known], one.values[name][known]
-                )
-        text = pd.DataFrame(columns).to_csv(index=False, float_format="%.6g")
-        _write(out / f"{one.name}.csv", text)
-    return out / "summary.json"
+    effects = [cause["effect"] for cause in summary["causes"]]
+    added = effects or summary["partial"]
+    extension = f"with {', '.join(added)}" if added else ""
+    span = FAST if _turns(outcome) else LASTING
+    pairs = list(zip(outcome.residuals, cases, strict=True))
+    pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(effects)))
+    figures = []
+    for one, case in pairs:
+        figure = stop_figure(one, case, extension, span)
+        draw_case(figure, _pictures(out, one.name))
+        _write_stop(one, out / f"{one.name}.csv")
+        figures.append(figure)
+    _write_tables(summary, out)
+    draw_dependences(summary["dependences"], _pictures(out, "dependences"))
+    names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
+    draw_confusability(names, cosines, effects, _pictures(out, "confusability"))
+    if summary["gain"] is not None:
+        draw_gain(summary["gain"], _pictures(out, "gain"))
+    return write_diagnosis_page(summary, figures, out)
+
+
+def _clearness(one: Residuals, span: int, found: bool) -> float:
+    """How clearly a stop shows what was found, or else how wrong the nominal model is in it."""
+    before, after = lasting(one, span).noises()
+    return float(np.max(before**2 - after**2 if found else before**2))
+
+
+def _pictures(out: Path, name: str) -> list[Path]:
+    return [out / f"{name}.png", out / f"{name}.svg"]
+
+
+def _write_stop(one: Residuals, path: Path) -> None:
+    """Prediction errors and residuals of a stop, at the middle of each block of 50 ms."""
+    columns = {"time [s]": one.block_time}
+    means = lasting(one, LASTING)
+    for c, (channel, unit) in enumerate(zip(CHANNELS, _UNITS, strict=True)):
+        if c < one.before.shape[1]:
+            columns[f"before.{channel} [{unit}]"] = one.before[:, c]
+            columns[f"after.{channel} [{unit}]"] = one.after[:, c]
+            columns[f"sigma.{channel} [{unit}]"] = one.sigma[:, c]
+            columns[f"lasting_before.{channel} [{unit}]"] = means.before[:, c]
+            columns[f"lasting_after.{channel} [{unit}]"] = means.after[:, c]
+            columns[f"lasting_sigma.{channel} [{unit}]"] = means.sigma[:, c]
+    for name, values in at_blocks(one).items():
+        columns[f"residual.{name} [{RESIDUALS[name]}]"] = values
+    _write(path, _csv(pd.DataFrame(columns)))
+
+
+def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
+    """Data of the figures that show all stops."""
+    rows = [{**one, "shape": json.dumps(one["shape"])} for one in summary["candidates"]]
+    _write(out / "candidates.csv", _csv(pd.DataFrame(rows)))
+    _write(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
+    names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
+    cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
+    _write(out / "confusability.csv", _csv(pd.DataFrame(cells)))
+    if (gain := summary["gain"]) is not None:
+        rows = [{"stop": name, **one} for name, one in gain["stops"].items()]
+        total = {key: gain[key] for key in ("before", "after", "low", "high")}
+        _write(out / "gain.csv", _csv(pd.DataFrame([*rows, {"stop": "all stops", **total}])))
+
+
+def _csv(table: pd.DataFrame) -> str:
+    text: str = table.to_csv(index=False, float_format="%.6g")
+    return text

@@ -234,4 +234,4 @@ function zoomable(figure) {
 
 document.documentElement.classList.add("script");
 document.querySelectorAll("table.sortable").forEach(sortable);
-document.querySelectorAll("figure").forEach(zoomable);
+document.querySelectorAll("figure.zoomable").forEach(zoomable);

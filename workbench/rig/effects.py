@@ -24,8 +24,8 @@ class Effects:
     fade: float = _gain("1/K", "pad friction times 1 - gain*(T - 100 degC), T of each disc")
     pressure_exponent: float = _gain("1", "pad friction times (normal force/35 kN)^-gain")
     bedding_in: float = _gain("1", "pad friction times 1 - gain*exp(-t/2 s) from first contact")
-    water_film: float = _gain("1", "pad friction times 1 - gain*exp(-E/0.45 MJ), E of each disc")
-    single_disc_film: float = _gain("1", "the same, of disc 2 alone")
+    water_film: float = _gain("1", "film on dry discs at the start, 1 on a wet disc", least=0.0)
+    single_disc_film: float = _gain("1", "the same, on disc 2 alone", least=0.0)
     disc_thickness: float = _gain("1", "pad friction times 1 + gain*cos(phiW + phase)")
     caliper_hysteresis: float = _gain(
         "1", "pad force less by gain as pressure rises, more as it falls"

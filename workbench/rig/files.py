@@ -54,7 +54,7 @@ def check_files(folders: Iterable[Path], rate: int) -> None:
             )
 
 
-def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> None:
+def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every: int = 1) -> None:
     """Write a case for estimators and the truth for judges.
 
     Parameters
@@ -62,6 +62,7 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> No
     effects : as given to `simulate`.
     rate : [Hz] of the recording, a divisor of RATE.
     folder : of the case: case.toml, measured.csv, truth.csv, truth.json.
+    every : how many samples of the recording one line of truth.csv stands for.
     """
     recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
     time = stop.time[recorded]
@@ -72,7 +73,7 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> No
         for name, (unit, factor, digits) in _COLUMNS.items()
     }
     truth = {
-        f"{name} [{unit}]": (stop.truth[name][recorded][kept], "%.7g")
+        f"{name} [{unit}]": (stop.truth[name][recorded][kept][::every], "%.7g")
         for name, unit in TRUTH.items()
     }
     planted = {name: gain for name, gain in dataclasses.asdict(effects).items() if gain}
@@ -92,7 +93,7 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path) -> No
     }
     folder.mkdir(parents=True, exist_ok=True)
     _write(folder / "truth.json", json.dumps(made, indent=2) + "\n")
-    _write(folder / "truth.csv", _table(time[kept], truth))
+    _write(folder / "truth.csv", _table(time[kept][::every], truth))
     _write(folder / "measured.csv", _table(time[kept], measured))
     _write(folder / "case.toml", _case(stop.scenario))
 

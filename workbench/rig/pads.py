@@ -38,21 +38,22 @@ class Pads:
     Attributes
     ----------
     temperature : [degC] of each disc.
-    film : water on each disc, 1 at the start if wet, 0 if dry; not what is planted.
+    film : water on each disc, 1 at the start if wet, what is planted if dry.
     """
 
     def __init__(
         self, effects: Effects, level: float, discs: Sequence[Surface], phase: float, dt: float
     ) -> None:
         self.temperature = [_INITIAL] * len(discs)
-        self.film = [1.0 if disc == "wet" else 0.0 for disc in discs]
+        planted = [effects.water_film] * len(discs)
+        planted[1] = max(planted[1], effects.single_disc_film)
+        self.film = [
+            1.0 if disc == "wet" else film for disc, film in zip(discs, planted, strict=True)
+        ]
         self._effects = effects
         self._level = level
         self._phase = phase
         self._dt = dt
-        # Share of friction lost to films that are planted, whatever the conditions say.
-        self._lost = [effects.water_film] * len(discs)
-        self._lost[1] += effects.single_disc_film
         self._contact = 0.0  # [s] since first contact
 
     def friction(self, speed: float, force: float, turn: float) -> list[float]:
@@ -74,9 +75,8 @@ class Pads:
             self._level
             * (common * (1.0 - e.fade * (T - _TEMPERATURE)) * (1.0 - film) + _WET_FRICTION * film)
             * varied
-            * (1.0 - lost)
             * (1.0 + e.friction_step * _step(T))
-            for T, film, lost in zip(self.temperature, self.film, self._lost, strict=True)
+            for T, film in zip(self.temperature, self.film, strict=True)
         ]
 
     def heat(self, powers: Sequence[float], speed: float, force: float) -> None:
@@ -91,9 +91,7 @@ class Pads:
         for i, power in enumerate(powers):
             cooled = cooling * (self.temperature[i] - _AMBIENT)
             self.temperature[i] += self._dt * (_INTO_DISC * power - cooled) / _HEAT_CAPACITY
-            dried = math.exp(-self._dt * power / _DRYING_ENERGY)
-            self.film[i] *= dried
-            self._lost[i] *= dried
+            self.film[i] *= math.exp(-self._dt * power / _DRYING_ENERGY)
         if force > 0.0 or self._contact > 0.0:
             self._contact += self._dt
 

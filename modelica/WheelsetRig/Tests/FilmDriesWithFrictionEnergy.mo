@@ -1,10 +1,10 @@
 within WheelsetRig.Tests;
 model FilmDriesWithFrictionEnergy "Water on discs leaves with friction energy, not with time"
-  parameter Real d(unit="1") = 0.6 "Depth of the film";
-  Effects.WaterFilm film(level=0.30, Fperp=30000.0, v=20.0, depth=d);
-  Effects.WaterFilm reverse(level=0.30, Fperp=30000.0, v=-20.0, depth=d);
-  Effects.WaterFilm light(level=0.30, Fperp=15000.0, v=20.0, depth=d, E0=0.225e6);
-  Effects.SingleDiscWaterFilm single(level=0.30, Fperp=30000.0, v=20.0, depth=d);
+  parameter Real d(unit="1") = 0.54 "Share of friction lost at the start, 0.9*(0.30 - 0.12)/0.30";
+  Effects.WaterFilm film(level=0.30, Fperp=30000.0, v=20.0, film=0.9);
+  Effects.WaterFilm reverse(level=0.30, Fperp=30000.0, v=-20.0, film=0.9);
+  Effects.WaterFilm light(level=0.30, Fperp=15000.0, v=20.0, film=0.9, E0=0.225e6);
+  Effects.SingleDiscWaterFilm single(level=0.30, Fperp=30000.0, v=20.0, film=0.9);
   Units.Energy dry = 0.30*30000.0*20.0*time "Energy without water";
   // Of der(E) = level*Fperp*v*(1 - d*exp(-E/E0)), by y = exp(E/E0) - d.
   Real deficit(unit="1") = d/(d + (1.0 - d)*exp(dry/0.45e6)) "Share of friction that is lacking";

@@ -1,0 +1,217 @@
+"""The parts that a diagnosis is made of, each against a closed form or an independent way."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.case import Case, Conditions
+from workbench.diagnosis import CATALOGUE, choose
+from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.fit import StopSystem, add, covariance, minimum
+from workbench.diagnosis.prediction import Predictor
+from workbench.diagnosis.samples import Samples, prepare
+from workbench.errors import InputError
+from workbench.fmu import FMU, CoSimulation, Vector
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
+DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
+    text = source("AllEffects", CATALOGUE, {}, {}, "Every effect at zero")
+    build(PACKAGE, "AllEffects", text, path, every_platform=False)
+    return path
+
+
+def simulated(fmu: Path, parameters: dict[str, float]) -> Case:
+    """A stop without noise, by the FMU's own integrator (RODAS, implicit, with error control)."""
+    h, n = 0.005, 3200
+    time = h * np.arange(n)
+    # A ramp of 1 s and a torque that takes four fifths of the deceleration, as the drive does.
+    pB = 2.7e5 * np.clip(time - 3.0, 0.0, 1.0)
+    tauR = 7500.0 * np.clip(time - 3.2, 0.0, 1.0)
+    readings = ("omegaWReading", "omegaRReading", "FxReading")
+    rows = []
+    with CoSimulation(fmu) as model:
+        inputs, outputs = model.variables(["pB", "tauR"]), model.variables(readings)
+        model.start({"omegaW": 39.0 * 0.70 / 0.46, "omegaR": 39.0}, {"muWR": 0.4, **parameters})
+        for k in range(n):
+            model.set(inputs, np.array([pB[k], tauR[k]]))
+            rows.append(model.get(outputs).copy())
+            # Inputs are held in a step: ten of them follow the ramp to 0.25 ms.
+            for i in range(10):
+                share = (i + 0.5) / 10
+                after = min(k + 1, n - 1)
+                between = [
+                    pB[k] + share * (pB[after] - pB[k]),
+                    tauR[k] + share * (tauR[after] - tauR[k]),
+                ]
+                model.set(inputs, np.array(between))
+                model.step(h / 10)
+    omegaW, omegaR, Fx = np.array(rows).T
+    return Case("stop", "a stop", DRY, time, pB, tauR, omegaW, omegaR, Fx, Path("none.csv"))
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{}, {"padFriction.brakeFade.fade": 5e-4}, {"wheelRadius.outOfRoundWheel.cosine": 2e-4}],
+)
+def test_prediction_agrees_with_an_error_controlled_integrator(
+    effects: dict[str, float], everything: Path
+) -> None:
+    case = simulated(everything, effects)
+    with FMU(everything) as fmu:
+        stop = prepare(case, fmu.defaults)
+        errors = Predictor(fmu).errors(stop, {"muWR": 0.4, **effects})
+    moving = slice(200, int(stop.blocks[-1, 1]))
+    # Steps of 5 ms, force of 14 kN: 1 N where the force is smooth, and 25 N for the samples at the
+    # two kinks of the ramp; a wheel out of round shakes the force by 0.9 kN at 9 Hz, of which
+    # 5 % is lost. The noise of one sample is 80 N and 10 mm/s.
+    turning = "wheelRadius.outOfRoundWheel.cosine" in effects
+    assert np.sqrt(np.mean(errors[moving, 2] ** 2)) < (35.0 if turning else 1.0)
+    assert np.abs(errors[moving, 2]).max() < (170.0 if turning else 25.0)
+    assert np.abs(0.46 * errors[moving, 0]).max() < 0.015
+
+
+def test_an_effect_of_size_zero_predicts_what_the_observer_model_does(everything: Path) -> None:
+    case = simulated(MINIMAL, {})
+    both = []
+    for path in (MINIMAL, everything):
+        with FMU(path) as fmu:
+            both.append(Predictor(fmu).errors(prepare(case, fmu.defaults), {"muWR": 0.4}))
+    moving = slice(200, 2800)
+    np.testing.assert_allclose(both[0][moving], both[1][moving], rtol=0, atol=1e-7)
+
+
+def noisy(seed: int, spikes: tuple[int, ...] = ()) -> Case:
+    """A stop at constant deceleration with the noise of the rig's sensors."""
+    rng = np.random.default_rng(seed)
+    time = 0.005 * np.arange(6000)
+    omegaR = 40.0 - 1.2 * np.maximum(0.0, time - 3.0)
+    signals = {
+        "pB": 2.7e5 * np.clip(time - 3.0, 0.0, 1.0) + 500.0 * rng.standard_normal(6000),
+        "tauR": 5000.0 * np.clip(time - 3.0, 0.0, 1.0) + 40.0 * rng.standard_normal(6000),
+        "omegaW": omegaR * 0.70 / 0.46 * (1.0 + 3e-4 * rng.standard_normal(6000)),
+        "omegaR": omegaR + 0.003 * rng.standard_normal(6000),
+        "Fx": 15e3 * np.clip(time - 3.0, 0.0, 1.0) + 80.0 * rng.standard_normal(6000),
+    }
+    for k in spikes:
+        signals["Fx"][k] += 5e3
+        signals["omegaR"][k] += 1.0
+    return Case("stop", "a stop", DRY, time, **signals, source=Path("none.csv"))
+
+
+def ready(case: Case) -> Samples:
+    with FMU(MINIMAL) as fmu:
+        return prepare(case, fmu.defaults)
+
+
+def test_spikes_are_set_aside_with_their_blocks() -> None:
+    spikes = (1503, 2407, 3801)
+    stop = ready(noisy(1, spikes))
+    assert stop.set_aside["spike, dropout or saturation"] == len(spikes)
+    for k in spikes:
+        assert not any(first <= k < end for first, end in stop.blocks)
+        assert stop.gain[k] == 0.0
+
+
+def test_noise_is_whitened_to_variance_one() -> None:
+    case = noisy(2)
+    stop = ready(case)
+    smooth = np.column_stack(
+        [case.omegaR * 0 + 40.0 - 1.2 * np.maximum(0.0, case.time - 3.0)] * 2
+    ) * np.array([0.70 / 0.46, 1.0])
+    force = 15e3 * np.clip(case.time - 3.0, 0.0, 1.0)
+    errors = np.column_stack([case.omegaW, case.omegaR, case.Fx]) - np.column_stack([smooth, force])
+    means = stop.channels(errors, 0.46, 0.70)
+    white = np.einsum("bij,bj->bi", stop.whitening, means)
+    # 500 blocks: a variance is known to 6 %. The roller's channel allows for the prediction's own
+    # variance, which pure measurement noise does not have.
+    assert white[:, 0].var() == pytest.approx(1.0, abs=0.25)
+    assert white[:, 2].var() == pytest.approx(1.0, abs=0.25)
+    assert 0.3 < white[:, 1].var() < 1.2
+
+
+def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
+    stop = ready(noisy(3))
+    for frequency in (2.0, 8.0, 15.0):
+        wave = np.sin(2.0 * np.pi * frequency * stop.time)
+        read = stop.behind_structure(wave)[2000:]
+        s, mode = 1j * frequency, 21.6
+        gain = abs(mode**2 / (s**2 + 2 * 0.05 * mode * s + mode**2))
+        # Matched poles: 1 % of the amplitude, and 1 % for the samples missing the crest.
+        assert np.abs(read).max() == pytest.approx(gain, rel=0.02)
+
+
+def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
+    rng = np.random.default_rng(4)
+    systems = [
+        StopSystem(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d)
+        for d in rng.normal(size=(4, 5))
+    ]
+    total = add([system.eliminated() for system in systems])
+    step = minimum(total)
+    # The same by brute force: all local unknowns side by side, priors as rows.
+    rows, right = [], []
+    for k, one in enumerate(systems):
+        block = np.zeros((40 + 5, 3 + 5 * 4))
+        block[:40, :3], block[:40, 3 + 5 * k : 8 + 5 * k] = one.J, one.P
+        block[40:, 3 + 5 * k : 8 + 5 * k] = np.eye(5)
+        rows.append(block)
+        right.append(np.concatenate([one.r, one.deviations]))
+    matrix, vector = np.vstack(rows), np.concatenate(right)
+    brute = np.linalg.lstsq(matrix, -vector, rcond=None)[0]
+    np.testing.assert_allclose(step, brute[:3], rtol=1e-6)
+    assert total.at(step) == pytest.approx(float(np.sum((matrix @ brute + vector) ** 2)), rel=1e-6)
+    full = np.linalg.inv(matrix.T @ matrix)[:3, :3]
+    np.testing.assert_allclose(covariance(total.N), full, rtol=1e-6)
+    local = systems[2].local(step)
+    np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
+
+
+def test_covariance_is_the_same_in_any_unit() -> None:
+    rng = np.random.default_rng(5)
+    matrix = rng.normal(size=(30, 4))
+    units: Vector = np.array([1.0, 1e5, 1e-6, 30.0])
+    plain = covariance(matrix.T @ matrix)
+    other = covariance((matrix / units).T @ (matrix / units))
+    np.testing.assert_allclose(other, plain * np.outer(units, units), rtol=1e-8)
+
+
+def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
+    with FMU(everything) as fmu:
+        described = {variable.name: variable for variable in fmu.description.variables}
+        for effect in CATALOGUE:
+            for parameter in effect.sizes:
+                for name in variables(effect, parameter):
+                    one = described[name]
+                    assert fmu.defaults[name] == 0.0
+                    assert one.unit
+                    assert one.minimum is not None
+                    assert one.maximum is not None
+                    assert one.minimum <= 0.0 < effect.matters < one.maximum
+            for shape, values in effect.shapes:
+                one = described[variables(effect, shape)[0]]
+                assert one.minimum is not None
+                assert one.maximum is not None
+                assert one.minimum <= min(values) <= max(values) <= one.maximum
+
+
+def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
+    with pytest.raises(InputError, match="closest: 'BrakeFade'"):
+        choose(["brakefade"])
+
+
+def test_source_with_an_error_says_where(tmp_path: Path) -> None:
+    text = source("Extended", CATALOGUE[:1], {CATALOGUE[0].name: {"slop": 0.1}}, {}, "a typo")
+    with pytest.raises(InputError, match="slop"):
+        build(PACKAGE, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
+    assert not (tmp_path / "Extended.fmu").exists()

@@ -1,0 +1,512 @@
+"""The page of `diagnose`: the verdict and its evidence, for an engineer without the tool."""
+
+import dataclasses
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import lxml.html
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.__main__ import main
+from workbench.case import Case
+from workbench.diagnosis import Residuals
+from workbench.report.diagnosis_figures import FAST, LASTING, lasting, stop_figure
+from workbench.report.diagnosis_page import write_diagnosis_page
+from workbench.report.figures import CaseFigure
+from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
+
+STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
+PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second
+TWINS = {"FxOffset", "ApexOffset"}  # of which either may be named first
+EFFECTS = ["BrakeFade", "BeddingIn", "WheelRadius", *sorted(TWINS)]
+
+
+@pytest.fixture(scope="session")
+def stops(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Three stops of the virtual rig, whose load cells have a wrong zero."""
+    folder = tmp_path_factory.mktemp("stops")
+    effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
+    for seed, (name, speed) in enumerate(STOPS.items()):
+        usual = SCENARIOS[name]
+        conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
+        short = dataclasses.replace(usual, conditions=conditions)
+        stop = simulate(short, seed, effects, root / "fmus" / "fmi2" / "Reference.fmu")
+        write_recording(stop, effects, 200, folder / name)
+    return folder
+
+
+def diagnose(root: Path, stops: Path, out: Path) -> Path:
+    """Through the command line, with few effects to be quick."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        assert main(["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="session")
+def results(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    return diagnose(root, stops, tmp_path_factory.mktemp("diagnosis"))
+
+
+@pytest.fixture(scope="session")
+def summary(results: Path) -> dict[str, Any]:
+    return json.loads((results / "summary.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def page(results: Path) -> Any:
+    return lxml.html.fromstring((results / "index.html").read_bytes())
+
+
+@pytest.fixture(scope="session")
+def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The page of the same stops without Fx, in which nothing is wrong then."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    folder = tmp_path_factory.mktemp("forceless")
+    for name in STOPS:
+        (folder / name).mkdir()
+        (folder / name / "case.toml").write_text((stops / name / "case.toml").read_text())
+        table = pd.read_csv(stops / name / "measured.csv")
+        forces = [column for column in table if column.startswith("Fx")]
+        table.drop(columns=forces).to_csv(folder / name / "measured.csv", index=False)
+    out = diagnose(root, folder, tmp_path_factory.mktemp("forceless_out"))
+    return lxml.html.fromstring((out / "index.html").read_bytes())
+
+
+def text(element: Any) -> str:
+    return " ".join(element.text_content().split())
+
+
+def section(page: Any, name: str) -> Any:
+    return page.xpath(f"//section[@aria-labelledby='{name}']")[0]
+
+
+def data(table: Any) -> pd.DataFrame:
+    """Numbers of a table as the page sorts them, by its headings."""
+    titles = [text(cell) for cell in table.xpath("thead/tr/th")][1:]
+    rows = {
+        text(row[0]): [cell.get("data-value") for cell in row[1:]] for row in table.find("tbody")
+    }
+    return pd.DataFrame.from_dict(rows, orient="index", columns=titles)
+
+
+def steps(path: str) -> np.ndarray:
+    """Points of a path of relative steps, (n, 2)."""
+    return np.cumsum(np.array(re.findall(r"-?\d+", path), float).reshape(-1, 2), axis=0)
+
+
+# --- the page as a whole ---
+
+
+def test_verdict_comes_first_in_one_sentence_and_names_the_planted_effect_and_its_twin(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    headline = page.find_class("headline")[0]
+    assert summary["sentence"] in text(headline)
+    assert all(twin in text(headline) for twin in TWINS)
+    assert text(headline).count(". ") <= 1  # after the verdict's name
+    assert headline.getparent().tag == "header"
+
+
+def test_page_follows_the_rules_of_accessible_pages(page: Any) -> None:
+    levels = [int(heading.tag[1]) for heading in page.xpath("//h1|//h2|//h3|//h4")]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert max(np.diff(levels)) <= 1
+    first = page.xpath("//body//*[self::a or self::button or @tabindex]")[0]
+    assert page.get_element_by_id(first.get("href")[1:]).tag == "main"
+    ids = page.xpath("//@id")
+    assert len(ids) == len(set(ids))
+    assert set(page.xpath("//@aria-labelledby")) <= set(ids)
+    for table in page.xpath("//table"):
+        assert table.xpath("string(caption)").strip()
+        assert all(cell.get("scope") == "col" for cell in table.xpath("thead//th"))
+        assert all(row[0].get("scope") == "row" for row in table.find("tbody"))
+    for drawing in page.xpath("//svg[not(ancestor::svg)]"):
+        assert drawing.get("role") == "img"
+        assert re.search(r"\d", drawing.get("aria-label"))
+    assert not page.xpath("//svg[ancestor::svg][not(@aria-hidden)]")
+
+
+def test_page_needs_nothing_but_the_files_beside_it(results: Path, page: Any) -> None:
+    ids = set(page.xpath("//@id"))
+    links = [unquote(address) for address in page.xpath("//a/@href")]
+    for link in links:
+        assert link[1:] in ids if link.startswith("#") else (results / link).stat().st_size > 0
+    figures = {*STOPS, "dependences", "confusability", "gain"}
+    for suffix in (".csv", ".png", ".svg"):
+        assert {Path(link).name for link in links} >= {name + suffix for name in figures}
+    source = (results / "index.html").read_text()
+    assert not re.search(r"url\(|@import|(src|href)=\"(\w+:)?//", source)
+    assert "default-src 'none'" in page.xpath("//meta[@http-equiv]/@content")[0]
+
+
+# --- the figure that convinces ---
+
+
+def test_every_stop_has_a_figure_and_the_clearest_comes_first(page: Any, results: Path) -> None:
+    names = [text(heading) for heading in page.xpath("//article[figure]/h3")]
+    assert sorted(names) == sorted(STOPS)
+    clearness = []
+    for name in names:
+        table = pd.read_csv(results / f"{name}.csv")
+        ratio = (
+            table.filter(like="lasting_before.") / table.filter(like="lasting_sigma.").to_numpy()
+        )
+        clearness.append((ratio**2).mean().max())
+    assert clearness[0] == max(clearness)
+    # What was there, errors by channel, residuals: above each other on one axis of time.
+    panels = page.xpath("//article[figure][1]//g[@class='axes']/text[@class='title']")
+    first = [text(panel) for panel in panels[:8]]
+    assert [title.split()[0] for title in first] == [
+        *("Roller", "Brake", "Slip:", "Roller", "Creep", "Wheelset", "Roller", "Slip")
+    ]
+
+
+def test_curves_of_the_page_are_those_of_the_data(page: Any, results: Path) -> None:
+    name = text(page.xpath("//article[figure]/h3")[0])
+    table = pd.read_csv(results / f"{name}.csv")
+    axes = page.xpath("//article[figure][1]//g[starts-with(text, 'Creep force')]")[0]
+    low, high = float(axes.get("data-low")), float(axes.get("data-high"))
+    for style, column in (("0", "lasting_before.Fx [N]"), ("2", "lasting_after.Fx [N]")):
+        path = axes.xpath(f".//path[@class='curve style-{style}']/@d")[0]
+        x, y = steps(path).T if path.count("M") == 1 else steps(path[: path.rindex("M")]).T
+        shown = high - y * (high - low) / 4000
+        at = table["time [s]"].iloc[0] + x / 1e3
+        # Half a level of rounding in value; half a millisecond in time does not show.
+        assert_allclose(
+            shown, np.interp(at, table["time [s]"], table[column]), atol=0.6 * (high - low) / 4000
+        )
+
+
+def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(
+    results: Path,
+) -> None:
+    for name in STOPS:
+        table = pd.read_csv(results / f"{name}.csv")
+        band = 2.0 * table["lasting_sigma.Fx [N]"]
+        # 95 % of white noise; the load cell rings, and neighbouring means are not independent.
+        assert (abs(table["lasting_after.Fx [N]"]) < band).mean() > 0.8
+        assert (abs(table["lasting_before.Fx [N]"]) < band).mean() < 0.3
+
+
+def residuals(gap: bool) -> Residuals:
+    """A stop of 40 s with white noise, an error in its second half, and perhaps a slide."""
+    rng = np.random.default_rng(1)
+    time = np.arange(800) * 0.05
+    kept = (time < 10.0) | (time > 15.0) if gap else time >= 0.0
+    after = rng.normal(size=(kept.sum(), 3))
+    step = np.where(time[kept] > 12.0, 10.0, 0.0)
+    return Residuals(
+        name="stop",
+        time=time,
+        values={"slip": np.where(kept, 1e-3, np.nan)},
+        block_time=time[kept],
+        before=after + step[:, None],
+        after=after,
+        sigma=np.ones_like(after),
+    )
+
+
+def test_noise_alone_leaves_one_and_a_lasting_error_stands_out() -> None:
+    before, after = lasting(residuals(gap=False), LASTING).noises()
+    # 80 independent means: one standard deviation of their rms is 8 %.
+    assert_allclose(after, 1.0, atol=0.3)
+    # Ten sigma of a block, in means over ten blocks, for 70 % of the time.
+    assert_allclose(before, 10.0 * np.sqrt(10.0 * 0.7), rtol=0.05)
+
+
+def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(
+    dry_case: Case,
+) -> None:
+    one = residuals(gap=False)
+    turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
+    one = dataclasses.replace(one, before=turning)
+    assert (lasting(one, LASTING).noises()[0] < 1.5).all()
+    assert (lasting(one, FAST).noises()[0] > 4.5).all()
+    assert "means over 0.05 s" in stop_figure(one, dry_case, "with X", FAST).finding
+
+
+def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case: Case) -> None:
+    one = residuals(gap=True)
+    quiet, loud = one.block_time < 10.0, one.block_time > 15.0
+    assert abs(lasting(one, LASTING).before[quiet]).max() < 3.0
+    assert lasting(one, LASTING).before[loud].min() > 7.0
+    figure = stop_figure(one, dry_case, "with X", LASTING)
+    inside = (figure.time > 10.0) & (figure.time < 15.0)
+    for panel in figure.panels:
+        for curve in panel.curves:
+            assert np.isnan(curve.values[inside]).all()
+            assert np.isfinite(curve.values[~inside]).all()
+
+
+# --- evidence in tables ---
+
+
+def test_dependences_are_those_of_the_summary_before_and_after(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    table = data(page.get_element_by_id("dependence-table"))
+    for one in summary["dependences"]:
+        assert float(table.at[one["influence"], f"{one['channel']}, nominal"]) == one["before"]
+        assert float(table.at[one["influence"], f"{one['channel']}, extended"]) == one["after"]
+    assert table.size == 2 * len(summary["dependences"])
+
+
+def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    (cause,) = summary["causes"]
+    article = section(page, "causes").xpath("article")[0]
+    assert cause["effect"] in text(article.find("h3"))
+    for name, one in cause["parameters"].items():
+        row = article.xpath(f".//tr[th='{name}']")[0]
+        value, low, high = (float(cell.get("data-value")) for cell in row[1:4])
+        assert (value, low, high) == (one["value"], one["low"], one["high"])
+        assert text(row[4]) == one["unit"]
+    assert cause["confusable_with"]
+    assert cause["confusable_with"][0] in text(article)
+    assert cause["separation"] in text(article)
+    assert f"{100 * cause['explained']:.1f} %" in text(article)
+
+
+def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str, Any]) -> None:
+    table = data(page.get_element_by_id("candidate-table"))
+    falls = table["fall, held out"].astype(float)
+    assert sorted(table.index) == sorted({one["effect"] for one in summary["candidates"]})
+    assert falls.is_monotonic_decreasing
+    for name, fall in falls.items():
+        best = max(o["held_out"] for o in summary["candidates"] if o["effect"] == name)
+        assert fall == best
+    outcomes = {text(row[0]): text(row[-1]) for row in page.xpath("//*[@id='candidate-table']//tr")}
+    (cause,) = summary["causes"]
+    (twin,) = TWINS - {cause["effect"]}
+    assert (outcomes[cause["effect"]], outcomes[twin]) == ("cause", "as good as the cause")
+    assert outcomes["BrakeFade"] == ""
+    for effect, reason in summary["not_visible"].items():
+        assert f"{effect}, {reason}" in text(section(page, "causes"))
+
+
+def test_matrix_frames_what_was_found_and_reads_out_its_twin(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    (matrix,) = page.find_class("matrix")
+    names = summary["confusability"]["effects"]
+    assert len(matrix.xpath("./rect")) == len(names) ** 2
+    frame = matrix.xpath("./path[@class='mark']/@d")[0]
+    framed = matrix.xpath("./text[@class='found' and @y]")[0]
+    assert text(framed).endswith(summary["causes"][0]["effect"])
+    assert abs(float(framed.get("y")) - float(frame.split()[1].split("H")[0])) < 24.0
+    for told in (matrix.get("aria-label"), text(section(page, "confusability"))):
+        assert re.search(r"ApexOffset and FxOffset|FxOffset and ApexOffset", told)
+
+
+def test_gain_is_drawn_for_every_stop_and_for_all(page: Any, summary: dict[str, Any]) -> None:
+    (dots,) = page.find_class("dots")
+    gain = summary["gain"]
+    names = [text(label) for label in dots.xpath("./text[@text-anchor='end']")]
+    assert sorted(names) == sorted([*gain["stops"], "all stops"])
+    values = [{**gain["stops"], "all stops": gain}[name] for name in names]
+    circles = [float(x) for x in dots.xpath("./circle/@cx")]
+    diamonds = [
+        float(re.match(r"M([\d.]+)", d)[1])
+        for d in dots.xpath("./path[contains(@class, 'diamond')]/@d")
+    ]
+    # One scale for both: position is linear in the logarithm.
+    logs = np.log([*(one["before"] for one in values), *(one["after"] for one in values)])
+    slope, start = np.polyfit(logs, [*circles, *diamonds], 1)
+    assert slope > 0.0
+    assert_allclose([*circles, *diamonds], start + slope * logs, atol=0.1)  # [px] as rounded
+    shown = text(section(page, "gain"))
+    for number in (gain["before"], gain["after"], gain["low"], gain["high"]):
+        assert f"{number:.2f}" in shown
+
+
+def test_extended_model_is_shown_as_written_with_the_next_command(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    shown = section(page, "model").xpath(".//pre/code")
+    assert shown[0].text_content().strip() == Path(summary["model"]["modelica"]).read_text().strip()
+    assert "redeclare" in shown[0].text_content()
+    assert f"diagnose NEW_STOPS --model {summary['model']['fmu']}" in shown[1].text_content()
+    assert "simulate" not in shown[1].text_content()
+
+
+def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str, Any]) -> None:
+    entries = section(page, "baseline").xpath(".//dt")
+    shown = {text(entry): text(entry.getnext()).split()[0] for entry in entries}
+    assert shown == {name: f"{one['value']:.4g}" for name, one in summary["levels"].items()}
+    aside = data(page.get_element_by_id("aside-table"))
+    for name, counts in summary["set_aside"].items():
+        assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
+
+
+# --- other verdicts ---
+
+
+def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
+    headline = text(forceless.find_class("headline")[0])
+    assert headline.startswith("Nothing.")
+    assert "Without a measured force" in headline
+    assert any("Fx was not measured" in text(one) for one in forceless.find_class("warning"))
+    titles = [text(title) for title in forceless.xpath("//text[@class='title']")]
+    assert not [title for title in titles if "force" in title or "balance" in title]
+
+
+def test_where_nothing_is_missing_nothing_is_claimed(forceless: Any) -> None:
+    assert not forceless.find_class("dots")
+    assert not forceless.xpath("//section[@aria-labelledby='model']")
+    assert not forceless.xpath("//a[@href='#model']")
+    assert "Nothing was extended" in text(section(forceless, "gain"))
+    assert not forceless.xpath("//path[contains(@class, 'style-2')]")
+    assert text(section(forceless, "causes")).startswith("Causes, strongest first None.")
+
+
+@pytest.fixture
+def figure(dry_case: Case) -> CaseFigure:
+    return stop_figure(residuals(gap=False), dry_case, "with FxOffset", LASTING)
+
+
+def written(summary: dict[str, Any], figures: list[CaseFigure], folder: Path) -> Any:
+    """The page of a summary that was changed, without an extended model."""
+    changed = {**summary, "model": dict.fromkeys(summary["model"])}
+    return lxml.html.fromstring(write_diagnosis_page(changed, figures, folder).read_bytes())
+
+
+def test_the_unexplained_is_no_cause(
+    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+) -> None:
+    unexplained = {
+        **summary,
+        "verdict": "unexplained",
+        "causes": [],
+        "gain": None,
+        "partial": ["BrakeFade"],
+        "sentence": "Something is missing.",
+    }
+    page = written(unexplained, [figure], tmp_path)
+    assert text(page.find_class("headline")[0]) == "Unexplained. Something is missing."
+    causes = section(page, "causes")
+    assert not causes.xpath("article")
+    assert "BrakeFade would explain a part, which is no proof" in text(causes)
+    assert not page.xpath("//*[@class='mark']")
+    assert "is not explained" in text(section(page, "shown"))
+
+
+def test_a_deviation_beyond_its_tolerance_is_flagged(
+    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+) -> None:
+    deviations = {"a": {"muDC": 2.6, "JR": -2.4}, "b": {"muDC": -2.6, "JR": 0.0}}
+    page = written({**summary, "deviations": deviations}, [figure], tmp_path)
+    table = page.get_element_by_id("deviation-table")
+    assert [text(cell) for cell in table.find_class("warning")] == ["⚠ +2.60", "⚠ -2.60"]
+
+
+def test_observers_are_compared_at_every_stop_that_could_be_judged(
+    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+) -> None:
+    errors = {name: {"before": 0.021, "after": 0.004} for name in STOPS}
+    errors["03_dry_120_3.6"] = {"before": 0.03, "after": None}
+    page = written({**summary, "observers": {"ekf": errors}}, [figure], tmp_path)
+    table = page.get_element_by_id("observer-table")
+    assert [[text(cell) for cell in row] for row in table.find("tbody")] == [
+        ["01_dry_80_1.5", "2.10", "0.40"],
+        ["03_dry_120_3.6", "3.00", "n/a"],
+        ["05_dry_120_2.7_rev", "2.10", "0.40"],
+    ]
+    without = written({**summary, "observers": {}}, [figure], tmp_path)
+    assert not without.xpath("//*[@id='observer-table']")
+
+
+def test_pages_of_six_and_fourteen_long_stops_stay_small(
+    summary: dict[str, Any], dry_case: Case, tmp_path: Path
+) -> None:
+    """Residuals of noise, of every kind, are the longest that curves can be."""
+    one = residuals(gap=True)
+    rng = np.random.default_rng(2)
+    values = {name: rng.normal(size=one.time.size) for name in ("wheelset", "roller", "slip")}
+    long = dataclasses.replace(one, values=values)
+    for count, most in ((6, 3e6), (14, 3e6)):
+        figures = [
+            dataclasses.replace(stop_figure(long, dry_case, "with X", LASTING), name=f"stop_{k}")
+            for k in range(count)
+        ]
+        written(summary, figures, tmp_path)
+        assert (tmp_path / "index.html").stat().st_size < most
+
+
+# --- in a browser ---
+
+PROBE = """
+const plots = [...document.querySelectorAll(".plot")];
+told.panels = plots.map((plot) =>
+  [...plot.querySelectorAll(".panel")].map((panel) => panel.getBoundingClientRect().height));
+told.curves = [...document.querySelectorAll(".curve")].map((path) => path.getTotalLength());
+told.sizes = [".matrix", ".dots"].map((name) =>
+  document.querySelector(name).getBoundingClientRect().height);
+const table = document.getElementById("candidate-table");
+const order = () => [...table.tBodies[0].rows].map((row) => row.cells[0].textContent.trim());
+const press = (column) => {
+  table.tHead.rows[0].cells[column].querySelector("button").click();
+  return order();
+};
+told.orders = [order(), press(0), press(4), press(4)];
+const tools = document.querySelectorAll(".tools");
+told.tools = tools.length;
+const view = () => plots[0].querySelector(".panel").getAttribute("viewBox").split(" ").map(Number);
+told.whole = view();
+tools[0].children[0].click();
+told.zoomed = view();
+const cells = [...document.querySelectorAll("#dependence-table .heat")];
+told.heat = cells.map((cell) => getComputedStyle(cell).backgroundColor);
+told.shares = cells.map((cell) => Number(cell.dataset.value));
+told.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+"""
+
+
+@pytest.fixture(scope="session")
+def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict[str, Any]:
+    """What a script that uses the page finds."""
+    return probe(results / "index.html", PROBE)
+
+
+def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any]) -> None:
+    assert browser["errors"] == []
+    assert [len(heights) for heights in browser["panels"]] == [8] * len(STOPS)
+    assert min(min(heights) for heights in browser["panels"]) > 35  # [px] that can be read
+    assert min(browser["curves"]) > 0
+    assert min(browser["sizes"]) > 100
+    assert browser["overflow"] <= 0
+
+
+def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, Any]) -> None:
+    best: dict[str, float] = {}
+    for one in summary["candidates"]:
+        best.setdefault(one["effect"], one["gain"])
+    first, by_name, down, up = browser["orders"]
+    assert first == list(best)
+    assert by_name == sorted(best)
+    assert down == sorted(best, key=lambda name: -best[name])
+    assert up == down[::-1]
+
+
+def test_only_stops_zoom(browser: dict[str, Any]) -> None:
+    assert browser["tools"] == len(STOPS)
+    assert browser["zoomed"][2] == 0.5 * browser["whole"][2]
+
+
+def test_heat_follows_the_share(browser: dict[str, Any]) -> None:
+    """Cells of equal share have one colour, others another."""
+    alpha = [
+        float(re.search(r"([\d.]+)\)$", colour)[1]) if colour.endswith(")") else 0.0
+        for colour in browser["heat"]
+    ]
+    assert_allclose(alpha, 0.45 * np.array(browser["shares"]), atol=0.01)

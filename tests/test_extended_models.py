@@ -1,0 +1,177 @@
+"""Observers on models with an effect plugged in: other states, another radius."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.case import Case, Conditions, read_case
+from workbench.cosim import Outcome, observe
+from workbench.fmu import FMU
+from workbench.objective import Weights, score
+from workbench.observers import (
+    DisturbanceObserver,
+    Estimator,
+    ExtendedKalmanFilter,
+    UnscentedKalmanFilter,
+    stationary_gains,
+)
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.diagnosis.extension import build
+
+RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
+WORN = 0.45  # m, wheel radius of Worn
+
+EFFECTS = {
+    "Fading": "Effects.BrakeFade padFriction(fade=1e-3)",
+    "Lagging": "Effects.CylinderLag cylinder(lag=0.1)",
+    "Worn": "Effects.WheelRadius wheelRadius(delta=-0.01)",
+}
+FADING_STATES = ("omegaW", "omegaR", "padFriction.T")
+
+
+@pytest.fixture(scope="module")
+def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FMU]]:
+    """The minimal model with one effect each."""
+    folder = tmp_path_factory.mktemp("extended")
+    models = {}
+    for name, effect in EFFECTS.items():
+        text = (
+            f"model {name}\n"
+            f"  extends WheelsetRig.MinimalObserver(redeclare WheelsetRig.{effect});\n"
+            f"end {name};\n"
+        )
+        path = folder / f"{name}.fmu"
+        package = root / "modelica" / "WheelsetRig" / "package.mo"
+        build(package, name, text, path, every_platform=False)
+        models[name] = FMU(path)
+    yield models
+    for fmu in models.values():
+        fmu.close()
+
+
+@pytest.fixture(scope="module")
+def fading_stop(extended: dict[str, FMU]) -> tuple[Case, float]:
+    """A stop from 120 km/h whose pads fade, without noise, and the disc temperature at its end."""
+    fmu = extended["Fading"]
+    assert fmu.states == FADING_STATES
+    fmu.start({"omegaR": 120 / 3.6 / RR, "omegaW": 120 / 3.6 / 0.46})
+    inputs = fmu.variables(["pB", "tauR"])
+    outputs = fmu.variables(["omegaW", "omegaR", "Fx"])
+    rows = []
+    for k in range(24_000):
+        t = 0.001 * k
+        pB = 2.7e5 * (1 - np.exp(-max(0.0, t - 1.0) / 0.5))
+        # The drive imitates a train: it supplies what the roller lacks in inertia.
+        tauR = (TRAIN_INERTIA - JR) / TRAIN_INERTIA * RR * fmu.get(outputs)[2]
+        fmu.set(inputs, np.array([pB, tauR]))
+        fmu.step(0.001)
+        if k % 5 == 0:
+            rows.append([t, pB, tauR, *fmu.get(outputs)])
+    t, pB, tauR, omegaW, omegaR, Fx = np.array(rows).T
+    case = Case(
+        name="fading",
+        title="fading",
+        conditions=Conditions(120 / 3.6, 2.7e5, "dry", ("dry",) * 3, 1),
+        time=t,
+        pB=pB,
+        tauR=tauR,
+        omegaW=omegaW,
+        omegaR=omegaR,
+        Fx=Fx,
+        source=Path("fading"),
+    )
+    return case, float(fmu.get_states()[2])
+
+
+def force_error(case: Case, estimator: Estimator) -> float:
+    """Error of Fx, rms over mean while braking."""
+    run = observe(case, estimator)
+    assert run.outcome is Outcome.OK
+    error = score(case, run, RR, Weights()).Fx_nrmse
+    assert error is not None
+    return error
+
+
+def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
+    minimal: FMU, extended: dict[str, FMU], fading_stop: tuple[Case, float]
+) -> None:
+    case, _ = fading_stop
+    without, knowing = (
+        force_error(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
+        for fmu in (minimal, extended["Fading"])
+    )
+    # Measured: 0.05 % and 0.007 %; what is left is of the step.
+    assert knowing < 0.5 * without
+
+
+def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(
+    extended: dict[str, FMU], fading_stop: tuple[Case, float]
+) -> None:
+    case, temperature = fading_stop
+    fmu = extended["Fading"]
+    observer = DisturbanceObserver(fmu, stationary_gains(fmu))
+    observer.run(case.time, case.u, case.y)
+    start = fmu.defaults["padFriction.T"]
+    assert temperature - start > 50.0
+    # Steps of 5 ms, in the order of 1e-3 of the stop.
+    assert fmu.get_states()[2] - start == pytest.approx(temperature - start, rel=1e-3)
+
+
+def test_the_effect_costs_nothing_on_a_recorded_stop(
+    minimal: FMU, extended: dict[str, FMU], root: Path
+) -> None:
+    """The recorded pads fade by 7e-4 /K instead of 1e-3."""
+    folder = root.parent / "shared" / "recordings" / "labelled" / "fade" / "04_dry_160_4.2"
+    if not folder.is_dir():
+        pytest.skip("no such recordings")
+    case = read_case(folder)
+    without, knowing = (
+        force_error(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
+        for fmu in (minimal, extended["Fading"])
+    )
+    # The observer learns the fade anyway; noise of the sensors is all of the 0.15 %.
+    assert knowing < 1.1 * without
+
+
+def test_the_operating_point_is_an_equilibrium_of_every_model(extended: dict[str, FMU]) -> None:
+    for fmu in extended.values():
+        gains = stationary_gains(fmu)
+        # Of some 100 rad/s2 that pads and creep force have; the search ends at 1e-9 m/s of slip.
+        assert abs(fmu.derivatives()[fmu.states.index("omegaW")]) < 1e-4
+        assert fmu.get(fmu.variables(["Fx"]))[0] > 5e3
+        assert np.isfinite(gains.L).all()
+        assert np.abs(gains.effect).min() > 10.0
+
+
+def test_a_cylinder_that_lags_is_full_at_the_operating_point(
+    minimal: FMU, extended: dict[str, FMU]
+) -> None:
+    expected, found = (stationary_gains(fmu) for fmu in (minimal, extended["Lagging"]))
+    assert_allclose(found.L, expected.L, rtol=1e-9)
+    assert_allclose(found.effect, expected.effect, rtol=1e-9)
+
+
+def test_discs_are_at_their_start_at_the_operating_point(extended: dict[str, FMU]) -> None:
+    fmu = extended["Fading"]
+    stationary_gains(fmu)
+    assert fmu.get_states()[2] == fmu.defaults["padFriction.T"]
+
+
+@pytest.mark.parametrize("method", [ExtendedKalmanFilter, UnscentedKalmanFilter])
+def test_a_worn_wheel_at_standstill_has_no_creep_force(
+    extended: dict[str, FMU], dry_case: Case, method: type[ExtendedKalmanFilter]
+) -> None:
+    """The radius of rolling is the model's, not the parameter rW: that would leave 7 kN."""
+    fmu = extended["Worn"]
+    case = replace(dry_case, omegaW=dry_case.omegaW * fmu.defaults["rW"] / WORN)
+    run = observe(case, method(fmu))
+    resting = case.time > case.time[-1] - 0.5
+    # 100 N is the noise of the load cell itself (80 N) with a margin for the drive's torque.
+    assert np.abs(run.signal("Fx")[resting]).max() < 100.0

@@ -1,0 +1,356 @@
+"""Power of the diagnosis: plan, verdicts on the disk, statistics, and a small run of all."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from workbench.__main__ import main
+from workbench.diagnosis import CATALOGUE
+from workbench.diagnosis.extension import build, source, variables
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.power import (
+    PLANTABLE,
+    Journal,
+    Judged,
+    Named,
+    Planting,
+    measure,
+    plan,
+    share,
+    summarise,
+)
+from workbench.power.planting import Group, Kind
+from workbench.power.statistics import intervals_cover, named_all, named_right
+from workbench.report.power import format_power, write_power
+from workbench.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
+PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+IDENTITY = {"seed": 1}
+
+
+def short(name: str, speed: float) -> Scenario:
+    """A standard stop from a lower speed [km/h]."""
+    usual = SCENARIOS[name]
+    conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
+    return dataclasses.replace(usual, conditions=conditions)
+
+
+STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
+
+
+def said(gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = "") -> Judged:
+    """A verdict on a set: causes, or other words, or nothing."""
+    verdict = other or ("found" if causes else "nothing")
+    return Judged(Planting(kind, 1, 4.0, gains), verdict, causes, None, None, 1.0)
+
+
+def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> Named:
+    return Named(effect, intervals, twins)
+
+
+@pytest.fixture(scope="module")
+def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("fmu") / "AllEffects.fmu"
+    build(
+        PACKAGE,
+        "AllEffects",
+        source("AllEffects", CATALOGUE, {}, {}, ""),
+        path,
+        every_platform=False,
+    )
+    return path
+
+
+# --- plan ---
+
+
+def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside() -> None:
+    assert sorted(one.effect for one in PLANTABLE if one.effect) == sorted(
+        effect.name for effect in CATALOGUE
+    )
+    faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
+    rig = {field.name for field in dataclasses.fields(Effects)} - faults_of_the_acquisition
+    assert {one.name for one in PLANTABLE} == rig
+
+
+def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:
+    """That is what lets all their sizes share one simulation."""
+
+    def truth(names: list[str]) -> np.ndarray:
+        effects = plant(CONSTANT_PADS, [f"{name}=1e-3" for name in names])
+        stop = simulate(short("03_dry_120_3.6", 15.0), 1, effects, REFERENCE)
+        return np.array(list(stop.truth.values()))[:, :5000]
+
+    none = truth([])
+    assert np.array_equal(truth([one.name for one in PLANTABLE if one.sensed]), none)
+    assert not np.array_equal(truth(["wheel_radius"]), none)
+
+
+def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Path) -> None:
+    """Beyond them no fit could find it. A size that cannot be negative is never planted so."""
+    with FMU(all_effects) as fmu:
+        bounds = {v.name: (v.minimum, v.maximum) for v in fmu.description.variables}
+    for effect in CATALOGUE:
+        one = next(one for one in PLANTABLE if one.effect == effect.name)
+        low, high = bounds[variables(effect, effect.size)[0]]
+        assert low is not None
+        assert high is not None
+        if not effect.hidden:
+            assert 4.0 * one.size <= high, effect.name
+            assert not one.signed or -4.0 * one.size >= low, effect.name
+        assert set(one.shapes) == {name for name, _ in effect.shapes}
+
+
+def test_longer_plan_holds_the_shorter_one() -> None:
+    """So that a run can be resumed with more sets."""
+
+    def options(groups: list[Group]) -> set[str]:
+        return {one.options for group in groups for one in group}
+
+    shorter, longer = plan(2, [1.0, 4.0], 1, 2, 1), plan(5, [0.5, 1.0, 4.0], 2, 3, 1)
+    assert options(shorter) < options(longer)
+    assert options(shorter).isdisjoint(options(plan(2, [1.0, 4.0], 1, 2, 2)))
+
+
+def test_each_simulation_has_tolerances_of_its_own() -> None:
+    groups = plan(50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
+    seeds = [group[0].seed for group in groups]
+    assert len(set(seeds)) == len(seeds)
+    assert all(one.seed == group[0].seed for group in groups for one in group)
+
+
+def test_plan_that_is_cut_short_has_something_of_each_kind() -> None:
+    groups = plan(50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
+    assert {group[0].kind for group in groups[:20]} == {"clean", "single", "pair", "outside"}
+
+
+def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for() -> None:
+    signs: dict[str, set[float]] = {}
+    for one, *_ in plan(1, [3.0], 12, 1, 1):
+        if one.kind == "single":
+            ((name, gain),) = one.gains.items()
+            plantable = next(p for p in PLANTABLE if p.name == name)
+            assert abs(gain) == pytest.approx(3.0 * plantable.size, rel=1e-5)  # six digits
+            signs.setdefault(name, set()).add(np.sign(gain))
+    assert signs["fx_gain"] == {-1.0, 1.0}
+    assert signs["cylinder_lag"] == signs["water_film"] == signs["pole_ring"] == {1.0}
+
+
+# --- statistics ---
+
+
+@pytest.mark.parametrize(("hits", "of"), [(0, 50), (1, 50), (7, 12), (12, 12)])
+def test_interval_of_a_share_leaves_2_5_percent_on_either_side(hits: int, of: int) -> None:
+    """Definition of Clopper and Pearson (1934), by the binomial distribution itself."""
+    found = share([True] * hits + [False] * (of - hits))
+    assert found["share"] == hits / of
+    # To rounding: both sides are computed by inverse functions of double precision.
+    if hits:
+        assert binom.sf(hits - 1, of, found["low"]) == pytest.approx(0.025, rel=1e-9)
+    if hits < of:
+        assert binom.cdf(hits, of, found["high"]) == pytest.approx(0.025, rel=1e-9)
+    assert (found["low"] == 0.0) == (hits == 0)
+    assert (found["high"] == 1.0) == (hits == of)
+
+
+def test_share_of_no_trials_is_unknown() -> None:
+    found = share([])
+    assert (found["share"], found["low"], found["high"]) == (None, 0.0, 1.0)
+
+
+def test_right_name_is_the_first_one_or_in_its_group() -> None:
+    planted = {"fx_gain": 0.008}
+    assert named_right(said(planted, named("FxGain")))
+    assert named_right(said(planted, named("DriveTorqueGain", "FxGain")))
+    assert not named_right(said(planted, named("BrakeFade"), named("FxGain")))
+    assert not named_right(said(planted))
+    assert not named_right(said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"))
+
+
+def test_pair_is_found_if_each_effect_has_a_cause_of_its_own() -> None:
+    planted = {"fx_gain": 0.008, "torque_gain": 0.008}
+    both = named("FxGain", "DriveTorqueGain")
+    assert named_all(said(planted, named("DriveTorqueGain"), named("BrakeFade"), named("FxGain")))
+    assert not named_all(said(planted, both))
+    assert not named_all(said(planted, both, named("BrakeFade")))
+
+
+def test_intervals_are_judged_by_the_law_of_the_rig() -> None:
+    near, far = (2.1, 1.9, 2.3), (1.0, 0.9, 1.1)
+    assert intervals_cover(
+        said({"bedding_in": -0.04}, named("BeddingIn", loss=(-0.04, -0.05, -0.03), tau=far))
+    ) == [True, False]
+    # The phase of an amplitude is free in each stop, so that its sign means nothing.
+    ring = named("PoleRingEccentricity", amplitude=near)
+    assert intervals_cover(said({"pole_ring": -2.0}, ring)) == [True]
+    # A twin has a size of its own, which is no claim on what was planted.
+    assert (
+        intervals_cover(said({"fx_gain": 1.0}, named("DriveTorqueGain", "FxGain", gain=near))) == []
+    )
+
+
+def test_summary_counts_what_was_said(tmp_path: Path) -> None:
+    results = [
+        said({}, kind="clean"),
+        said({}, kind="clean", other="unexplained"),
+        said({"fx_gain": 0.008}, named("DriveTorqueGain", "FxGain")),
+        said({"fade": 1e-4}, named("BrakeFade", fade=(1e-4, 9e-5, 1.1e-4)), named("FxGain")),
+        said({"fade": 1e-4}, named("WaterFilm")),
+        said({"wheel_inertia": 0.8}),
+        said({"fx_gain": 0.008, "fade": 1e-4}, named("BrakeFade"), named("FxGain"), kind="pair"),
+        said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"),
+        said({"friction_step": 0.04}, kind="outside", other="unexplained"),
+        said({"drive_beat": 0.02}, kind="outside", other="failed"),
+    ]
+    found = summarise(results)
+    shares = ("false_alarms", "right_first", "right_alone", "unexplained", "coverage")
+    assert {key: (found[key]["hits"], found[key]["of"]) for key in shares} == {
+        "false_alarms": (1, 2),
+        "right_first": (2, 3),  # the inertia cannot be seen, and is no miss
+        "right_alone": (1, 3),
+        "unexplained": (1, 3),
+        "coverage": (1, 1),
+    }
+    assert [found["pairs"][key]["of"] for key in ("both", "both_seen_alone")] == [1, 0]
+    assert found["outside"]["friction_step"]["verdicts"] == {"4": {"found": 1, "unexplained": 1}}
+    assert found["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
+    assert [one["said"] for one in found["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
+    assert len(found["failed"]) == 1
+    write_power(found, {}, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "power.json",
+        *(
+            f"{name}.{kind}"
+            for name in ("power", "confusion", "coverage")
+            for kind in ("png", "svg")
+        ),
+    }
+    assert "BrakeFade" in format_power(found)
+
+
+@pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
+def test_run_that_ended_early_is_reported(results: list[Judged], tmp_path: Path) -> None:
+    found = summarise(results)
+    write_power(found, {}, tmp_path)
+    assert f"{len(results)} sets" in format_power(found)
+
+
+# --- verdicts on the disk ---
+
+
+def test_line_that_a_kill_cut_off_is_forgotten(tmp_path: Path) -> None:
+    path = tmp_path / "sets.jsonl"
+    first, second = (
+        said({"fx_gain": 0.1}, named("FxGain", "ApexOffset", gain=(0.1, 0.0, 0.2))),
+        said({}),
+    )
+    journal = Journal(path, IDENTITY, resume=False)
+    journal.append(first)
+    journal.append(second)
+    path.write_text(path.read_text()[:-5])
+    journal = Journal(path, IDENTITY, resume=True)
+    assert journal.results == [first]
+    journal.append(second)
+    assert Journal(path, IDENTITY, resume=True).results == [first, second]
+
+
+def test_verdicts_of_another_run_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "sets.jsonl"
+    Journal(path, IDENTITY, resume=False).append(said({}))
+    with pytest.raises(InputError, match=r"another run \(other: seed\)"):
+        Journal(path, {"seed": 2}, resume=True)
+    assert len(Journal(path, IDENTITY, resume=True).results) == 1
+    path.write_text("no verdicts\n")
+    with pytest.raises(InputError, match="without --resume"):
+        Journal(path, IDENTITY, resume=True)
+
+
+# --- all of it ---
+
+_GROUPS = [
+    (Planting("clean", 11, 0.0, {}),),
+    tuple(Planting("single", 12, x, {"fx_gain": 0.002 * x}) for x in (8.0, 0.25)),
+]
+
+
+def run(out: Path, report: Callable[[str], None]) -> tuple[list[Judged], bool]:
+    return measure(
+        _GROUPS, STOPS, REFERENCE, PACKAGE, out, seed=1, workers=1, resume=True, report=report
+    )
+
+
+def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -> None:
+    """Two short stops: a load cell's gain of 1.6 % is plain, one of 0.05 % is not worth a word."""
+    script = (
+        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); import test_power;"
+        "test_power.run(Path(sys.argv[2]), lambda line: print(line, flush=True))"
+    )
+    command = [sys.executable, "-c", script, str(ROOT / "tests"), str(tmp_path)]
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, start_new_session=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        assert "clean" in process.stdout.readline()
+        # The next set is simulated in a worker, then diagnosed in a process of the worker's own.
+        simulating = len(_living(process.pid))
+        assert _comes_true(lambda: len(_living(process.pid)) > simulating)
+        time.sleep(3.0)  # while it starts, it would end by itself
+        process.kill()
+    assert _comes_true(lambda: not _living(process.pid))
+
+    lines: list[str] = []
+    results, interrupted = run(tmp_path, lines.append)
+    assert not interrupted
+    assert len(lines) == 2
+    assert lines[0].startswith("[   1/2] fx_gain=0.016")
+    assert [one.verdict for one in results] == ["nothing", "found", "nothing"]
+    assert named_right(results[1])
+    assert summarise(results)["false_alarms"]["hits"] == 0
+
+
+def _comes_true(condition: Callable[[], bool]) -> bool:
+    """Wait a minute at most, which a machine that has other work to do may need."""
+    end = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return condition()
+
+
+def _living(session: int) -> list[int]:
+    """Processes of a session that are not zombies."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            state = (entry / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue  # it ended meanwhile
+        if int(state[3]) == session and state[0] != "Z":
+            found.append(int(entry.name))
+    return found
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--sizes", "0"], ["--clean", "-1"], ["--case", "16_nowhere"]]
+)
+def test_command_refuses_what_makes_no_sense(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        status = main(["power", "--out", str(tmp_path), *arguments])
+    except SystemExit as refused:
+        status = int(refused.code or 0)
+    assert status == 2
+    assert arguments[0] in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())

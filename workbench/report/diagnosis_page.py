@@ -1,0 +1,163 @@
+"""The page of `diagnose`: verdict, the figure that convinces, causes, twins, gain, the new model.
+
+Numbers come from the summary, curves from the figures; what is here orders and places them.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.report.diagnosis_figures import EXTENDED, NOMINAL
+from workbench.report.drawing import drawing
+from workbench.report.figures import CaseFigure
+from workbench.report.results import _write
+from workbench.report.templates import environment
+
+_BLOCKS = 900  # of a curve, two points each; errors have one value in 50 ms
+_FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
+_SIMILAR = 0.7  # cosine from which on a pair is worth a word
+_PAIRS = 8  # that are put in words
+_CLEAR = 0.05  # share of variance that is a dependence worth a word
+_READ = 4  # of them that are put in words
+_CELL, _NAMES = 24, 205  # of the matrix of similarities, room for names [px]
+_DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of the gain [px]
+
+
+def write_diagnosis_page(
+    summary: Mapping[str, Any], figures: Sequence[CaseFigure], folder: Path
+) -> Path:
+    """Write the page into the folder, beside the files of each figure; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to summary.json.
+    figures : one for each stop, the one that shows most first.
+    """
+    modelica = summary["model"]["modelica"]
+    text = (
+        environment()
+        .get_template("diagnosis.html")
+        .render(
+            summary=summary,
+            drawings=[drawing(figure, _BLOCKS) for figure in figures],
+            found=[cause["effect"] for cause in summary["causes"]],
+            dependences=_dependences(summary["dependences"]),
+            channels=list(summary["lasting_errors"]),
+            candidates=_candidates(summary),
+            matrix=_matrix(summary),
+            pairs=_pairs(summary["confusability"]),
+            dots=None if summary["gain"] is None else _dots(summary["gain"]),
+            styles={"nominal": NOMINAL, "extended": EXTENDED},
+            flagged=_FLAGGED,
+            source=None if modelica is None else Path(modelica).read_text(),
+            # What is written into the folder is linked from there.
+            files={
+                key: Path(summary["model"][key]).relative_to(folder).as_posix()
+                for key in ("modelica", "fmu")
+                if summary["model"][key] is not None
+            },
+        )
+    )
+    path = folder / "index.html"
+    _write(path, text)
+    return path
+
+
+def _dependences(table: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Shares by influence and channel, the strongest influence first, and their reading."""
+    shares: dict[str, dict[str, Mapping[str, Any]]] = {}
+    for one in sorted(table, key=lambda one: -max(one["before"], one["after"])):
+        shares.setdefault(one["influence"], {})[one["channel"]] = one
+    texts = {}
+    for key in ("before", "after"):
+        clear = sorted((one for one in table if one[key] > _CLEAR), key=lambda one: -one[key])
+        texts[key] = [
+            f"{one['channel']} with {one['influence']}, {100 * one[key]:.0f} %"
+            for one in clear[:_READ]
+        ]
+    return {"shares": shares, **texts}
+
+
+def _candidates(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The best variant of each effect, best first, and what became of it."""
+    twins = {twin for cause in summary["causes"] for twin in cause["confusable_with"]}
+    standing = {
+        **dict.fromkeys(twins, "as good as the cause"),
+        **dict.fromkeys(summary["partial"], "explains a part"),
+        **{cause["effect"]: "cause" for cause in summary["causes"]},
+    }
+    best: dict[str, dict[str, Any]] = {}
+    for one in summary["candidates"]:
+        if one["effect"] not in best:
+            best[one["effect"]] = {**one, "standing": standing.get(one["effect"], "")}
+    return list(best.values())
+
+
+def _matrix(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Cells of the matrix of similarities, in pixels."""
+    names = summary["confusability"]["effects"]
+    cosines = np.array(summary["confusability"]["cosines"]).reshape(len(names), len(names))
+    rows = [
+        {
+            "name": name,
+            "y": _NAMES + _CELL * i,
+            "cells": [
+                {
+                    "x": _NAMES + _CELL * j,
+                    "cosine": float(cosine),
+                    "text": f"{100 * cosine:.0f}" if cosine >= _SIMILAR else "",
+                }
+                for j, cosine in enumerate(cosines[i])
+            ],
+        }
+        for i, name in enumerate(names)
+    ]
+    return {"rows": rows, "cell": _CELL, "left": _NAMES, "size": _NAMES + _CELL * len(names) + 2}
+
+
+def _pairs(confusability: Mapping[str, Any]) -> list[tuple[str, str, float]]:
+    """The most similar pairs."""
+    names, cosines = confusability["effects"], confusability["cosines"]
+    pairs = [
+        (names[i], names[j], float(cosines[i][j]))
+        for i in range(len(names))
+        for j in range(i)
+        if cosines[i][j] >= _SIMILAR
+    ]
+    return sorted(pairs, key=lambda pair: -pair[2])[:_PAIRS]
+
+
+def _dots(gain: Mapping[str, Any]) -> dict[str, Any]:
+    """Pairs of dots on a logarithmic axis, in pixels: the worst stop first, then all of them."""
+    stops = sorted(gain["stops"].items(), key=lambda item: -item[1]["before"])
+    values = [1.0, gain["low"], gain["high"], gain["before"], gain["after"]]
+    values += [one[key] for _, one in stops for key in ("before", "after")]
+    low, high = np.log(min(values) / 1.15), np.log(max(values) * 1.15)
+    left, width, row, top = _DOTS["left"], _DOTS["width"], _DOTS["row"], _DOTS["top"]
+
+    def at(value: float) -> float:
+        return float(left + width * (np.log(value) - low) / (high - low))
+
+    rows = [
+        {
+            "name": name,
+            "y": top + row * (k + 0.5),
+            "before": at(one["before"]),
+            "after": at(one["after"]),
+        }
+        for k, (name, one) in enumerate([*stops, ("all stops", gain)])
+    ]
+    powers = range(int(np.floor(low / np.log(10.0))), int(np.ceil(high / np.log(10.0))) + 1)
+    marks = [factor * 10.0**power for power in powers for factor in (1, 2, 5)]
+    return {
+        **_DOTS,
+        "stops": stops,
+        "rows": rows,
+        "interval": (at(gain["low"]), at(gain["high"])),
+        "noise": at(1.0),
+        "ticks": [(at(mark), f"{mark:g}") for mark in marks if low <= np.log(mark) <= high],
+        "bottom": top + row * len(rows),
+        "total": left + width + 40,
+    }

@@ -1,0 +1,134 @@
+"""A figure of a stop as geometry for a page, where it can be zoomed.
+
+A panel of a figure is an `svg` of its own, whose view box is time [ms] by value; zooming is a
+change of that view box.
+"""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from workbench.fmu import Vector
+from workbench.report.figures import CaseFigure, Curve, Panel
+
+_LEVELS = 4000  # units of a panel's height: 1 % of it can be zoomed to full height
+_LEFT, _WIDTH, _RIGHT = 58, 890, 12  # of the panels [px]
+_HEIGHT = 110  # of a panel of height 1 [px]
+_HEAD, _FOOT = 24, 40  # room for a panel's title, for the time axis [px]
+
+
+def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
+    """Geometry of a figure for the template, in pixels, and in the units of the panels inside.
+
+    Parameters
+    ----------
+    blocks : most per curve, each drawn by its extremes.
+    """
+    begin, end = float(figure.time[0]), float(figure.time[-1])
+    panels = []
+    top = 0
+    for panel in figure.panels:
+        height = round(_HEIGHT * panel.height)
+        top += _HEAD
+        panels.append(
+            {
+                "title": panel.title,
+                "top": top,
+                "height": height,
+                "low": panel.low,
+                "high": panel.high,
+                "ticks": [
+                    (top + height * (panel.high - value) / (panel.high - panel.low), text)
+                    for value, text in _ticks(panel.low, panel.high, max(3, height // 28))
+                ],
+                "zero": round(_LEVELS * panel.high / (panel.high - panel.low))
+                if panel.low < 0 < panel.high
+                else None,
+                "curves": [_curve(figure.time, curve, panel, blocks) for curve in panel.curves],
+            }
+        )
+        top += height
+    return {
+        "figure": figure,
+        "left": _LEFT,
+        "width": _WIDTH,
+        "total": _LEFT + _WIDTH + _RIGHT,
+        "bottom": top,
+        "height": top + _FOOT,
+        "levels": _LEVELS,
+        "begin": begin,
+        "duration": round(1e3 * (end - begin)),
+        "window": None
+        if figure.window is None
+        else [round(1e3 * (edge - begin)) for edge in figure.window],
+        "ticks": [
+            (_LEFT + _WIDTH * (value - begin) / (end - begin), text)
+            for value, text in _ticks(begin, end, 12)
+        ],
+        "panels": panels,
+    }
+
+
+def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
+    values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
+    inside = [float(value) for value in values if low <= value <= high]
+    return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]
+
+
+def _curve(time: Vector, curve: Curve, panel: Panel, blocks: int) -> dict[str, Any]:
+    """Path of a curve, and of the band of one standard deviation if it has one."""
+    milliseconds = np.rint(1e3 * (time - time[0]))
+    scale = _LEVELS / (panel.high - panel.low)
+
+    def levels(values: Vector) -> Vector:
+        # Values far outside are seen nowhere; cut, they cost fewer digits.
+        return np.clip(np.rint((panel.high - values) * scale), -_LEVELS, 2 * _LEVELS)
+
+    kept = extremes(curve.values, blocks)
+    x, y = milliseconds[kept], levels(curve.values[kept])
+    known = np.isfinite(y)
+    runs = np.split(np.arange(y.size), np.flatnonzero(np.diff(known)) + 1)
+    band = ""
+    if curve.sigma is not None:
+        kept = extremes(curve.values, blocks // 4)
+        kept = kept[np.isfinite(curve.values[kept] + curve.sigma[kept])]
+        if kept.size:
+            values, sigma, there = curve.values[kept], curve.sigma[kept], milliseconds[kept]
+            edges = np.r_[levels(values + sigma), levels(values - sigma)[::-1]]
+            band = _path(np.r_[there, there[::-1]], edges) + "z"
+    return {
+        "style": curve.style,
+        "dashed": curve.dashed,
+        "path": "".join(_path(x[run], y[run]) for run in runs if known[run[0]]),
+        "band": band,
+    }
+
+
+def extremes(values: Vector, blocks: int) -> NDArray[np.intp]:
+    """Indices of the lowest and highest value of each block, and of both ends.
+
+    A curve through them covers the same pixels as the whole curve as long as a block is no wider
+    than a pixel. A block with a NaN is a gap.
+
+    >>> extremes(np.array([0.0, 5.0, 1.0, 2.0, 2.0, 9.0, 3.0, 4.0]), 2)
+    array([0, 1, 4, 5, 7])
+    """
+    size = -(-values.size // blocks)
+    first = np.arange(0, values.size, size)
+    table = np.pad(values, (0, first.size * size - values.size), mode="edge")
+    table = table.reshape(first.size, size)
+    kept = np.r_[0, first + table.argmin(axis=1), first + table.argmax(axis=1), values.size - 1]
+    return np.unique(np.minimum(kept, values.size - 1))
+
+
+def _path(x: Vector, y: Vector) -> str:
+    """Path through points on a grid of whole numbers, in relative steps, which are short."""
+    dx, dy = np.diff(x), np.diff(y)
+    # A point on the way from one neighbour to the other adds nothing.
+    straight = (dx[:-1] * dy[1:] == dx[1:] * dy[:-1]) & (dx[:-1] * dx[1:] + dy[:-1] * dy[1:] >= 0)
+    kept = np.r_[0, np.flatnonzero(~straight) + 1, x.size - 1]
+    points = np.column_stack([x[kept], y[kept]]).astype(int)
+    steps = " ".join(map(str, np.diff(points, axis=0).ravel()))
+    return f"M{points[0, 0]} {points[0, 1]}l{steps}".replace(" -", "-")

@@ -1,0 +1,36 @@
+"""Templates of the pages, and what all of them share: one file each, readable without scripts."""
+
+import re
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from workbench.report.figures import DARK, LIGHT
+from workbench.report.results import label, percent
+
+
+def environment() -> Environment:
+    """Where the pages find templates, filters and the colours of curves."""
+    found = Environment(
+        autoescape=True,
+        loader=PackageLoader("workbench", "report"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    found.filters |= {
+        "label": label,
+        "percent": percent,
+        "anchor": _anchor,
+        "significant": _significant,
+    }
+    found.globals["colours"] = {"light": LIGHT, "dark": DARK}
+    return found
+
+
+def _anchor(name: str) -> str:
+    return re.sub(r"\s", "_", name)
+
+
+def _significant(value: object) -> str:
+    """A setting, in a column if it is a number."""
+    return f"{value:>9.4g}" if isinstance(value, (int, float)) else str(value)
