@@ -53,7 +53,7 @@ PLANTED = {
     "apex_offset": ("ApexOffset", "offset", 1e-3),
     "speed_delay": ("SpeedSignalDelay", "delay", 0.008),
     "pole_ring": ("PoleRingEccentricity", "amplitude", 1e-3),
-    "time_skew": ("LoggerTimeSkew", "skew", 0.012),
+    "time_skew": ("LoggerTimeSkew", "skew", 0.025),
 }
 # Dry stops in which pressure only rises and no wheel slides do not show these.
 HIDDEN = {"caliper_hysteresis", "adhesion_recovery", "wheel_inertia"}

@@ -30,6 +30,7 @@ WORN = 0.45  # m, wheel radius of Worn
 
 EFFECTS = {
     "Fading": "Effects.BrakeFade padFriction(fade=1e-3)",
+    "Warming": "Effects.BrakeFade padFriction(fade=0.0)",
     "Lagging": "Effects.CylinderLag cylinder(lag=0.1)",
     "Worn": "Effects.WheelRadius wheelRadius(delta=-0.01)",
 }
@@ -109,6 +110,19 @@ def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
     )
     # Measured: 0.05 % and 0.007 %; what is left is of the step.
     assert knowing < 0.5 * without
+
+
+def test_a_state_without_effect_changes_no_estimate(
+    minimal: FMU, extended: dict[str, FMU], dry_case: Case
+) -> None:
+    gains = stationary_gains(minimal)
+    recording = dry_case.time, dry_case.u, dry_case.y
+    expected, found = (
+        DisturbanceObserver(fmu, gains).run(*recording).values
+        for fmu in (minimal, extended["Warming"])
+    )
+    # Rounding only, amplified by the stiff slip.
+    assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
 def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(

@@ -318,7 +318,7 @@ def test_a_standing_wheelset_has_no_chattering_force(
     assert chattering(estimators[name], cases) == []
 
 
-@pytest.mark.parametrize("name", [name for name in OBSERVERS if name != "parameter_estimator"])
+@pytest.mark.parametrize("name", OBSERVERS)
 @pytest.mark.parametrize("case", SPRINGING_BACK)
 def test_a_wheelset_that_springs_back_has_no_chattering_force(
     estimators: dict[str, Estimator], root: Path, name: str, case: str

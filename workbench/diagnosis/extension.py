@@ -74,7 +74,7 @@ def source(
     about : one line, for the documentation.
     """
     nested: list[str] = []
-    redeclared = [f"    {parameter}={value!r}" for parameter, value in parameters.items()]
+    redeclared = [f"    {parameter}={float(value)!r}" for parameter, value in parameters.items()]
     for slot, interface in _SLOTS.items():
         chained = [effect for effect in effects if slot in effect.slots]
         if not chained:
@@ -106,7 +106,7 @@ def _composed(
         bindings = [f"{inlet}={source}" for inlet, source in before.items()]
         bindings += [f"{name}={name}" for name in slot.others]
         given = values.get(effect.name, {})
-        bindings += [f"{parameter}={value!r}" for parameter, value in given.items()]
+        bindings += [f"{parameter}={float(value)!r}" for parameter, value in given.items()]
         instance = component(effect)
         lines.append(
             f"    {LIBRARY}.{effect.package}.{effect.name} {instance}({', '.join(bindings)});"

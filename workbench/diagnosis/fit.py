@@ -29,6 +29,7 @@ _RAIL: Mapping[Surface, Mapping[str, float]] = {
 _RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
 _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
 _WORSE = 1.0  # of chi-squared, which no step is worth
+_SETTLED = 1e-3  # share of it
 _SECOND = 20  # blocks
 _FURTHEST = 3.0  # standard deviations that a tolerance may explain
 
@@ -315,7 +316,7 @@ class Fit:
             if not tried.misfit < best.misfit + _WORSE:
                 point = _between(best.point, point)
                 continue
-            settled = best.misfit - tried.misfit < _WORSE * float(tried.inflation.max())
+            settled = best.misfit - tried.misfit < max(_WORSE, _SETTLED * tried.misfit)
             best, point = tried, self._stepped(tried)
             if settled:
                 break
@@ -329,7 +330,7 @@ class Fit:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             if key in levels:
-                levels[key] += change
+                levels[key] += float(change)
             elif key in sizes:
                 sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
         locals_ = [system.local(step) for system in joint.systems]

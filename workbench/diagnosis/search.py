@@ -33,7 +33,7 @@ _NEAR = 0.4  # share of the best score from which on an effect is a rival
 _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
 _BEGUN = 2  # rounds after which a rival that is far behind is given up
 _BEHIND = 3.0  # times the chi-squared of the best
-_ROUNDS = 4  # of Gauss-Newton
+_ROUNDS = 6  # of Gauss-Newton
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,9 @@ Verdict = Literal["nothing", "found", "unexplained"]
 _QUANTILE = 1.96  # of a normal distribution, 95 %
 _TWIN = 0.98  # cosine of signatures from which on two effects are told as one
 _CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
-_CLOSE_SHARE = 0.01  # of what the effect explains: a rival may owe that to its exact form
+_CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
 _EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
+_FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 
 
@@ -207,7 +208,9 @@ def _causes(
                 continue
             parameter = effect.size if key[1] == effect.label else key[1]
             low, high = fit.bounds(effect, parameter)
-            reach = _QUANTILE * sigma[trial.joint.known.index(key)]
+            # Beside the noise: forms of laws that differ in detail, and immaterial companions.
+            form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
+            reach = float(_QUANTILE * np.hypot(sigma[trial.joint.known.index(key)], form))
             parameters[key[1]] = Interval(
                 value,
                 max(value - reach, low),
