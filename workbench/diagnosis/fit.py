@@ -31,7 +31,7 @@ _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncerta
 _WORSE = 1.0  # of chi-squared, which no step is worth
 _SETTLED = 1e-3  # share of it
 _SECOND = 20  # blocks
-_FURTHEST = 3.0  # standard deviations that a tolerance may explain
+_FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 
 _FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
 
