@@ -239,18 +239,24 @@ def _twins(
 ) -> tuple[str, ...]:
     """Effects that explain the data as well, by a full fit or by their signature."""
     found: list[str] = []
+    refuted: set[str] = set()
     for step in steps:
         winner = step.rivals[0]
         if winner.active[-1] is not effect:
             continue
         close = max(_CLOSE * winner.lasting, _CLOSE_SHARE * (step.before.misfit - winner.misfit))
-        found += [
-            rival.active[-1].name
-            for rival in step.rivals[1:]
-            if rival.misfit - winner.misfit < close
-        ]
+        for rival in step.rivals[1:]:
+            name = rival.active[-1].name
+            if rival.misfit - winner.misfit < close:
+                found.append(name)
+            else:
+                refuted.add(name)
     row = cosines[names.index(effect.name)]
-    found += [name for name, cosine in zip(names, row, strict=True) if cosine > _TWIN]
+    found += [
+        name
+        for name, cosine in zip(names, row, strict=True)
+        if cosine > _TWIN and name not in refuted
+    ]
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
 
