@@ -26,6 +26,7 @@ from workbench.fmu import Matrix, Vector
 Verdict = Literal["nothing", "found", "unexplained"]
 
 _QUANTILE = 1.96  # of a normal distribution, 95 %
+_AS_GOOD = 0.95  # share of the best score on held-out stops: with less, an effect is no twin
 _TWIN = 0.98  # cosine of signatures from which on two effects are told as one
 _CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
 _CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
@@ -251,6 +252,11 @@ def _twins(
                 found.append(name)
             else:
                 refuted.add(name)
+        able: dict[str, float] = {}
+        for score in step.scores:
+            able.setdefault(score.effect.name, float(score.held_out.sum()))
+        least = _AS_GOOD * able[effect.name]
+        refuted |= {name for name, held in able.items() if held < least}
     row = cosines[names.index(effect.name)]
     found += [
         name
