@@ -255,7 +255,8 @@ def _twins(
         able: dict[str, float] = {}
         for score in step.scores:
             able.setdefault(score.effect.name, float(score.held_out.sum()))
-        least = _AS_GOOD * able[effect.name]
+        most = able[effect.name]
+        least = min(_AS_GOOD * most, most - _CLOSE)
         refuted |= {name for name, held in able.items() if held < least}
     row = cosines[names.index(effect.name)]
     found += [
