@@ -126,7 +126,7 @@ class Fit:
         return [case.name for case in self._court.cases]
 
     def unit(self, effect: Effect, parameter: str) -> str:
-        """Unit of a parameter."""
+        """Unit of a parameter, "1" if it has none."""
         return self._court.units.get(variables(effect, parameter)[0], "1")
 
     def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:

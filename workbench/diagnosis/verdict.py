@@ -16,6 +16,7 @@ from workbench.diagnosis.search import (
     Step,
     Trial,
     fitted,
+    joined,
     lesser,
     pruned,
     search,
@@ -26,8 +27,7 @@ from workbench.fmu import Matrix, Vector
 Verdict = Literal["nothing", "found", "unexplained"]
 
 _QUANTILE = 1.96  # of a normal distribution, 95 %
-_AS_GOOD = 0.95  # share of the best score on held-out stops: with less, an effect is no twin
-_TWIN = 0.98  # cosine of signatures from which on two effects are told as one
+_TWIN = 0.98  # cosine of signatures from which on an effect is fitted in full, to be told apart
 _CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
 _CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
 _EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
@@ -222,7 +222,7 @@ def _causes(
             Cause(
                 effect=effect,
                 parameters=parameters,
-                confusable_with=_twins(effect, best, steps, names, cosines),
+                confusable_with=_twins(fit, effect, best, steps, names, cosines),
                 explained=float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)),
                 phases=best.point.phases.get(effect.name),
             )
@@ -232,38 +232,28 @@ def _causes(
 
 
 def _twins(
+    fit: Fit,
     effect: Effect,
     best: Fitted,
     steps: Sequence[Step],
     names: Sequence[str],
     cosines: Matrix,
 ) -> tuple[str, ...]:
-    """Effects that explain the data as well, by a full fit or by their signature."""
+    """Effects that, fitted in full in place of this one, explain the data as well."""
+    row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
     found: list[str] = []
-    refuted: set[str] = set()
     for step in steps:
         winner = step.rivals[0]
         if winner.active[-1] is not effect:
             continue
-        close = max(_CLOSE * winner.lasting, _CLOSE_SHARE * (step.before.misfit - winner.misfit))
-        for rival in step.rivals[1:]:
-            name = rival.active[-1].name
-            if rival.misfit - winner.misfit < close:
-                found.append(name)
-            else:
-                refuted.add(name)
-        able: dict[str, float] = {}
+        fits = {rival.active[-1].name: rival for rival in step.rivals[1:]}
         for score in step.scores:
-            able.setdefault(score.effect.name, float(score.held_out.sum()))
-        most = able[effect.name]
-        least = min(_AS_GOOD * most, most - _CLOSE)
-        refuted |= {name for name, held in able.items() if held < least}
-    row = cosines[names.index(effect.name)]
-    found += [
-        name
-        for name, cosine in zip(names, row, strict=True)
-        if cosine > _TWIN and name not in refuted
-    ]
+            name = score.effect.name
+            if row.get(name, 0.0) > _TWIN and name not in fits and name != effect.name:
+                start = joined(step.before.point, score)
+                fits[name] = fitted(fit, start, (*step.before.active, score.effect))
+        close = max(_CLOSE * winner.lasting, _CLOSE_SHARE * (step.before.misfit - winner.misfit))
+        found += [name for name, one in fits.items() if one.misfit - winner.misfit < close]
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
 
