@@ -145,7 +145,7 @@ class Fit:
         return Point({}, levels, np.zeros((self.count, len(TOLERANCES))), {})
 
     def present(self, effect: Effect, k: int) -> bool:
-        """Whether stop k can have an effect: water is where the conditions say so, if they do."""
+        """Whether stop k can have an effect: water is where the conditions say, if they do."""
         return effect.name != _FILM or not self._soaked or self._wet(k) > 0.0
 
     def _wet(self, k: int) -> float:
@@ -280,9 +280,8 @@ class Fit:
             at[_STOP, name] * tolerance * self._common(point, name, case)
             for name, tolerance in TOLERANCES.items()
         ]
-        return StopSystem(
-            evidence.residual * weight, J, np.column_stack(tolerances + P), point.deviations[k]
-        )
+        local = np.column_stack(tolerances + P)
+        return StopSystem(evidence.residual * weight, J, local, point.deviations[k])
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand: muWR to a fifth, the rest freely."""
