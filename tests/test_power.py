@@ -303,9 +303,8 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     ) as process:
         assert process.stdout is not None
         assert "clean" in process.stdout.readline()
-        # The next set is simulated in a worker, then diagnosed in a process of the worker's own.
-        simulating = len(_living(process.pid))
-        assert _comes_true(lambda: len(_living(process.pid)) > simulating)
+        # The next set is under way in a worker.
+        assert _comes_true(lambda: len(_living(process.pid)) > 1)
         time.sleep(3.0)  # while it starts, it would end by itself
         process.kill()
     assert _comes_true(lambda: not _living(process.pid))
