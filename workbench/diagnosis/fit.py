@@ -94,7 +94,6 @@ class Linearised:
     """
 
     point: Point
-    active: tuple[Effect, ...]
     keys: tuple[Key, ...]
     evidence: tuple[Evidence, ...]
     inflation: Vector
@@ -234,7 +233,7 @@ class Fit:
                 columns.append(Column(variables(effect, parameter), effect.step, setting))
                 keys.append((variant(effect, shape), parameter))
         evidence = self._court.hear(self.values(point), [columns] * self.count)
-        return Linearised(point, tuple(active), tuple(keys), tuple(evidence), slowness(evidence))
+        return Linearised(point, tuple(keys), tuple(evidence), slowness(evidence))
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> "Joint":
         """Every stop over the common unknowns, local ones eliminated.
