@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.signal import butter, sosfiltfilt
 
 from workbench.case import Case
@@ -11,6 +12,8 @@ from workbench.fmu import Vector
 
 BANDWIDTH = 5.0  # [Hz] below the 15..35 Hz modes of a rig's structure, above what friction does
 FIRST_PRESSURE = 0.1e5  # [Pa] twenty times the noise of a pressure sensor (5 mbar)
+# [rad/s] two equal poles there are down by 3 dB at the bandwidth
+_CORNER = 2 * np.pi * BANDWIDTH / np.sqrt(np.sqrt(2) - 1)
 LOWEST_SPEED = 1.0  # [m/s] below, slip and creepage lose their meaning
 
 
@@ -26,6 +29,11 @@ class Weights:
     cR: float = 1.0  # [s/rad]
     cF: float = 1.0e-3  # [1/N]
 
+    @property
+    def vector(self) -> Vector:
+        """cW, cR, cF, (3,)."""
+        return np.array([self.cW, self.cR, self.cF])
+
 
 @dataclass(frozen=True)
 class Score:
@@ -35,7 +43,7 @@ class Score:
     ----------
     Fx_rms : rms error of the creep force between first pressure and 1 m/s, below 5 Hz [N].
     Fx_nrmse : the same over the mean of |Fx| [1].
-    z : objective z_k of equation (12), over the whole recording [1].
+    z : objective z_k of equation (12), over the whole recording, of deviations below 5 Hz [1].
     reason : why a value is missing; empty if none is.
     """
 
@@ -74,6 +82,37 @@ def low_pass(time: Vector, signal: Vector, bandwidth: float = BANDWIDTH) -> Vect
     return np.interp(time, even, smooth)
 
 
+def samples(time: Vector) -> tuple[Vector, Vector]:
+    """Step [s] from the sample before, and share [1] in the time average, of each sample, (n,)."""
+    steps = np.diff(time, prepend=time[0])
+    return steps, 0.5 * (steps + np.append(steps[1:], 0.0)) / (time[-1] - time[0])
+
+
+@njit(cache=True)
+def integrate(z, memory, deviations, weights, steps, shares):  # type: ignore[no-untyped-def]
+    """Add a piece of recording to z_k, equation (12) of Schwarz et al. (2018).
+
+    Deviations count below 5 Hz, where an estimate can follow friction; above, a recording holds the
+    noise of its sensors and the modes of its rig, which would reward slow gains. The low-pass has
+    two equal real poles. z only grows, sample by sample, so that pieces do not change the sum.
+
+    Parameters
+    ----------
+    memory : (2, 3) of the low-pass, written; zeros at the beginning.
+    deviations : (n, 3) of omegaW, omegaR [rad/s] and Fx [N] from their measurement.
+    weights : (3,) cW, cR, cF.
+    steps, shares : (n,) as of `samples`.
+    """
+    for i in range(steps.size):
+        # The first sample has no step before it and stands for all the past.
+        gain = 1.0 - np.exp(-_CORNER * steps[i]) if steps[i] > 0.0 else 1.0
+        for j in range(3):
+            memory[0, j] += gain * (deviations[i, j] - memory[0, j])
+            memory[1, j] += gain * (memory[0, j] - memory[1, j])
+            z += shares[i] * weights[j] * abs(memory[1, j])
+    return z
+
+
 def score(case: Case, run: Run, roller_radius: float, weights: Weights) -> Score:
     """Judge a run against its recording.
 
@@ -87,13 +126,11 @@ def score(case: Case, run: Run, roller_radius: float, weights: Weights) -> Score
         return Score(None, None, None, "the recording has no Fx to judge by")
     error = run.signal("Fx") - case.Fx
     # A method that takes the speeds as measured makes no error in them.
-    speed_errors = [
-        np.nan_to_num(np.abs(run.signal(name) - measured))
-        for name, measured in (("omegaW", case.omegaW), ("omegaR", case.omegaR))
-    ]
-    rate = weights.cW * speed_errors[0] + weights.cR * speed_errors[1] + weights.cF * np.abs(error)
-    duration = case.time[-1] - case.time[0]
-    z = float(np.trapezoid(rate, case.time) / duration)
+    omegaW = np.nan_to_num(run.signal("omegaW") - case.omegaW)
+    omegaR = np.nan_to_num(run.signal("omegaR") - case.omegaR)
+    deviations = np.column_stack([omegaW, omegaR, error])
+    steps, shares = samples(case.time)
+    z = float(integrate(0.0, np.zeros((2, 3)), deviations, weights.vector, steps, shares))
     window = braking_window(case, roller_radius)
     if window.stop - window.start < 2:
         return Score(None, None, z, "the recording has no braking above 1 m/s")

@@ -91,8 +91,8 @@ class Estimator(ABC):
     def _arguments(self) -> tuple[Any, Any]:
         """Settings and memory of the law."""
 
-    def _reset(self, u: Vector, y: Vector) -> None:
-        """Start FMU and memory from the first sample."""
+    def start(self, u: Vector, y: Vector) -> None:
+        """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
         self.fmu.start({"omegaW": y[0], "omegaR": y[1]})
         self._plant.u[:] = 0.0
         self._begin(u, y)
@@ -100,7 +100,7 @@ class Estimator(ABC):
     def init(self, t: float, u: Vector, y: Vector) -> Estimate:
         """Start at time t [s] with the first sample: measured speeds, nominal friction."""
         self._t = t
-        self._reset(u, y)
+        self.start(u, y)
         settings, memory = self._arguments()
         self._row[:] = np.nan
         checked(self._law(self._plant, settings, memory, 0.0, u, y, self._row), self.fmu)
@@ -127,11 +127,25 @@ class Estimator(ABC):
         FMUError
             If the FMU refuses a call.
         """
-        rows = np.full((time.size, 2 * WIDTH + 1), np.nan)
-        self._reset(u[0], y[0])
+        self.start(u[0], y[0])
+        return self.advance(np.diff(time, prepend=time[0]), u, y)
+
+    def advance(self, steps: Vector, u: Matrix, y: Matrix) -> Estimate:
+        """Run over a piece of a recording, from where the piece before it ended, or from `start`.
+
+        Parameters
+        ----------
+        steps : (n,) from the sample before [s].
+        u, y : (n, 2) measured inputs and outputs.
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses a call.
+        """
+        rows = np.full((steps.size, 2 * WIDTH + 1), np.nan)
         settings, memory = self._arguments()
         inputs, outputs = np.ascontiguousarray(u), np.ascontiguousarray(y)
-        steps = np.diff(time, prepend=time[0])
         checked(self._loop(self._plant, settings, memory, steps, inputs, outputs, rows), self.fmu)
         return _split(rows)
 

@@ -8,19 +8,17 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from workbench.case import Case
 from workbench.errors import InputError
 from workbench.fmu import FMU, FMUError, Matrix, Vector
-from workbench.objective import Weights
+from workbench.objective import Weights, integrate, samples
 from workbench.observers import ESTIMATE, Estimator
-from workbench.observers.contract import WIDTH
 from workbench.tuning.space import Gains, build, from_vector
 
 PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
 DIVERGED = 1e3  # z of a mean error of 1000 rad/s or 1 MN: no estimate of a brake stop
-_OMEGA_W, _OMEGA_R, _FORCE = (list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx"))
+_JUDGED = [list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx")]
 
 
 class Recording(NamedTuple):
@@ -31,16 +29,16 @@ class Recording(NamedTuple):
     name : of the case.
     steps : (n,) from the sample before [s].
     u, y : (n, 2) measured inputs and outputs.
-    force : (n,) measured creep force [N].
-    share : (n,) weight of each sample in the time average (trapezoidal rule) [1].
+    judged : (n, 3) measured omegaW, omegaR [rad/s] and creep force [N].
+    shares : (n,) weight of each sample in the time average (trapezoidal rule) [1].
     """
 
     name: str
     steps: Vector
     u: Matrix
     y: Matrix
-    force: Vector
-    share: Vector
+    judged: Matrix
+    shares: Vector
 
 
 def recording(case: Case) -> Recording:
@@ -58,9 +56,9 @@ def recording(case: Case) -> Recording:
             expected="the measured force, by which gains are judged",
             remedy="leave this case out of the tuning with --cases",
         )
-    steps = np.diff(case.time, prepend=case.time[0])
-    share = 0.5 * (steps + np.append(steps[1:], 0.0)) / (case.time[-1] - case.time[0])
-    return Recording(case.name, steps, case.u.copy(), case.y.copy(), case.Fx.copy(), share)
+    steps, shares = samples(case.time)
+    judged = np.column_stack([case.y, case.Fx])
+    return Recording(case.name, steps, case.u.copy(), case.y.copy(), judged, shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +124,6 @@ class Bench:
             path = Path(folder) / "model.fmu"
             path.write_bytes(job.fmu)
             self._fmu = FMU(path, job.names)
-        longest = max(r.steps.size for r in job.recordings)
-        self._rows = np.empty((longest, 2 * WIDTH + 1))
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", *(values[:PIECES] for values in job.recordings[0][1:]))
         self._judge_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
@@ -161,47 +157,19 @@ class Bench:
         """The z of one case, or the part of it that is beyond the limit, and samples evaluated."""
         z, size = 0.0, case.steps.size
         edges = [size * i // PIECES for i in range(PIECES + 1)]
+        weights, low_pass = self._job.weights.vector, np.zeros((2, 3))
+        end = 0
         try:
-            estimator._reset(case.u[0], case.y[0])
+            estimator.start(case.u[0], case.y[0])
+            for begin, end in pairwise(edges):
+                part = slice(begin, end)
+                steps, y = case.steps[part], case.y[part]
+                estimate = estimator.advance(steps, case.u[part], y)
+                deviations = estimate.values[:, _JUDGED] - case.judged[part]
+                z = integrate(z, low_pass, deviations, weights, steps, case.shares[part])
+                if not z <= limit:
+                    break
         except FMUError:
-            return np.nan, 0
-        settings, memory = estimator._arguments()
-        weights = self._job.weights
-        for begin, end in pairwise(edges):
-            part = slice(begin, end)
-            rows = self._rows[part]
-            status = estimator._loop(
-                estimator._plant,
-                settings,
-                memory,
-                case.steps[part],
-                case.u[part],
-                case.y[part],
-                rows,
-            )
-            if status:
-                self._fmu.renew(reload=False)
-                return np.nan, end
-            z = _add(
-                z,
-                rows,
-                case.y[part],
-                case.force[part],
-                case.share[part],
-                np.array([weights.cW, weights.cR, weights.cF]),
-            )
-            if not z <= limit:
-                return z, end
-        return z, size
-
-
-@njit(cache=True)
-def _add(z, rows, y, force, share, weights):  # type: ignore[no-untyped-def]
-    """Add a piece of recording to z, sample by sample, so that pieces do not change the sum."""
-    for i in range(share.size):
-        z += share[i] * (
-            weights[0] * abs(rows[i, _OMEGA_W] - y[i, 0])
-            + weights[1] * abs(rows[i, _OMEGA_R] - y[i, 1])
-            + weights[2] * abs(rows[i, _FORCE] - force[i])
-        )
-    return z
+            self._fmu.renew(reload=False)
+            return np.nan, end
+        return z, end
