@@ -3,7 +3,9 @@
 import json
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Future
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,9 @@ import pytest
 
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
+from workbench.objective import Weights
+from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
+from workbench.tuning.cost import Bench, Candidate, Verdict
 
 ROOT = Path(__file__).parent.parent
 
@@ -41,6 +46,85 @@ def minimal(minimal_path: Path) -> Iterator[FMU]:
 def dry_case() -> Case:
     return read_case(ROOT / "cases" / "03_dry_120_3.6")
 
+
+# --- tuning ---
+
+
+@pytest.fixture(scope="session")
+def stop_beginnings() -> list[Case]:
+    """6 s each of three stops: first pressure and what follows."""
+    part = slice(700, 1900)
+    beginnings = []
+    for name in ("03_dry_120_3.6", "08_wet_120_3.6", "10_wet_100_2.7_rev"):
+        case = read_case(ROOT / "cases" / name)
+        signals = {s: getattr(case, s)[part] for s in ("time", "pB", "tauR", "omegaW", "omegaR")}
+        assert case.Fx is not None
+        beginnings.append(replace(case, **signals, Fx=case.Fx[part]))
+    return beginnings
+
+
+@pytest.fixture(scope="session")
+def prepare() -> Callable[..., tuple[Job, SearchSpace]]:
+    """Prepares the tuning of an estimator on an FMU, from its reasoned gains, over cases."""
+
+    def prepared(name: str, path: Path, cases: Sequence[Case]) -> tuple[Job, SearchSpace]:
+        with FMU(path) as fmu:
+            gains = reasoned_gains(name, fmu)
+            space = search_space(fmu, gains, slowest=1 / 40, fastest=200.0)
+        job = Job(name, path.read_bytes(), {}, gains, tuple(map(recording, cases)), Weights())
+        return job, space
+
+    return prepared
+
+
+@pytest.fixture(scope="session")
+def problem(
+    prepare: Callable[..., tuple[Job, SearchSpace]],
+    minimal_path: Path,
+    stop_beginnings: list[Case],
+) -> tuple[Job, SearchSpace]:
+    """Tuning of the disturbance observer."""
+    return prepare("disturbance_observer", minimal_path, stop_beginnings)
+
+
+class Inline:
+    """A pool of this process alone."""
+
+    size = 1
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+    def __init__(self, job: Job) -> None:
+        self._bench = Bench(job)
+
+    def submit(self, candidates: Sequence[Candidate]) -> "Future[list[Verdict]]":
+        future: Future[list[Verdict]] = Future()
+        future.set_result([self._bench.judge(candidate) for candidate in candidates])
+        return future
+
+    def close(self) -> None:
+        self._bench.close()
+
+
+@pytest.fixture
+def inline() -> Iterator[Callable[[Job], Pool]]:
+    """Opens pools of this process alone."""
+    pools: list[Inline] = []
+
+    def opened(job: Job) -> Pool:
+        pools.append(Inline(job))
+        return pools[-1]
+
+    yield opened
+    for pool in pools:
+        pool.close()
+
+
+@pytest.fixture
+def pool(inline: Callable[[Job], Pool], problem: tuple[Job, SearchSpace]) -> Pool:
+    return inline(problem[0])
+
+
+# --- pages ---
 
 # Set before the page's own scripts, for a probe to report.
 COLLECT = """<script>

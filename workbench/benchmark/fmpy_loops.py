@@ -14,9 +14,11 @@ import numpy as np
 from fmpy import extract, instantiate_fmu, read_model_description
 
 from workbench.fmu import Matrix, Vector
-from workbench.observers import DisturbanceGains, Estimate, FilterNoise, ParameterGains
+from workbench.objective import BANDWIDTH, Weights
+from workbench.observers import ESTIMATE, DisturbanceGains, Estimate, FilterNoise, ParameterGains
 from workbench.observers.contract import FADING_SPEED, FRICTION_RANGE
 from workbench.observers.kalman import POINT_DISTANCE, TANGENT_SHARE
+from workbench.tuning.cost import Recording
 
 
 class FMPyModel:
@@ -279,3 +281,19 @@ def unscented_kalman_filter(
 ) -> Estimate:
     """Unscented Kalman filter with its covariance in full; see `disturbance_observer`."""
     return _filter(model, noise, time, u, y, points=True)
+
+
+def objective(estimate: Estimate, case: Recording, weights: Weights) -> float:
+    """z_k, equation (12) of Schwarz et al. (2018), of deviations below 5 Hz."""
+    columns = [list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx")]
+    deviations = estimate.values[:, columns] - case.judged
+    # Two equal poles, which together are down by 3 dB at the bandwidth.
+    corner = 2 * np.pi * BANDWIDTH / np.sqrt(np.sqrt(2) - 1)
+    gains = np.where(case.steps > 0.0, 1.0 - np.exp(-corner * case.steps), 1.0)
+    smooth = np.empty_like(deviations)
+    first = second = np.zeros(3)
+    for k, gain in enumerate(gains):
+        first = first + gain * (deviations[k] - first)
+        second = second + gain * (first - second)
+        smooth[k] = second
+    return float(case.shares @ np.abs(smooth) @ weights.vector)

@@ -5,7 +5,6 @@ import json
 import math
 import multiprocessing
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ import numpy as np
 
 from workbench.benchmark import fmpy_loops
 from workbench.benchmark.c_loop import CLoop
+from workbench.benchmark.memory import peak_memory
 from workbench.case import Case
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.observers import (
@@ -256,8 +256,7 @@ def _work(
             for estimator in estimators:
                 estimator.run(*samples[number])
             answers.put(number)
-    unit = 1 if sys.platform == "darwin" else 1024
-    answers.put(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
+    answers.put(peak_memory())
 
 
 def format_observers(

@@ -1,4 +1,4 @@
-"""`workbench bench`: how long calls into the FMUs take."""
+"""`workbench bench`: how long calls into the FMUs, observers and tuning take."""
 
 import argparse
 import platform
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from workbench.commands.arguments import Commands, require_compiler, write_json
 from workbench.commands.bench_observers import bench_observers
+from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
 
 if TYPE_CHECKING:
@@ -21,10 +22,11 @@ def add_bench(commands: Commands) -> None:
     """Add the command to the parser."""
     bench = commands.add_parser(
         "bench",
-        help="time calls into the FMUs, and the observers",
+        help="time calls into the FMUs, the observers, and the tuning",
         description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
         "sources in one program, and Co-Simulation steps; then the observers beside the same "
-        "methods written with FMPy and in plain C. Needs the extra [compiler].",
+        "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
+        "workers, memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
         epilog="example:\n  python -m workbench bench --json results/bench/bench.json",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -42,6 +44,7 @@ def _run(options: argparse.Namespace) -> int:
         calls[model] = measure_calls(description, _SEED)
     print(_format_calls(calls))
     observers = bench_observers()
+    tuning = bench_tuning()
     if options.json:
         content: dict[str, Any] = {
             "machine": {"processor": platform.machine(), "system": platform.platform()},
@@ -56,6 +59,7 @@ def _run(options: argparse.Namespace) -> int:
                 for name, times in calls.items()
             },
             "observers": observers,
+            "tuning": tuning,
         }
         write_json(content, options.json)
     return 0

@@ -7,8 +7,8 @@ from typing import Any
 from workbench.case import read_case, read_cases
 from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
 
-_CASES = Path("cases")
-_CASE = "03_dry_120_3.6"
+CASES = Path("cases")
+CASE = "03_dry_120_3.6"
 
 
 def bench_observers() -> dict[str, Any]:
@@ -21,12 +21,12 @@ def bench_observers() -> dict[str, Any]:
     )
 
     models = (MINIMAL_OBSERVER, FULL_OBSERVER)
-    observers = measure_observers(read_case(_CASES / _CASE), *models)
-    processes = measure_processes(read_cases([_CASES]), *models)
+    observers = measure_observers(read_case(CASES / CASE), *models)
+    processes = measure_processes(read_cases([CASES]), *models)
     compilation = measure_compilation(*models)
     print(f"\n{format_observers(observers, processes, compilation)}")
     return {
-        "case": _CASE,
+        "case": CASE,
         "steps": [asdict(row) for row in observers],
         "processes": asdict(processes),
         "compilation": compilation,

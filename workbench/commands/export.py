@@ -8,14 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from workbench.commands.arguments import (
-    FULL_OBSERVER,
-    MINIMAL_OBSERVER,
-    Commands,
-    require_compiler,
-)
+from workbench.commands.arguments import Commands, require_compiler
 from workbench.errors import InputError
-from workbench.fmu import FMU
 from workbench.observers import (
     DisturbanceGains,
     DisturbanceObserver,
@@ -23,14 +17,7 @@ from workbench.observers import (
     ParameterEstimator,
     ParameterGains,
 )
-from workbench.tuning import (
-    format_gains,
-    gain_names,
-    read_gains,
-    reasoned_gains,
-    to_vector,
-    write_whole,
-)
+from workbench.tuning import DEFAULTS, gain_names, read_gains, to_vector, write_whole
 
 if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
@@ -39,7 +26,7 @@ _Gains: TypeAlias = DisturbanceGains | ParameterGains
 
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
 _REFERENCE = Path("fmus/fmi2/Reference.fmu")
-_MODELS = {DisturbanceObserver.name: MINIMAL_OBSERVER, ParameterEstimator.name: FULL_OBSERVER}
+_OBSERVERS = (DisturbanceObserver.name, ParameterEstimator.name)  # written in Modelica too
 
 
 def add_export(commands: Commands) -> None:
@@ -62,14 +49,14 @@ def add_export(commands: Commands) -> None:
         "--gains",
         type=Path,
         metavar="FILE",
-        help="gains.toml of 'workbench tune', which names the observer (default: gains reasoned "
-        "from the linearised model)",
+        help="gains.toml of 'workbench tune', which names the observer (default: gains tuned on "
+        "the project's cases)",
     )
     which.add_argument(
         "--estimator",
-        choices=tuple(_MODELS),
+        choices=_OBSERVERS,
         default=DisturbanceObserver.name,
-        help="observer with reasoned gains (default: %(default)s)",
+        help="observer with these tuned gains (default: %(default)s)",
     )
     export.add_argument(
         "--fmi",
@@ -100,7 +87,8 @@ def _export(options: argparse.Namespace) -> int:
     from workbench.compiler import source_hash
     from workbench.export import OBSERVERS, ObserverModel, build_observer, write_package
 
-    estimator, gains, text = _gains(options)
+    source = options.gains or DEFAULTS / f"{options.estimator}.toml"
+    estimator, gains, text = _gains(source)
     name = OBSERVERS[estimator]
     observer = ObserverModel(_PACKAGE, f"{_PACKAGE.parent.name}.Observers.{name}", gains, text)
     with tempfile.TemporaryDirectory() as scratch:
@@ -128,7 +116,7 @@ def _export(options: argparse.Namespace) -> int:
                 "workbench": version("wheelset-workbench"),
                 "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
                 "source_sha256": source_hash(_PACKAGE),
-                "gains": options.gains.name if options.gains else "reasoned",
+                "gains": source.name,
             },
         }
         # Nothing is written before everything is made.
@@ -141,24 +129,17 @@ def _export(options: argparse.Namespace) -> int:
     return 0
 
 
-def _gains(options: argparse.Namespace) -> tuple[str, _Gains, str]:
+def _gains(path: Path) -> tuple[str, _Gains, str]:
     """Name of the estimator, its gains, and the text of their file."""
-    if options.gains is None:
-        with FMU(_MODELS[options.estimator]) as fmu:
-            found = reasoned_gains(options.estimator, fmu)
-            source = {"source": "reasoned from the linearised model", "fmu": fmu.path.name}
-        estimator, text = options.estimator, format_gains(options.estimator, found, source)
-    else:
-        estimator, found = read_gains(options.gains)
-        text = options.gains.read_text()
+    estimator, found = read_gains(path)
     if isinstance(found, FilterNoise):
         raise InputError(
-            where=str(options.gains),
+            where=str(path),
             found=f"estimator = '{estimator}'",
-            expected=f"one of {', '.join(_MODELS)}, which are models in Modelica",
+            expected=f"one of {', '.join(_OBSERVERS)}, which are models in Modelica",
             remedy="tune one of these and export its gains",
         )
-    return estimator, found, text
+    return estimator, found, path.read_text()
 
 
 def _show(name: str, fmi: int, platform: str) -> None:

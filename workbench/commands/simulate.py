@@ -43,7 +43,7 @@ from workbench.report import (
     write_page,
     write_summary,
 )
-from workbench.tuning import read_gains, with_tuned
+from workbench.tuning import default_settings, read_gains, with_tuned
 
 
 def add_simulate(commands: Commands) -> None:
@@ -68,7 +68,14 @@ def add_simulate(commands: Commands) -> None:
         "--gains",
         type=Path,
         metavar="FILE",
-        help="gains.toml of 'workbench tune' (default: gains reasoned from the linearised models)",
+        help="gains.toml of 'workbench tune', for the estimator that it names (default: for the "
+        "project's models gains tuned on the project's cases, else gains reasoned from the "
+        "linearised models)",
+    )
+    simulate.add_argument(
+        "--untuned",
+        action="store_true",
+        help="gains reasoned from the linearised models, to compare tuned ones with",
     )
     add_map(simulate)
     simulate.add_argument(
@@ -123,15 +130,17 @@ def _simulate(options: argparse.Namespace) -> int:
     window = LiveWindow() if options.live else None
     options.out.mkdir(parents=True, exist_ok=True)
     with FMU(options.fmu, names) as minimal, FMU(options.full_fmu, names) as full:
-        settings = reasoned_settings(minimal, full)
-        sources = settings.summary()
+        settings, tuned = default_settings(minimal, full)
+        if options.untuned:
+            settings, tuned = reasoned_settings(minimal, full), {}
         if options.gains is not None:
             name, gains = read_gains(options.gains)
-            settings = with_tuned(settings, gains)
-            sources = settings.summary()
-            for key in sources:
+            settings, tuned[name] = with_tuned(settings, gains), options.gains.name
+        sources = settings.summary()
+        for key in sources:
+            for name, file in tuned.items():
                 if name in key:
-                    sources[key]["source"] = f"tuned, {options.gains.name}"
+                    sources[key]["source"] = f"tuned, {file}"
         print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
         for estimator in make_estimators(chosen, minimal, full, settings):
             estimator.run(cases[0].time[:2], cases[0].u[:2], cases[0].y[:2])

@@ -7,7 +7,7 @@ import platform
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict
 from importlib.metadata import version
@@ -29,6 +29,7 @@ from workbench.commands.arguments import (
 from workbench.errors import InputError
 from workbench.fmu import FMU, FMUError, Vector
 from workbench.objective import Weights
+from workbench.report.tuning import write_tuning_page
 from workbench.tuning import (
     TUNABLE,
     Fold,
@@ -48,15 +49,17 @@ from workbench.tuning import (
     gain_names,
     judge_gains,
     reasoned_gains,
-    recording,
+    recordings,
     search,
     search_space,
     sensitivities,
     to_vector,
+    untuned_filter,
     write_whole,
 )
 
 TIMEOUT = 60  # [s] for one candidate, which takes about 0.1 s
+RADIUS_ERROR = 0.1  # [%] what the Kalman filters' noise of omegaW allows for, too
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 
@@ -67,8 +70,8 @@ def add_tune(commands: Commands) -> None:
         help="find the gains whose worst case is best",
         description="Find gains that minimise z, the worst of the objectives z_k of all cases "
         "(Schwarz et al. 2018, equations 11 and 12), by differential evolution. Writes gains.toml, "
-        "summary.json and figures. Ctrl-C keeps the best so far; --resume goes on from there, to "
-        "the same result.",
+        "summary.json, figures and a page. Ctrl-C keeps the best so far; --resume goes on from "
+        "there, to the same result.",
         epilog="examples:\n"
         "  python -m workbench tune disturbance_observer\n"
         "  python -m workbench tune parameter_estimator --budget 20 --out /tmp/quick\n"
@@ -122,6 +125,15 @@ def add_tune(commands: Commands) -> None:
         help="scheduler of a Dask cluster to work on instead; needs the extra [cluster]",
     )
     tune.add_argument(
+        "--radius-error",
+        type=float,
+        default=RADIUS_ERROR,
+        metavar="PERCENT",
+        help="judge each case a second time with the wheel's radius off by this much, alternately "
+        "to both sides, so that gains do not rely on radii that nobody knows as well; 0: only as "
+        "recorded (default: %(default)s)",
+    )
+    tune.add_argument(
         "--timeout",
         type=positive,
         default=TIMEOUT,
@@ -162,6 +174,13 @@ def _tune(options: argparse.Namespace) -> int:
             expected="2 or more, and no more than there are cases",
             remedy="choose another number, or more cases with --cases",
         )
+    if not 0.0 <= options.radius_error < 10.0:
+        raise InputError(
+            where="command line, --radius-error",
+            found=f"{options.radius_error:g}",
+            expected="a share of the radius in percent, from 0 to 10",
+            remedy=f"choose another, or leave it out for {RADIUS_ERROR:g} %",
+        )
     out = options.out or Path("results/tune") / options.estimator
     out.mkdir(parents=True, exist_ok=True)
     job, space, provenance = _prepare(options, cases)
@@ -193,11 +212,11 @@ def _tune(options: argparse.Namespace) -> int:
                 f"{provenance['fmu']['file']}: the FMU fails, hangs or diverges with the untuned "
                 "gains, so there is nothing to start from; see 'python -m workbench simulate'"
             )
-        found = tune("checkpoint", range(len(cases)))
+        found = tune("checkpoint", range(len(job.recordings)))
         if found is None:
             print("interrupted before the first generation was judged; nothing is written")
             return 130
-        z_k = dict(zip((c.name for c in cases), found.z_k.tolist(), strict=True))
+        z_k = dict(zip((r.name for r in job.recordings), found.z_k.tolist(), strict=True))
         gains = format_gains(
             options.estimator,
             from_vector(job.gains, found.best),
@@ -215,8 +234,11 @@ def _tune(options: argparse.Namespace) -> int:
             return 1
         folds: list[Fold] = []
         effects: list[Sensitivity] = []
+        beside: dict[str, Vector] = {}
         if not found.interrupted:
             effects = sensitivities(pool, job, space, found)
+            if options.estimator not in ("ekf", "ukf"):
+                beside["ekf"] = untuned_filter(job)
             if options.folds:
 
                 def without(number: int, on: Sequence[int]) -> Search | None:
@@ -225,13 +247,16 @@ def _tune(options: argparse.Namespace) -> int:
 
                 folds = cross_validate(pool, job, reasoned, options.folds, without)
     z_k_before = dict(zip(z_k, before.tolist(), strict=True))
-    summary = _summary(found, reasoned, z_k_before, z_k, folds, effects, job, space, provenance)
+    summary = _summary(
+        found, reasoned, z_k_before, z_k, folds, effects, beside, job, space, provenance
+    )
     if not _written(out / "summary.json", json.dumps(summary, indent=2) + "\n"):
         return 1
     draw_convergence(found.history, out / "convergence.png")
     draw_cases(z_k_before, z_k, out / "cases.png")
     print(_format(found, z_k_before, z_k, folds, effects, summary))
-    print(f"written: {out / 'gains.toml'}, summary and figures beside it")
+    page = write_tuning_page(summary, out)
+    print(f"written: {page}, gains.toml, summary and figures beside it")
     interrupted = found.interrupted or len(folds) < options.folds
     return 130 if interrupted else 0
 
@@ -258,7 +283,6 @@ def _prepare(
     default = FULL_OBSERVER if options.estimator == "parameter_estimator" else MINIMAL_OBSERVER
     path = options.fmu or default
     names = model_names(options.map, cases)
-    recordings = tuple(map(recording, cases))
     weights = Weights()
     # A recording shows nothing slower than itself, and its samples carry nothing faster.
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
@@ -274,9 +298,11 @@ def _prepare(
             "cases": [case.name for case in cases],
             "seed": options.seed,
             "population": options.population,
+            "radius_error": options.radius_error / 100.0,
             "weights": asdict(weights),
         }
-    job = Job(options.estimator, path.read_bytes(), names, gains, recordings, weights)
+    judged = recordings(cases, options.radius_error / 100.0)
+    job = Job(options.estimator, path.read_bytes(), names, gains, judged, weights)
     return job, space, provenance
 
 
@@ -353,6 +379,7 @@ def _summary(
     after: dict[str, float],
     folds: Sequence[Fold],
     effects: Sequence[Sensitivity],
+    beside: Mapping[str, Vector],
     job: Job,
     space: SearchSpace,
     provenance: dict[str, Any],
@@ -392,7 +419,11 @@ def _summary(
             }
             for e in effects
         },
-        "folds": [asdict(fold) for fold in folds],
+        "folds": [{**asdict(fold), "tuned": _finite(fold.tuned)} for fold in folds],
+        "beside": {
+            name: {"z": _finite(float(z_k.max())), "worst": list(after)[int(z_k.argmax())]}
+            for name, z_k in beside.items()
+        },
         "work": {
             "generations": len(history) - 1,
             "candidates": sum(g.candidates for g in history),
@@ -419,9 +450,10 @@ def _format(
     effects: Sequence[Sensitivity],
     summary: dict[str, Any],
 ) -> str:
-    lines = [f"{'case':<28} {'reasoned':>9} {'tuned':>9}  z_k, worst first"]
+    width = max(map(len, after))
+    lines = [f"{'case':<{width}} {'reasoned':>9} {'tuned':>9}  z_k, worst first"]
     for name in sorted(after, key=after.__getitem__, reverse=True):
-        lines.append(f"{name:<28} {before[name]:>9.4f} {after[name]:>9.4f}")
+        lines.append(f"{name:<{width}} {before[name]:>9.4f} {after[name]:>9.4f}")
     work = summary["work"]
     lines.append(
         f"z = {found.z:.5f} after {work['generations']} generations, {work['candidates']} "
@@ -432,6 +464,8 @@ def _format(
     if effects:
         idle = [effect.gain for effect in effects if not effect.matters]
         lines.append(f"gains that do not matter (z within 1 %): {', '.join(idle) or 'none'}")
+    for name, one in summary["beside"].items():
+        lines.append(f"{name}, not tuned: z = {one['z']:.5f}, worst {one['worst']}")
     for fold in folds:
         verdict = "better" if fold.tuned < fold.reasoned else "not better"
         lines.append(

@@ -44,8 +44,8 @@ class Score:
     ----------
     effect, shape : the candidate, and the shape it was tried with.
     size, sigma : estimate of its size and standard deviation, SI.
-    gain : fall of chi-squared when it is fitted to all stops.
-    held_out : (K,) fall of chi-squared of each stop when it is fitted to the others.
+    gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
+    held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
     phases : (K,) [rad] of an order-locked effect.
     """
 
@@ -80,7 +80,8 @@ class Trial:
     """All candidates about one point.
 
     Each may be present at a size that does not matter, as part of the baseline: a candidate must
-    explain what all others together, too small to matter, do not.
+    explain what all others together, too small to matter, do not. On held-out stops it is judged
+    alone, since what companions cost, by their size, shows only where they are fitted.
     """
 
     def __init__(
@@ -99,16 +100,16 @@ class Trial:
                 at = joint.shared.index((variant(effect, shape), effect.size))
                 middle[effect.name] = (at, effect.matters)
         self._immaterial = middle
+        self._without = _held_out(*self._select({}, alone=True))
         base = self._select({})
-        self._without = _held_out(*base)
         total = add([*base[0], base[1]])
         self._reference = total.at(minimum(total))
 
     def _select(
-        self, own: Mapping[int, Matrix], name: str = ""
+        self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
     ) -> tuple[list[Quadratic], Quadratic]:
         """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
-        others = [one for key, one in self._immaterial.items() if key != name]
+        others = [one for key, one in self._immaterial.items() if key != name and not alone]
         columns = [*self._known, *(at for at, _ in others)]
         count = len(columns) + bool(own)
         transforms = []
@@ -143,24 +144,29 @@ class Trial:
         if effect.order_locked:
             phases = np.array([_phase(stop, at) for stop in self._stops])
             own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
+        low, high = self._fit.bounds(effect, effect.size)
         stops, prior = self._select(own, effect.name)
         total = add([*stops, prior])
         best = minimum(total)
-        size, (low, high) = float(best[-1]), self._fit.bounds(effect, effect.size)
         sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
+        size = float(best[-1])
         if not low <= size <= high:
             # What its bounds allow of it: the rest of the unknowns do their best beside that.
             size = float(np.clip(size, low, high))
-            stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
-            total = add([*stops, prior])
+            total = _fixed(total, size)
             best = minimum(total)
+        alone, prior = self._select(own, alone=True)
+        single = float(minimum(add([*alone, prior]))[-1])
+        if not low <= single <= high:
+            single = float(np.clip(single, low, high))
+            alone, prior = [_fixed(stop, single) for stop in alone], _fixed(prior, single)
         return Score(
             effect=effect,
             shape=shape,
             size=size,
             sigma=sigma,
             gain=self._reference - total.at(best),
-            held_out=self._without - _held_out(stops, prior),
+            held_out=self._without - _held_out(alone, prior),
             phases=phases,
         )
 
@@ -245,10 +251,19 @@ def search(
             return best, steps, trial
         report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
         fits = _fits(fit, best, rivals)
-        if best.misfit - fits[0].misfit < _HELD_OUT * fits[0].lasting:
+        if _fall(best, fits[0]) < _HELD_OUT:
             return best, steps, trial
         steps.append(Step(best, scores, tuple(fits)))
         best = fits[0]
+
+
+def _fall(before: Fitted, after: Fitted) -> float:
+    """Fall of chi-squared, each channel against what is wrong with it before."""
+    was, left = (
+        np.sum([np.square(one.errors).sum(axis=0) for one in fit.linearised.evidence], axis=0)
+        for fit in (before, after)
+    )
+    return float(((was - left) / before.linearised.inflation).sum())
 
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
@@ -344,7 +359,9 @@ def _rivals(scores: Sequence[Score], best: Fitted) -> list[Score]:
         clear, needed = _HINT, 0.0
     able: dict[str, Score] = {}
     for one in scores:
-        significant = abs(one.size) > clear * one.sigma and one.held_out.sum() > needed
+        significant = (
+            abs(one.size) > clear * one.sigma and min(one.gain, one.held_out.sum()) > needed
+        )
         if significant and abs(one.size) >= one.effect.matters:
             able.setdefault(one.effect.name, one)
     ranked = list(able.values())[:_RIVALS]

@@ -28,7 +28,7 @@ Verdict = Literal["nothing", "found", "unexplained"]
 
 _QUANTILE = 1.96  # of a normal distribution, 95 %
 _TWIN = 0.98  # cosine of signatures from which on an effect is fitted in full, to be told apart
-_CLOSE = 12.0  # of chi-squared: less does not tell two fitted effects apart
+_CLOSE = 40.0  # of chi-squared: less does not tell fitted effects apart, whose laws are simplified
 _CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
 _EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
 _FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters

@@ -4,9 +4,15 @@ Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential e
 """
 
 from workbench.tuning.checkpoint import Generation, write_whole
-from workbench.tuning.cost import Job, recording
+from workbench.tuning.cost import Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
-from workbench.tuning.gains import format_gains, read_gains, with_tuned
+from workbench.tuning.gains import (
+    DEFAULTS,
+    default_settings,
+    format_gains,
+    read_gains,
+    with_tuned,
+)
 from workbench.tuning.search import Plan, Search, search
 from workbench.tuning.space import (
     TUNABLE,
@@ -24,10 +30,12 @@ from workbench.tuning.validation import (
     cross_validate,
     judge_gains,
     sensitivities,
+    untuned_filter,
 )
 from workbench.tuning.workers import Pool, ProcessPool
 
 __all__ = [
+    "DEFAULTS",
     "TUNABLE",
     "Fold",
     "Gains",
@@ -40,6 +48,7 @@ __all__ = [
     "SearchSpace",
     "Sensitivity",
     "cross_validate",
+    "default_settings",
     "draw_cases",
     "draw_convergence",
     "format_gains",
@@ -49,10 +58,12 @@ __all__ = [
     "read_gains",
     "reasoned_gains",
     "recording",
+    "recordings",
     "search",
     "search_space",
     "sensitivities",
     "to_vector",
+    "untuned_filter",
     "with_tuned",
     "write_whole",
 ]

@@ -9,8 +9,19 @@ from typing import Any
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.observers import DisturbanceGains, FilterNoise, ParameterGains, Settings
+from workbench.fmu import FMU
+from workbench.observers import (
+    DisturbanceGains,
+    DisturbanceObserver,
+    FilterNoise,
+    ParameterEstimator,
+    ParameterGains,
+    Settings,
+    reasoned_settings,
+)
 from workbench.tuning.space import TUNABLE, Gains, from_vector, gain_names, to_vector
+
+DEFAULTS = Path(__file__).parent / "defaults"  # gains.toml of `make tune`, by estimator
 
 _MEANING = {
     "disturbance_observer": "L: rows omegaW, omegaR [1/s, 1/s2], dmuWR, dmuDC [1/rad, 1/(rad.s)]; "
@@ -75,6 +86,24 @@ def read_gains(path: Path) -> tuple[str, Gains]:
         if not np.isfinite(number):
             raise _wrong(path, f"{name} = {number!r}", "a finite number")
     return estimator, from_vector(blank, np.array([float(given[name]) for name in names]))
+
+
+def default_settings(minimal: FMU, full: FMU) -> tuple[Settings, dict[str, str]]:
+    """Settings of all estimators, and by estimator the file of the gains that are tuned.
+
+    Gains tuned on the project's cases serve the models they were tuned on; other models get gains
+    that follow from their linearisation, and so do Kalman filters from their sensors' noise.
+
+    Parameters
+    ----------
+    minimal, full : the two observer models; their states are left at an operating point.
+    """
+    settings, tuned = reasoned_settings(minimal, full), {}
+    for name, fmu in ((DisturbanceObserver.name, minimal), (ParameterEstimator.name, full)):
+        path = DEFAULTS / f"{name}.toml"
+        if tomllib.loads(path.read_text())["provenance"]["fmu"]["model"] == fmu.name:
+            settings, tuned[name] = with_tuned(settings, read_gains(path)[1]), path.name
+    return settings, tuned
 
 
 def with_tuned(settings: Settings, gains: Gains) -> Settings:

@@ -76,7 +76,7 @@ def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> 
     digest.update(json.dumps([*what, plan.population, plan.seed]).encode())
     for recording in job.recordings:
         digest.update(recording.name.encode())
-        for values in recording[1:]:
+        for values in recording[2:]:
             digest.update(np.ascontiguousarray(values).tobytes())
     for values in (to_vector(job.gains), *vars(space).values()):
         digest.update(values.tobytes())

@@ -1,14 +1,15 @@
 """What tuned gains are worth: on cases they have not seen, and each gain by itself."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from workbench.fmu import Matrix, Vector
-from workbench.tuning.cost import DIVERGED, Candidate, Job
+from workbench.observers import ExtendedKalmanFilter, FilterNoise
+from workbench.tuning.cost import DIVERGED, Bench, Candidate, Job
 from workbench.tuning.search import Search
-from workbench.tuning.space import SearchSpace, gain_names
+from workbench.tuning.space import SearchSpace, gain_names, to_vector
 from workbench.tuning.workers import Pool, judge_all
 
 STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
@@ -62,13 +63,24 @@ def judge_gains(pool: Pool, job: Job, gains: Sequence[Vector]) -> Matrix:
     return np.array([verdict.z_k for verdict in judge_all(pool, candidates, len(order))])
 
 
-def split(cases: int, folds: int) -> list[tuple[int, ...]]:
-    """Deal cases out to folds, so that each holds different conditions.
+def untuned_filter(job: Job) -> Vector:
+    """z_k of an EKF with the noise levels of the sensors, which nobody tuned, (k,)."""
+    bench = Bench(replace(job, estimator=ExtendedKalmanFilter.name, gains=FilterNoise()))
+    order = tuple(range(len(job.recordings)))
+    verdict = bench.judge(Candidate(to_vector(FilterNoise()), np.inf, order))
+    bench.close()
+    return verdict.z_k
 
-    >>> split(5, 2)
-    [(0, 2, 4), (1, 3)]
+
+def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
+    """Deal recordings out to folds, so that each holds different conditions and whole stops.
+
+    >>> split(["a", "b", "c", "a", "b", "c"], 2)
+    [(0, 2, 3, 5), (1, 4)]
     """
-    return [tuple(range(fold, cases, folds)) for fold in range(folds)]
+    names = list(dict.fromkeys(stops))
+    fold = [names.index(stop) % folds for stop in stops]
+    return [tuple(k for k, mine in enumerate(fold) if mine == number) for number in range(folds)]
 
 
 def cross_validate(
@@ -88,14 +100,14 @@ def cross_validate(
     """
     everything = range(len(job.recordings))
     results: list[Fold] = []
-    for number, held_out in enumerate(split(len(everything), folds)):
+    for number, held_out in enumerate(split([one.stop for one in job.recordings], folds)):
         found = tune(number, [k for k in everything if k not in held_out])
         if found is None or found.interrupted:
             break
         tuned, untuned = judge_gains(pool, job, [found.best, reasoned])
         results.append(
             Fold(
-                cases=tuple(job.recordings[k].name for k in held_out),
+                cases=tuple(dict.fromkeys(job.recordings[k].stop for k in held_out)),
                 tuned=float(tuned[list(held_out)].max()),
                 reasoned=float(untuned[list(held_out)].max()),
                 z=found.z,

@@ -1,0 +1,186 @@
+"""`tune` as a user runs it: what it writes, what it reads back, and what it survives."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from numpy.testing import assert_array_equal
+
+from workbench.__main__ import main
+from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers import FilterNoise, reasoned_settings
+from workbench.tuning import (
+    format_gains,
+    read_gains,
+    reasoned_gains,
+    to_vector,
+    with_tuned,
+)
+
+CASES = ("03_dry_120_3.6", "08_wet_120_3.6")
+SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
+
+
+# --- gains.toml ---
+
+
+@pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf", "ukf"])
+def test_gains_read_back_to_the_bit(root: Path, tmp_path: Path, name: str) -> None:
+    model = "FullObserver" if name == "parameter_estimator" else "MinimalObserver"
+    with FMU(root / "fmus" / "fmi2" / f"{model}.fmu") as fmu:
+        gains = reasoned_gains(name, fmu)
+    path = tmp_path / "gains.toml"
+    path.write_text(format_gains(name, gains, {"z": 0.1, "cases": ['a "b"'], "z_k": {"a.b": 1}}))
+    estimator, read = read_gains(path)
+    assert estimator == name
+    assert_array_equal(to_vector(read), to_vector(gains))
+    if not isinstance(read, FilterNoise):
+        assert_array_equal(read.effect, gains.effect)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("gains = ", "no TOML"),
+        ("[gains]", "estimator = None"),
+        ('estimator = "ekf"\n[gains]\nmodel = 1', r"no omegaW_relative in \[gains\]"),
+        ('estimator = "parameter_estimator"\n[gains]', "effect = None"),
+    ],
+)
+def test_a_wrong_file_of_gains_is_refused(tmp_path: Path, text: str, match: str) -> None:
+    path = tmp_path / "gains.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=match):
+        read_gains(path)
+
+
+# --- as a user runs it ---
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Two short recordings."""
+    cases = tmp_path_factory.mktemp("cases")
+    for name in CASES:
+        (cases / name).mkdir()
+        source = root / "cases" / name
+        (cases / name / "case.toml").write_text((source / "case.toml").read_text())
+        table = pd.read_csv(source / "measured.csv").iloc[SAMPLES]
+        table.to_csv(cases / name / "measured.csv", index=False)
+    return cases
+
+
+def command(folder: Path, out: Path, *options: str) -> list[str]:
+    search = ["--cases", str(folder), "--budget", "15", "--population", "4", "--workers", "1"]
+    return ["tune", "parameter_estimator", *search, "--out", str(out), *options]
+
+
+def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
+    root: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    killed, whole = tmp_path / "killed", tmp_path / "whole"
+    checkpoint = killed / "checkpoint.json"
+    arguments = [sys.executable, "-m", "workbench", *command(folder, killed)]
+    with subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL) as master:
+        deadline = time.monotonic() + 60.0
+        while not checkpoint.exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        workers = children(master.pid)
+        master.kill()
+    assert checkpoint.exists()
+    assert workers
+    # A worker notices the death of its master at once; 10 s are for a busy machine.
+    deadline = time.monotonic() + 10.0
+    while any(alive(pid) for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [pid for pid in workers if alive(pid)]
+    # As if it had been killed inside a checkpoint, which is written beside and then renamed.
+    half = checkpoint.read_bytes()[:1000]
+    checkpoint.with_name("checkpoint.json.part").write_bytes(half)
+    assert len(json.loads(checkpoint.read_text())["history"]) < 16
+    monkeypatch.chdir(root)
+    assert main(command(folder, killed, "--resume")) == 0
+    assert main(command(folder, whole)) == 0
+    assert (killed / "gains.toml").read_bytes() == (whole / "gains.toml").read_bytes()
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process started, from /proc."""
+    found = []
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            found.append(int(status.parent.name))
+    return found
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended and waits for its parent does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_results_keep_their_contract(
+    root: Path,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(root)
+    arguments = command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "evaluations/s" in printed
+    assert "of work saved" in printed
+    assert "not seen: 03_dry_120_3.6" in printed
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert set(summary["gains"]) == {f"L{i}{j}" for i in (1, 2) for j in (1, 2, 3, 4)}
+    assert summary["z"] == max(case["z_k"] for case in summary["cases"].values())
+    assert summary["z"] <= summary["z_reasoned"]
+    assert len(summary["folds"]) == 2
+    assert len(summary["provenance"]["fmu"]["sha256"]) == 64
+    estimator, gains = read_gains(tmp_path / "gains.toml")
+    assert estimator == "parameter_estimator"
+    assert_array_equal(to_vector(gains), [g["value"] for g in summary["gains"].values()])
+    for name in ("convergence.png", "cases.png"):
+        assert (tmp_path / name).stat().st_size > 10_000
+    assert not list(tmp_path.glob("*.part"))
+    with FMU(MINIMAL_OBSERVER) as minimal, FMU(FULL_OBSERVER) as full:
+        settings = with_tuned(reasoned_settings(minimal, full), gains)
+    assert settings.parameter is gains
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        (["--folds", "3"], "3 with 2 cases"),
+        (["--fmu", "README.md"], "no FMU"),
+        (["--cluster", "tcp://127.0.0.1:1"], "--cluster"),
+    ],
+)
+def test_a_users_mistake_gives_status_2_and_a_message(
+    root: Path,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: list[str],
+    match: str,
+) -> None:
+    monkeypatch.chdir(root)
+    assert main(command(folder, tmp_path, *options)) == 2
+    captured = capsys.readouterr().err
+    assert match in captured
+    assert "Traceback" not in captured

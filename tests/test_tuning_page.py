@@ -1,0 +1,422 @@
+"""The page of `tune`: every number of the summary, the bad news first."""
+
+import copy
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import lxml.html
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.fmu import FMU
+from workbench.report.tuning import meanings, write_tuning_page
+from workbench.tuning import TUNABLE, gain_names, reasoned_gains
+
+HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
+CASES = {"03_dry_120_3.6": "03_dry_120_3.6", HOSTILE: "08_wet_120_3.6"}  # and where it is from
+SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Two short recordings."""
+    cases = tmp_path_factory.mktemp("cases")
+    for name, source in CASES.items():
+        (cases / name).mkdir()
+        text = (root / "cases" / source / "case.toml").read_text()
+        (cases / name / "case.toml").write_text(text)
+        table = pd.read_csv(root / "cases" / source / "measured.csv").iloc[SAMPLES]
+        table.to_csv(cases / name / "measured.csv", index=False)
+    return cases
+
+
+def command(folder: Path, out: Path, *options: str) -> list[str]:
+    search = ["--cases", str(folder), "--population", "2", "--workers", "1", "--out", str(out)]
+    return ["tune", "disturbance_observer", *search, *options]
+
+
+@pytest.fixture(scope="module")
+def results(root: Path, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Through the command line, its last line beside the results."""
+    out = tmp_path_factory.mktemp("tuned")
+    arguments = command(folder, out, "--budget", "2", "--folds", "2")
+    run = subprocess.run(
+        [sys.executable, "-m", "workbench", *arguments],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (out / "printed").write_text(run.stdout)
+    return out
+
+
+@pytest.fixture(scope="module")
+def summary(results: Path) -> dict[str, Any]:
+    return json.loads((results / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def page(results: Path) -> Any:
+    return lxml.html.fromstring((results / "index.html").read_bytes())
+
+
+def text(element: Any) -> str:
+    return " ".join(element.text_content().split())
+
+
+def data(page: Any, table: str) -> pd.DataFrame:
+    """Numbers of a table as the page sorts them, texts as they are shown, by its headings."""
+    table = page.get_element_by_id(table)
+    titles = [text(cell) for cell in table.xpath("thead/tr/th")][1:]
+    rows = {
+        text(row[0]): [
+            text(cell) if cell.get("data-value") is None else float(cell.get("data-value"))
+            for cell in row[1:]
+        ]
+        for row in table.find("tbody")
+    }
+    return pd.DataFrame.from_dict(rows, orient="index", columns=titles)
+
+
+def news(page: Any) -> str:
+    return " ".join(text(one) for one in page.xpath("//header//p[@class='warning']"))
+
+
+def headline(page: Any) -> str:
+    return text(page.get_element_by_id("result"))
+
+
+def written(summary: dict[str, Any], folder: Path) -> Any:
+    return lxml.html.fromstring(write_tuning_page(summary, folder).read_bytes())
+
+
+@pytest.fixture
+def changed(summary: dict[str, Any]) -> dict[str, Any]:
+    """A copy of the summary, to be changed."""
+    return copy.deepcopy(summary)
+
+
+# --- the page as a whole ---
+
+
+def test_command_ends_with_the_name_of_the_page(results: Path) -> None:
+    last = (results / "printed").read_text().splitlines()[-1]
+    assert str(results / "index.html") in last
+
+
+def test_page_follows_from_the_summary_alone(
+    results: Path, summary: dict[str, Any], tmp_path: Path
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    again = write_tuning_page(summary, tmp_path / "elsewhere").read_text()
+    there = again.replace(str(tmp_path / "elsewhere"), str(results))
+    assert there == (results / "index.html").read_text()
+
+
+def test_page_loads_nothing_and_links_only_to_what_is_there(results: Path, page: Any) -> None:
+    source = (results / "index.html").read_text()
+    assert not re.search(r"url\(|@import|(src|href)=\"(\w+:)?//", source)
+    assert "default-src 'none'" in page.xpath("//meta[@http-equiv]/@content")[0]
+    ids = page.xpath("//@id")
+    links = {unquote(address) for address in page.xpath("//a/@href")}
+    assert links >= {"gains.toml", "summary.json", "convergence.png", "cases.png"}
+    for link in links:
+        assert link[1:] in ids if link.startswith("#") else (results / link).stat().st_size > 0
+
+
+def test_page_follows_the_rules_of_accessible_pages(page: Any) -> None:
+    levels = [int(heading.tag[1]) for heading in page.xpath("//h1|//h2|//h3")]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    ids = page.xpath("//@id")
+    assert len(ids) == len(set(ids))
+    assert set(page.xpath("//@aria-labelledby")) <= set(ids)
+    for table in page.xpath("//table"):
+        assert table.xpath("string(caption)").strip()
+        assert all(cell.get("scope") == "col" for cell in table.xpath("thead//th"))
+        columns = len(table.xpath("thead//th"))
+        assert all(row[0].get("scope") == "row" for row in table.find("tbody"))
+        assert all(len(row) == columns for row in table.find("tbody"))
+    for drawing in page.xpath("//svg"):
+        assert drawing.get("role") == "img"
+        assert re.search(r"\d", drawing.get("aria-label"))
+
+
+def test_a_hostile_name_of_a_case_stays_text(page: Any) -> None:
+    assert HOSTILE in data(page, "case-table").index
+    assert HOSTILE in data(page, "fold-table").index
+    assert HOSTILE in page.xpath("//svg/@aria-label")[0]
+    assert HOSTILE in [text(label) for label in page.xpath("//svg/text")]
+    assert not page.xpath("//img|//@onerror")
+
+
+def test_page_opens_without_errors_and_draws_its_curve(
+    results: Path, probe: Callable[[Path, str], dict[str, Any]]
+) -> None:
+    curve = "document.querySelector('.dots .curve')"
+    found = probe(
+        results / "index.html",
+        f"told.length = {curve}.getTotalLength(); told.fill = getComputedStyle({curve}).fill;",
+    )
+    assert found["errors"] == []
+    assert found["length"] > 100  # [px]
+    assert found["fill"] == "none"
+
+
+# --- the result ---
+
+
+def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    told = headline(page)
+    z_k = sorted(((case["z_k"], name) for name, case in summary["cases"].items()), reverse=True)
+    (worst, first), (next_worst, second) = z_k
+    assert f"from {summary['z_reasoned']:.4g} with the reasoned gains to {worst:.4g}" in told
+    assert f"worst case is {first}, by {100 * (1 - next_worst / worst):.1f} % over {second}" in told
+    bound = [name for name, gain in summary["gains"].items() if gain["at_bound"]]
+    assert f"; {', '.join(bound) or 'no gain'} ended at a bound" in told
+    assert not re.search(r"\. [A-Z]", told)
+
+
+def test_gains_at_a_bound_are_named_and_flagged(changed: dict[str, Any], tmp_path: Path) -> None:
+    for name, gain in changed["gains"].items():
+        gain["at_bound"] = name in ("L12", "T_WR")
+    page = written(changed, tmp_path)
+    assert "; L12, T_WR ended at a bound" in headline(page)
+    table = page.get_element_by_id("gain-table")
+    flagged = [row for row in table.find("tbody") if row.find_class("warning")]
+    assert [text(row[0]) for row in flagged] == ["L12", "T_WR"]
+    assert all("at bound" in text(row[-1]) for row in flagged)
+
+
+def test_gains_that_were_not_improved_are_not_praised(
+    changed: dict[str, Any], tmp_path: Path
+) -> None:
+    changed["z"] = changed["z_reasoned"]
+    changed["convergence"] = [changed["z"]]
+    assert headline(written(changed, tmp_path)).startswith(f"z stays at {changed['z']:.4g}")
+
+
+def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
+    del changed["cases"][HOSTILE]
+    page = written(changed, tmp_path)
+    assert "tuned on one recorded stop" in text(page.find(".//h1"))
+    assert "the only case is 03_dry_120_3.6" in headline(page)
+
+
+# --- tables and figures ---
+
+
+def test_every_case_is_shown_with_its_numbers_the_worst_first(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    table = data(page, "case-table")
+    assert sorted(table.index) == sorted(CASES)
+    assert table["z_k, tuned"].is_monotonic_decreasing
+    for name, case in summary["cases"].items():
+        row = table.loc[name]
+        assert row["z_k, reasoned"] == case["z_k_reasoned"]
+        assert row["z_k, tuned"] == case["z_k"]
+        assert row["unstable candidates"] == case["unstable"]
+        assert row["change"] == case["z_k"] / case["z_k_reasoned"] - 1
+
+
+def test_every_gain_is_shown_with_its_numbers_and_unit(page: Any, summary: dict[str, Any]) -> None:
+    table = data(page, "gain-table")
+    assert list(table.index) == list(summary["gains"])
+    for name, gain in summary["gains"].items():
+        row, effect = table.loc[name], summary["sensitivity"][name]
+        assert (row["tuned"], row["reasoned"]) == (gain["value"], gain["reasoned"])
+        assert row["searched from, to"] == f"{gain['lower']:.4g}, {gain['upper']:.4g}"
+        for column, key in (("z, less", "less"), ("z, more", "more"), ("z, without", "without")):
+            assert row[column] == (np.inf if effect[key] is None else effect[key])
+        assert ("does not matter" in row["remark"]) == (not effect["matters"])
+    units = table["unit"]
+    assert units[["L12", "L21", "T_DC"]].eq("1/s").all()
+    assert units[["L13", "L24"]].eq("1/s2").all()
+    assert units[["L31", "L42"]].eq("1/rad").all()
+    assert units[["L33", "L44"]].eq("1/(rad.s)").all()
+    assert table.at["L43", "what it does"] == "rate of dmuDC by ∫ omegaW"
+
+
+@pytest.mark.parametrize("estimator", TUNABLE)
+def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(root: Path, estimator: str) -> None:
+    model = "FullObserver" if estimator == "parameter_estimator" else "MinimalObserver"
+    with FMU(root / "fmus" / "fmi2" / f"{model}.fmu") as fmu:
+        names = gain_names(reasoned_gains(estimator, fmu))
+    assert set(meanings(estimator)) == set(names)
+
+
+def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
+    changed: dict[str, Any], tmp_path: Path
+) -> None:
+    gain, effect = changed["gains"]["L11"], changed["sensitivity"]["L11"]
+    names = meanings("ekf")
+    changed |= {"estimator": "ekf", "gains": dict.fromkeys(names, gain)}
+    page = written(changed | {"sensitivity": dict.fromkeys(names, effect)}, tmp_path)
+    assert text(page.find(".//h1")) == "Extended Kalman filter, tuned on 2 recorded stops"
+    units = data(page, "gain-table")["unit"]
+    assert units[["omegaW_relative", "initial_friction"]].eq("1").all()
+    assert units[["omegaW", "omegaR"]].eq("rad/s").all()
+    assert units[["muWR", "muDC"]].eq("1/sqrt(s)").all()
+
+
+def test_a_gain_without_which_the_estimate_diverges_says_so(
+    changed: dict[str, Any], tmp_path: Path
+) -> None:
+    changed["sensitivity"]["L42"] |= {"without": None, "matters": True}
+    table = written(changed, tmp_path).get_element_by_id("gain-table")
+    (row,) = (row for row in table.find("tbody") if text(row[0]) == "L42")
+    assert text(row[-2]) == "diverges"
+    assert row[-2].get("data-value") == "Infinity"  # sorts as the worst
+
+
+def test_dots_of_cases_lie_on_one_axis_from_zero(page: Any, summary: dict[str, Any]) -> None:
+    drawing = page.xpath("//section[@aria-labelledby='cases']//svg")[0]
+    names = [text(label) for label in drawing.xpath("./text[@text-anchor='end']")]
+    cases = [summary["cases"][name] for name in names]
+    circles = [float(x) for x in drawing.xpath("./circle/@cx")]
+    diamonds = [
+        float(re.match(r"M([\d.]+)", d)[1])  # type: ignore[index]
+        for d in drawing.xpath("./path[contains(@class, 'diamond')]/@d")
+    ]
+    (zero,) = (
+        float(tick.get("x")) for tick in drawing.xpath("./text[@class='tick']") if text(tick) == "0"
+    )
+    z_k = np.array([*(c["z_k_reasoned"] for c in cases), *(c["z_k"] for c in cases)])
+    places = np.array([*circles, *diamonds]) - zero
+    assert_allclose(places, z_k * places[0] / z_k[0], atol=0.2)  # [px] as rounded, twice
+
+
+def test_curve_of_the_convergence_holds_z_of_every_generation(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    drawing = page.xpath("//section[@aria-labelledby='search']//svg")[0]
+    path = drawing.xpath("./path[contains(@class, 'curve')]/@d")[0]
+    points = np.array(re.findall(r"H([\d.]+)V([\d.]+)", path), float)
+    z = np.array([*summary["convergence"], summary["z_reasoned"]])
+    rule = drawing.xpath("./path[@class='noise']/@d")[0]
+    heights = np.array([*points[:, 1], float(rule.split()[1].split("h")[0])])
+    assert np.diff(points[:, 0]) == pytest.approx(np.ptp(points[:, 0]) / (len(points) - 1), abs=0.1)
+    slope = np.ptp(heights) / np.ptp(z)
+    assert_allclose(heights, heights[-1] + slope * (z[-1] - z), atol=0.2)  # [px] as rounded, twice
+
+
+def test_folds_are_shown_and_lost_ones_are_bad_news(
+    page: Any, summary: dict[str, Any], changed: dict[str, Any], tmp_path: Path
+) -> None:
+    table = data(page, "fold-table")
+    assert table["z, tuned without them"].is_monotonic_decreasing
+    for fold in summary["folds"]:
+        row = table.loc[", ".join(fold["cases"])]
+        assert row["z, reasoned"] == fold["reasoned"]
+        assert row["z, tuned without them"] == fold["tuned"]
+        assert row["z of the cases tuned on"] == fold["z"]
+    better, lost = changed["folds"]
+    better["tuned"], lost["tuned"] = 0.9 * better["reasoned"], float("inf")
+    one_lost = written(changed, tmp_path)
+    assert "not better than the reasoned ones in 1 of 2 folds" in news(one_lost)
+    verdicts = data(one_lost, "fold-table")["verdict"]
+    assert list(verdicts.index) == [", ".join(fold["cases"]) for fold in (lost, better)]
+    assert list(verdicts) == ["⚠ not better", "better"]
+    changed["folds"] = []
+    without = written(changed, tmp_path)
+    assert not without.xpath("//*[@id='fold-table']|//a[@href='#folds']")
+    assert "not seen" not in news(without)
+
+
+def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], results: Path) -> None:
+    told = {text(entry): text(entry.getnext()) for entry in page.xpath("//dl[@class='grid']/dt")}
+    work, provenance = summary["work"], summary["provenance"]
+    assert told["Generations"] == str(work["generations"])
+    assert told["Candidates"].startswith(f"{work['candidates']}, ")
+    assert told["Work saved"].startswith(f"{100 * work['saved']:.2f} %")
+    assert told["Time"] == f"{work['seconds']:.1f} s"
+    assert told["Crashed or blocked workers"] == str(work["crashed"])
+    assert told["SHA-256 of the FMU"] == provenance["fmu"]["sha256"]
+    assert told["Random seed"] == str(provenance["seed"])
+    for package, version in provenance["packages"].items():
+        assert f"{package} {version}" in told["Versions"]
+    (use,) = page.xpath("//pre[@class='source']")
+    assert text(use) == f"python -m workbench simulate --gains {results / 'gains.toml'}"
+
+
+# --- bad news ---
+
+
+def test_an_interrupted_run_says_so_and_claims_no_sensitivity(
+    root: Path, folder: Path, tmp_path: Path
+) -> None:
+    arguments = [sys.executable, "-m", "workbench", *command(folder, tmp_path, "--budget", "9999")]
+    with subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL) as run:
+        deadline = time.monotonic() + 60.0
+        while not (tmp_path / "checkpoint.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        run.send_signal(signal.SIGINT)
+        assert run.wait(60) == 130
+    page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
+    generations = json.loads((tmp_path / "summary.json").read_text())["work"]["generations"]
+    assert headline(page).startswith(f"Interrupted after generation {generations}: ")
+    assert "Incomplete" in news(page)
+    assert "--resume" in news(page)
+    assert list(data(page, "gain-table").columns)[-2:] == ["unit", "remark"]
+
+
+def test_an_uninterrupted_run_does_not_say_so(page: Any) -> None:
+    assert not re.search("[Ii]nterrupted|Incomplete", text(page))
+
+
+def test_what_got_worse_comes_before_the_tables(changed: dict[str, Any], tmp_path: Path) -> None:
+    for case in changed["cases"].values():
+        case["z_k_reasoned"] = 2.0 * case["z_k"]
+    assert "Worse" not in news(written(changed, tmp_path))
+    changed["cases"][HOSTILE]["z_k_reasoned"] = 0.5 * changed["cases"][HOSTILE]["z_k"]
+    changed["work"]["crashed"] = 3
+    told = news(written(changed, tmp_path))
+    assert f"Worse than with the reasoned gains: {HOSTILE} (" in told
+    assert "03_dry_120_3.6 (" not in told
+    assert "blocked their worker: 3" in told
+
+
+def test_a_search_that_could_go_on_says_with_which_gain(
+    changed: dict[str, Any], tmp_path: Path
+) -> None:
+    for effect in changed["sensitivity"].values():
+        effect |= {"less": 0.02, "more": -0.009, "without": None, "matters": True}
+    assert "converged" not in news(written(changed, tmp_path))
+    changed["sensitivity"]["L31"]["less"] = -0.034
+    page = written(changed, tmp_path)
+    assert "by up to 3.4 %, with another value of one gain alone (L31)" in news(page)
+    remarks = data(page, "gain-table")["remark"]
+    assert [name for name in remarks.index if "not converged" in remarks[name]] == ["L31"]
+
+
+def test_other_estimators_are_compared_and_better_ones_are_bad_news(
+    page: Any, changed: dict[str, Any], tmp_path: Path
+) -> None:
+    assert not page.xpath("//*[@id='beside-table']")
+    z, name = changed["z"], "disturbance observer"
+    changed["beside"] = {
+        "direct_inversion": {"z": 9.0 * z, "worst": HOSTILE},
+        "ekf": {"z": 0.5 * z, "worst": "03_dry_120_3.6"},
+    }
+    beside = written(changed, tmp_path)
+    table = data(beside, "beside-table")
+    order = ["extended Kalman filter", f"{name}, tuned", f"{name}, reasoned", "direct inversion"]
+    assert list(table.index) == order
+    assert list(table["z"]) == [0.5 * z, z, changed["z_reasoned"], 9.0 * z]
+    assert table.at["direct inversion", "worst case"] == HOSTILE
+    assert f"without any tuning: extended Kalman filter, z = {0.5 * z:.4g}" in news(beside)
+    assert "direct inversion" not in news(beside)

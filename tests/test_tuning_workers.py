@@ -1,0 +1,202 @@
+"""A search ends at the same gains with less work, other workers, after deaths and interruptions."""
+
+import errno
+import os
+import signal
+from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor, Future
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from workbench.errors import InputError
+from workbench.tuning import Job, Plan, Pool, ProcessPool, Search, SearchSpace, search, to_vector
+from workbench.tuning.checkpoint import load
+from workbench.tuning.cost import Candidate, Verdict
+from workbench.tuning.search import identity
+from workbench.tuning.workers import judge_all
+
+SMALL = Plan(generations=4, population=1, seed=3)
+
+
+def run(pool: Pool, problem: tuple[Job, SearchSpace], path: Path, plan: Plan, **options) -> Search:
+    job, space = problem
+    found = search(pool, job, space, range(len(job.recordings)), plan, path, **options)
+    assert found is not None
+    return found
+
+
+def test_economy_changes_nothing_but_the_work(
+    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+) -> None:
+    plan = replace(SMALL, generations=8)
+    thrifty = run(pool, problem, tmp_path / "a.json", plan)
+    full = run(pool, problem, tmp_path / "b.json", replace(plan, economy=False))
+    mark = identity(*problem, range(3), plan)
+    a, b = (load(tmp_path / name, mark) for name in ("a.json", "b.json"))
+    assert a is not None
+    assert b is not None
+    for name in ("members", "z", "z_k", "order"):
+        assert_array_equal(getattr(a.population, name), getattr(b.population, name))
+    assert a.rng == b.rng
+    assert_array_equal(thrifty.best, full.best)
+    assert sum(g.samples for g in thrifty.history) < 0.8 * sum(g.samples for g in full.history)
+    assert thrifty.z < thrifty.history[0].z
+
+
+# --- workers ---
+
+
+def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
+    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+) -> None:
+    """One process of two is killed while it works."""
+    job, _ = problem
+    alone = run(pool, problem, tmp_path / "alone.json", SMALL)
+    two = ProcessPool(job, 2, 60.0)
+    killed = []
+
+    def kill_once(history: Sequence[object]) -> None:
+        if not killed:
+            killed.append(next(iter(two._executor._processes)))
+            os.kill(killed[0], signal.SIGKILL)
+
+    try:
+        found = run(two, problem, tmp_path / "two.json", SMALL, report=kill_once)
+    finally:
+        two.close()
+    assert killed
+    assert_array_equal(found.best, alone.best)
+    assert_array_equal(found.z_k, alone.z_k)
+
+
+def test_a_cluster_finds_the_same_gains(
+    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    from workbench.tuning.cluster import DaskPool
+
+    job, _ = problem
+    alone = run(pool, problem, tmp_path / "alone.json", SMALL)
+    options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
+    with distributed.LocalCluster(processes=False, **options) as cluster:
+        remote = DaskPool(job, cluster.scheduler_address, 60.0)
+        try:
+            found = run(remote, problem, tmp_path / "remote.json", SMALL)
+        finally:
+            remote.close()
+    assert_array_equal(found.best, alone.best)
+
+
+def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
+    problem: tuple[Job, SearchSpace],
+) -> None:
+    job, _ = problem
+    endless = (0,) * 100_000  # at 1 ms a case, two minutes
+    hasty = ProcessPool(job, 1, 0.3)
+    try:
+        [verdict] = judge_all(hasty, [Candidate(to_vector(job.gains), np.inf, endless)], 3)
+    finally:
+        hasty.close()
+    assert verdict.crashed
+    assert verdict.z == np.inf
+
+
+class Deadly:
+    """A pool that loses the tasks which hold a certain candidate."""
+
+    size = 1
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+    def __init__(self, pool: Pool, candidate: float) -> None:
+        self._pool = pool
+        self._candidate = candidate
+        self.submitted: list[list[float]] = []
+
+    def submit(self, candidates: Sequence[Candidate]) -> "Future[list[Verdict]]":
+        self.submitted.append([float(c.values[0]) for c in candidates])
+        if self._candidate not in self.submitted[-1]:
+            return self._pool.submit(candidates)
+        future: Future[list[Verdict]] = Future()
+        future.set_exception(BrokenExecutor("a worker died"))
+        return future
+
+
+def test_only_the_candidate_that_kills_workers_is_lost(
+    problem: tuple[Job, SearchSpace], pool: Pool
+) -> None:
+    _, space = problem
+    values = [space.gains(np.clip(space.start + 0.001 * i, 0, 1)) for i in range(40)]
+    candidates = [Candidate(v, np.inf, (0, 1, 2)) for v in values]
+    undisturbed = judge_all(pool, candidates, 3)
+    deadly = Deadly(pool, float(values[7][0]))
+    verdicts = judge_all(deadly, candidates, 3)
+    assert [v.crashed for v in verdicts] == [i == 7 for i in range(40)]
+    others = [i for i in range(40) if i != 7]
+    assert_array_equal([verdicts[i].z for i in others], [undisturbed[i].z for i in others])
+    # Its task had others in it, so it was judged again by itself.
+    assert [float(values[7][0])] in deadly.submitted
+
+
+# --- checkpoints ---
+
+
+def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
+    problem: tuple[Job, SearchSpace],
+    pool: Pool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    undisturbed = run(pool, problem, tmp_path / "undisturbed.json", SMALL)
+    path = tmp_path / "checkpoint.json"
+    warnings: list[str] = []
+    kept: list[bytes] = []
+
+    def fill_disk(history: Sequence[object]) -> None:
+        if len(history) == 2:
+            kept.append(path.read_bytes())
+
+            def refuse(number: int) -> None:
+                raise OSError(errno.ENOSPC, "No space left on device")
+
+            monkeypatch.setattr(os, "fsync", refuse)
+
+    found = run(pool, problem, path, SMALL, report=fill_disk, warn=warnings.append)
+    assert path.read_bytes() == kept[0]
+    assert not list(tmp_path.glob("*.part"))
+    assert len(warnings) == SMALL.generations - 1
+    assert "No space left on device" in warnings[0]
+    assert_array_equal(found.best, undisturbed.best)
+
+
+def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
+    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+) -> None:
+    whole = run(pool, problem, tmp_path / "whole.json", SMALL)
+
+    def interrupt(history: Sequence[object]) -> None:
+        if len(history) == 3:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "checkpoint.json"
+    part = run(pool, problem, path, SMALL, report=interrupt)
+    assert part.interrupted
+    assert len(part.history) == 3
+    rest = run(pool, problem, path, SMALL, resume=True)
+    assert_array_equal(rest.best, whole.best)
+    assert [g.z for g in rest.history] == [g.z for g in whole.history]
+
+
+def test_another_search_does_not_go_on_from_a_checkpoint(
+    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+) -> None:
+    path = tmp_path / "checkpoint.json"
+    run(pool, problem, path, SMALL)
+    with pytest.raises(InputError, match="another search"):
+        run(pool, problem, path, replace(SMALL, seed=4), resume=True)
+    path.write_text(path.read_text()[:-100])
+    with pytest.raises(InputError, match="no checkpoint"):
+        run(pool, problem, path, SMALL, resume=True)

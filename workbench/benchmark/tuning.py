@@ -1,0 +1,263 @@
+"""Times and memory of the tuning: an evaluation beside FMPy's methods, workers, a Dask cluster."""
+
+import functools
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from workbench.benchmark import fmpy_loops
+from workbench.benchmark.memory import watch_command
+from workbench.case import Case
+from workbench.fmu import FMU, Vector
+from workbench.objective import Weights
+from workbench.observers import DisturbanceObserver, Estimate, ParameterEstimator
+from workbench.tuning import (
+    Job,
+    Pool,
+    ProcessPool,
+    from_vector,
+    reasoned_gains,
+    recording,
+    to_vector,
+)
+from workbench.tuning.cost import Bench, Candidate
+from workbench.tuning.workers import judge_all
+
+WORKERS = 2
+CANDIDATES = 48  # some seconds of work
+_REPEATS = 3
+_EVALUATIONS = 15  # of ours, in each repeat of one by FMPy
+_VARIATION = 0.01  # of gains: candidates differ, and all of them are stable
+_SEED = 1
+_TIMEOUT = 60.0  # s for one candidate, which takes 0.1
+# Rounding, grown 1e4 times by an estimator, of signals a thousand times as large as their errors.
+_AGREEMENT = 1e-9
+
+
+@dataclass(frozen=True)
+class EvaluationTimes:
+    """One candidate over one recording, from its gains to z; medians over repeats.
+
+    Attributes
+    ----------
+    steps : of the recording.
+    ours : by the tuning [s].
+    fmpy : by the same method written with FMPy's methods and numpy [s].
+    z : objective that both find.
+    """
+
+    estimator: str
+    steps: int
+    ours: float
+    fmpy: float
+    z: float
+
+    def ratios(self) -> Mapping[str, float]:
+        """How many times as long FMPy's methods take."""
+        return {"fmpy": self.fmpy / self.ours}
+
+
+@dataclass(frozen=True)
+class WorkerRates:
+    """Candidates per second over all cases in full, by workers that are ready; medians.
+
+    Attributes
+    ----------
+    one, two : by so many processes.
+    dask : by two processes of a local Dask cluster; None without the extra [cluster].
+    """
+
+    cases: int
+    candidates: int
+    one: float
+    two: float
+    dask: float | None
+
+    def ratios(self) -> Mapping[str, float]:
+        """Two processes over one, and Dask's two over these."""
+        dask = {} if self.dask is None else {"dask": self.dask / self.two}
+        return {"two": self.two / self.one, **dask}
+
+
+@dataclass(frozen=True)
+class TuningMemory:
+    """Peaks of resident memory in a run of the command with two workers [bytes].
+
+    Attributes
+    ----------
+    master : of the process that searches.
+    worker : of the largest process that it starts.
+    total : of all processes.
+    """
+
+    master: int
+    worker: int
+    total: int
+
+
+def measure_evaluations(case: Case, minimal: Path, full: Path) -> list[EvaluationTimes]:
+    """Time the reasoned gains of the two observers of the paper on one recording.
+
+    Parameters
+    ----------
+    minimal, full : the two observer models, FMI 2.0.
+    """
+    times = []
+    for name, path, loop in (
+        (DisturbanceObserver.name, minimal, fmpy_loops.disturbance_observer),
+        (ParameterEstimator.name, full, fmpy_loops.parameter_estimator),
+    ):
+        job = tuning_job(name, path, [case])
+        with fmpy_loops.FMPyModel(path) as model:
+            by_fmpy = functools.partial(evaluate_by_fmpy, job, functools.partial(loop, model))
+            times.append(measure_evaluation(job, by_fmpy))
+    return times
+
+
+def tuning_job(estimator: str, path: Path, cases: Sequence[Case]) -> Job:
+    """What is to be judged, about the reasoned gains."""
+    with FMU(path) as fmu:
+        gains = reasoned_gains(estimator, fmu)
+    recordings = tuple(map(recording, cases))
+    return Job(estimator, path.read_bytes(), {}, gains, recordings, Weights())
+
+
+def evaluate_by_fmpy(job: Job, loop: Callable[..., Estimate], values: Vector) -> float:
+    """The z of gains, (n,), over the first recording of a job, by a loop over FMPy's methods."""
+    case = job.recordings[0]
+    estimate = loop(from_vector(job.gains, values), np.cumsum(case.steps), case.u, case.y)
+    return fmpy_loops.objective(estimate, case, job.weights)
+
+
+def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> EvaluationTimes:
+    """Time the reasoned gains over the first recording of a job, in turns with another way.
+
+    Raises
+    ------
+    ArithmeticError
+        If the other way finds another z, because then it does other work.
+    """
+    values = to_vector(job.gains)
+    ours, theirs = [], []
+    with closing(Bench(job)) as bench:
+        for _ in range(_REPEATS):
+            for _ in range(_EVALUATIONS):
+                begin = time.perf_counter()
+                verdict = bench.judge(Candidate(values, np.inf, (0,)))
+                ours.append(time.perf_counter() - begin)
+            begin = time.perf_counter()
+            z = by_fmpy(values)
+            theirs.append(time.perf_counter() - begin)
+            if not abs(z - verdict.z) <= _AGREEMENT * verdict.z:
+                raise ArithmeticError(
+                    f"{job.estimator}: z is {verdict.z} by the tuning and {z} by FMPy's methods, "
+                    "so their times are not those of the same evaluation"
+                )
+    median = statistics.median
+    return EvaluationTimes(job.estimator, verdict.samples, median(ours), median(theirs), verdict.z)
+
+
+def measure_workers(
+    cases: Sequence[Case], minimal: Path, candidates: int = CANDIDATES
+) -> WorkerRates:
+    """Judge the same candidates of the disturbance observer by one worker, by two, and with Dask.
+
+    Raises
+    ------
+    ArithmeticError
+        If they do not all find the same z.
+    """
+    job = tuning_job(DisturbanceObserver.name, minimal, cases)
+    rng = np.random.default_rng(_SEED)
+    reasoned, order = to_vector(job.gains), tuple(range(len(cases)))
+    changed = reasoned * (1.0 + _VARIATION * rng.standard_normal((candidates, reasoned.size)))
+    every = [Candidate(values, np.inf, order) for values in changed]
+    with ExitStack() as stack:
+        pools: list[Pool] = [ProcessPool(job, size, _TIMEOUT) for size in (1, WORKERS)]
+        for pool in pools:
+            stack.callback(pool.close)
+        if find_spec("distributed"):
+            pools.append(_dask_pool(job, stack))
+        rates = _rates(pools, every)
+    one, two, *dask = rates
+    return WorkerRates(len(cases), candidates, one, two, dask[0] if dask else None)
+
+
+def _dask_pool(job: Job, stack: ExitStack) -> Pool:
+    """A pool on a cluster of this machine, which ends with the stack."""
+    from distributed import LocalCluster
+
+    from workbench.tuning.cluster import DaskPool
+
+    cluster = LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None)
+    stack.enter_context(cluster)
+    return stack.enter_context(closing(DaskPool(job, cluster.scheduler_address, _TIMEOUT)))
+
+
+def _rates(pools: Sequence[Pool], candidates: Sequence[Candidate]) -> list[float]:
+    """Candidates per second of each pool; in turns, so that they meet the same load."""
+    cases = len(candidates[0].order)
+    # The first time is not counted: it starts the workers.
+    z = [[verdict.z for verdict in judge_all(pool, candidates, cases)] for pool in pools]
+    if not np.isfinite(z).all() or any(other != z[0] for other in z):
+        raise ArithmeticError("candidates failed, or workers of different pools disagree about z")
+    spent: list[list[float]] = [[] for _ in pools]
+    for _ in range(_REPEATS):
+        for pool, times in zip(pools, spent, strict=True):
+            begin = time.perf_counter()
+            judge_all(pool, candidates, cases)
+            times.append(time.perf_counter() - begin)
+    return [len(candidates) / statistics.median(times) for times in spent]
+
+
+def measure_memory(folders: Sequence[Path], minimal: Path) -> TuningMemory:
+    """Tune the disturbance observer with the command, as briefly as it goes.
+
+    Parameters
+    ----------
+    folders : of cases.
+    """
+    command = [sys.executable, "-m", "workbench", "tune", DisturbanceObserver.name]
+    brief = ["--workers", str(WORKERS), "--budget", "1", "--population", "1"]
+    with tempfile.TemporaryDirectory() as out:
+        where = ["--fmu", str(minimal), "--out", out, "--cases", *map(str, folders)]
+        peaks = watch_command([*command, *brief, *where])
+    master, *others = peaks
+    return TuningMemory(master, max(others), sum(peaks))
+
+
+def format_tuning(
+    evaluations: Sequence[EvaluationTimes], rates: WorkerRates, memory: TuningMemory
+) -> str:
+    """The measurements as a table."""
+    lines = [
+        "tuning: a candidate over a recorded stop at 200 Hz, from its gains to z",
+        f"{'estimator':<21} {'steps':>6} {'ms':>6} {'FMPy':>6}",
+    ]
+    for row in evaluations:
+        ratio = f"{row.ratios()['fmpy']:.0f}x"
+        lines.append(f"{row.estimator:<21} {row.steps:>6} {1e3 * row.ours:>6.2f} {ratio:>6}")
+    ratios = rates.ratios()
+    cluster = (
+        "no Dask cluster measured, because there is no package 'distributed'"
+        if rates.dask is None
+        else f"{rates.dask:.1f} by {WORKERS} of a Dask cluster, {ratios['dask']:.2f} times as many"
+    )
+    lines += [
+        "FMPy: how many times as long the same evaluation takes with FMPy's methods and numpy",
+        f"candidates of the disturbance observer over {rates.cases} cases, in full: "
+        f"{rates.one:.1f} per second by one worker, {rates.two:.1f} by {WORKERS}, "
+        f"{ratios['two']:.2f} times as many; {cluster}",
+        f"peak memory of the command with {WORKERS} workers: {memory.master / 1e6:.0f} MB in the "
+        f"master, {memory.worker / 1e6:.0f} MB in the largest worker, "
+        f"{memory.total / 1e6:.0f} MB in all processes",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,264 @@
+"""The page of `tune`: what the search gained, what is wrong with it, what each gain is worth.
+
+Numbers come from the summary alone; what is here orders and places them.
+"""
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.objective import BANDWIDTH
+from workbench.report.drawing import _ticks
+from workbench.report.results import _write, label
+from workbench.report.templates import environment
+from workbench.tuning.validation import NEGLIGIBLE, STEP
+
+_REASONED, _TUNED = "0", "2"  # styles of curves
+_DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of the cases [px]
+_CURVE = {"left": 58, "width": 850, "height": 220, "top": 16}  # of the convergence [px]
+
+_COLUMNS = ("omegaW", "omegaR", "∫ omegaW", "∫ omegaR")  # deviations that correct, integrals
+# What a row of L corrects, and the unit of a gain of a deviation, and of its integral.
+_ROWS = {
+    "disturbance_observer": (
+        *((f"rate of {speed}", "1/s", "1/s2") for speed in ("omegaW", "omegaR")),
+        *((f"rate of {friction}", "1/rad", "1/(rad.s)") for friction in ("dmuWR", "dmuDC")),
+    ),
+    "parameter_estimator": tuple((friction, "s/rad", "1/rad") for friction in ("dmuWR", "dmuDC")),
+}
+_RATES = {f"T_{at}": (f"rate at which dmu{at} decays", "1/s") for at in ("WR", "DC")}
+_NOISE = {
+    "omegaW_relative": ("scatter of omegaW, as a share of it", "1"),
+    "omegaW": ("scatter of omegaW", "rad/s"),
+    "omegaR": ("scatter of omegaR", "rad/s"),
+    "model": ("random walk of every state", "unit of the state/sqrt(s)"),
+    "muWR": ("random walk of muWR", "1/sqrt(s)"),
+    "muDC": ("random walk of muDC", "1/sqrt(s)"),
+    "initial_friction": ("what is known of frictions at the start", "1"),
+}
+
+
+def meanings(estimator: str) -> dict[str, tuple[str, str]]:
+    """What each gain of an estimator does, and its unit.
+
+    >>> meanings("parameter_estimator")["L23"]
+    ('dmuDC by ∫ omegaW', '1/rad')
+    """
+    if estimator not in _ROWS:
+        return _NOISE
+    entries = {
+        f"L{i}{j}": (f"{row} by {column}", units[j > 2])
+        for i, (row, *units) in enumerate(_ROWS[estimator], 1)
+        for j, column in enumerate(_COLUMNS, 1)
+    }
+    return entries | (_RATES if estimator == "disturbance_observer" else {})
+
+
+def sentence(summary: Mapping[str, Any]) -> str:
+    """The result in one sentence."""
+    z, before = summary["z"], summary["z_reasoned"]
+    moved = "falls" if z < before else "rises"
+    result = (
+        f"z stays at {z:.4g}, because no candidate was better than the reasoned gains"
+        if z == before
+        else f"z {moved} from {before:.4g} with the reasoned gains to {z:.4g} with the tuned ones "
+        f"({100 * (z / before - 1):+.1f} %)"
+    )
+    worst, *others = _worst_first(summary)
+    if others:
+        margin = 100 * (1 - others[0]["z_k"] / worst["z_k"])
+        place = f"the worst case is {worst['name']}, by {margin:.1f} % over {others[0]['name']}"
+    else:
+        place = f"the only case is {worst['name']}"
+    bound = [name for name, gain in summary["gains"].items() if gain["at_bound"]]
+    end = f"{', '.join(bound) or 'no gain'} ended at a bound of the search"
+    work = summary["work"]
+    stop = f"Interrupted after generation {work['generations']}: " * work["interrupted"]
+    return f"{stop}{result}; {place}; {end}."
+
+
+def bad_news(summary: Mapping[str, Any]) -> list[str]:
+    """What speaks against the tuned gains, a sentence each."""
+    news = []
+    if summary["work"]["interrupted"]:
+        news.append(
+            "Incomplete: the search was interrupted, so nothing says yet what each gain is worth, "
+            "or how the gains do on cases they have not seen. The same command with --resume goes "
+            "on from there."
+        )
+    if worse := [case for case in _worst_first(summary) if case["z_k"] > case["z_k_reasoned"]]:
+        cases = ", ".join(
+            f"{case['name']} ({case['z_k_reasoned']:.4g} to {case['z_k']:.4g})" for case in worse
+        )
+        news.append(f"Worse than with the reasoned gains: {cases}.")
+    folds = _folds(summary)
+    if missed := sum(not fold["better"] for fold in folds):
+        news.append(
+            f"On cases they have not seen, tuned gains are not better than the reasoned ones in "
+            f"{missed} of {len(folds)} folds."
+        )
+    for name, one in summary.get("beside", {}).items():
+        if one["z"] is not None and one["z"] < summary["z"]:
+            news.append(f"Better without any tuning: {label(name)}, z = {one['z']:.4g}.")
+    falls = {name: fall for name, e in summary["sensitivity"].items() if (fall := _fall(e))}
+    if falls:
+        news.append(
+            f"z would still fall, by up to {100 * max(falls.values()):.1f} %, with another value "
+            f"of one gain alone ({', '.join(falls)}): the search had not converged."
+        )
+    if crashed := summary["work"]["crashed"]:
+        news.append(f"Candidates that crashed or blocked their worker: {crashed}.")
+    return news
+
+
+def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
+    """Write the page into the folder, beside gains.toml and the figures; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to summary.json.
+    """
+    text = (
+        environment()
+        .get_template("tuning.html")
+        .render(
+            summary=summary,
+            sentence=sentence(summary),
+            news=bad_news(summary),
+            cases=_worst_first(summary),
+            gains=_gains(summary),
+            folds=_folds(summary),
+            compared=_compared(summary),
+            dots=_dots(summary),
+            curve=_convergence(summary),
+            styles={"reasoned": _REASONED, "tuned": _TUNED},
+            gains_path=shlex.quote(str(folder / "gains.toml")),
+            bandwidth=BANDWIDTH,
+            negligible=NEGLIGIBLE,
+            step=STEP,
+        )
+    )
+    path = folder / "index.html"
+    _write(path, text)
+    return path
+
+
+def _worst_first(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Cases with their names."""
+    cases = [{"name": name, **case} for name, case in summary["cases"].items()]
+    return sorted(cases, key=lambda case: -case["z_k"])
+
+
+def _gains(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Gains with what they do, and what z does when they change; None after an interruption."""
+    told = meanings(summary["estimator"])
+    rows = []
+    for name, gain in summary["gains"].items():
+        meaning, unit = told[name]
+        effect = summary["sensitivity"].get(name)
+        remarks = ["⚠ at bound"] if gain["at_bound"] else []
+        if effect is not None and not effect["matters"]:
+            remarks.append("does not matter")
+        if effect is not None and _fall(effect):
+            remarks.append("not converged")
+        rows.append(
+            {**gain, "name": name, "meaning": meaning, "unit": unit, "effect": effect}
+            | {"remark": ", ".join(remarks)}
+        )
+    return rows
+
+
+def _fall(effect: Mapping[str, float | None]) -> float:
+    """How much z would fall if the gain alone were changed; 0 where that is negligible."""
+    changes = (effect["less"], effect["more"], effect["without"])
+    fall = -min((change for change in changes if change is not None), default=0.0)
+    return fall if fall > NEGLIGIBLE else 0.0
+
+
+def _folds(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Folds, the worst first; z is None where an estimate diverges."""
+    rows = [
+        {**fold, "better": fold["tuned"] is not None and fold["tuned"] < fold["reasoned"]}
+        for fold in summary["folds"]
+    ]
+    return sorted(rows, key=lambda fold: -np.inf if fold["tuned"] is None else -fold["tuned"])
+
+
+def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """These gains among untuned estimators, the least z first; empty if there is none to compare.
+
+    A z is None where an estimate diverges.
+    """
+    if not summary.get("beside"):
+        return []
+    name, cases = label(summary["estimator"]), summary["cases"]
+    rows = [
+        {
+            "name": f"{name}, {how}",
+            "z": summary[z],
+            "worst": max(cases, key=lambda c: cases[c][z_k]),
+        }
+        for how, z, z_k in (("tuned", "z", "z_k"), ("reasoned", "z_reasoned", "z_k_reasoned"))
+    ]
+    rows[0]["found"] = True
+    rows += [{"name": label(name), **one} for name, one in summary["beside"].items()]
+    return sorted(rows, key=lambda row: np.inf if row["z"] is None else row["z"])
+
+
+def _dots(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Pairs of dots on an axis from zero, in pixels, the worst case first."""
+    cases = _worst_first(summary)
+    left, width, row, top = _DOTS["left"], _DOTS["width"], _DOTS["row"], _DOTS["top"]
+    high = 1.05 * max(case[key] for case in cases for key in ("z_k", "z_k_reasoned"))
+
+    def at(value: float) -> float:
+        return float(left + width * value / high)
+
+    return {
+        **_DOTS,
+        "rows": [
+            {
+                "name": case["name"],
+                "y": top + row * (k + 0.5),
+                "reasoned": at(case["z_k_reasoned"]),
+                "tuned": at(case["z_k"]),
+            }
+            for k, case in enumerate(cases)
+        ],
+        "z": at(summary["z"]),
+        "ticks": [(at(value), text) for value, text in _ticks(0.0, high, 8)],
+        "bottom": top + row * len(cases),
+        "total": left + width + 40,
+    }
+
+
+def _convergence(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Best z by generation, in pixels; it holds until a better candidate is found."""
+    best, before = summary["convergence"], summary["z_reasoned"]
+    left, width, height, top = (_CURVE[key] for key in ("left", "width", "height", "top"))
+    low, high = min(*best, before), max(*best, before)
+    room = 0.08 * (high - low or high)
+    low, high = low - room, high + room
+    last = len(best) - 1
+
+    def across(generation: float) -> float:
+        return left + width * generation / max(last, 1)
+
+    def down(z: float) -> float:
+        return float(top + height * (high - z) / (high - low))
+
+    steps = (f"H{across(k):.1f}V{down(z):.1f}" for k, z in enumerate(best))
+    whole = ((value, text) for value, text in _ticks(0.0, max(last, 1), 10) if value % 1 == 0)
+    return {
+        **_CURVE,
+        "path": f"M{across(0):.1f} {down(best[0]):.1f}" + "".join(steps),
+        "end": (across(last), down(best[-1])),
+        "before": down(before),
+        "across": [(across(value), text) for value, text in whole],
+        "down": [(down(value), text) for value, text in _ticks(low, high, 6)],
+        "bottom": top + height,
+        "total": left + width + 40,
+    }
