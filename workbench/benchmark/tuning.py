@@ -5,8 +5,8 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,7 +32,7 @@ from workbench.tuning.cost import Bench, Candidate
 from workbench.tuning.workers import judge_all
 
 WORKERS = 2
-CANDIDATES = 48  # some seconds of work
+CANDIDATES = 60  # some seconds of work
 _REPEATS = 3
 _EVALUATIONS = 15  # of ours, in each repeat of one by FMPy
 _VARIATION = 0.01  # of gains: candidates differ, and all of them are stable
@@ -173,47 +173,57 @@ def measure_workers(
     Raises
     ------
     ArithmeticError
-        If they do not all find the same z.
+        If they do not find the same z, or any fails, which takes less than a full evaluation.
     """
     job = tuning_job(DisturbanceObserver.name, minimal, cases)
     rng = np.random.default_rng(_SEED)
     reasoned, order = to_vector(job.gains), tuple(range(len(cases)))
     changed = reasoned * (1.0 + _VARIATION * rng.standard_normal((candidates, reasoned.size)))
     every = [Candidate(values, np.inf, order) for values in changed]
-    with ExitStack() as stack:
-        pools: list[Pool] = [ProcessPool(job, size, _TIMEOUT) for size in (1, WORKERS)]
-        for pool in pools:
-            stack.callback(pool.close)
-        if find_spec("distributed"):
-            pools.append(_dask_pool(job, stack))
-        rates = _rates(pools, every)
-    one, two, *dask = rates
-    return WorkerRates(len(cases), candidates, one, two, dask[0] if dask else None)
+    with (
+        closing(ProcessPool(job, 1, _TIMEOUT)) as alone,
+        closing(ProcessPool(job, WORKERS, _TIMEOUT)) as together,
+    ):
+        z = [_judge(pool, every) for pool in (alone, together)]
+        one, two = _rates([alone, together], every)
+    dask = None
+    if find_spec("distributed"):
+        # Not in turns with the others: a cluster that waits takes 4 % of two processors.
+        with _cluster(job) as pool:
+            z.append(_judge(pool, every))
+            [dask] = _rates([pool], every)
+    if not np.isfinite(z).all() or any(other != z[0] for other in z):
+        raise ArithmeticError("candidates failed, or workers disagree about their z")
+    return WorkerRates(len(cases), candidates, one, two, dask)
 
 
-def _dask_pool(job: Job, stack: ExitStack) -> Pool:
-    """A pool on a cluster of this machine, which ends with the stack."""
+@contextmanager
+def _cluster(job: Job) -> Iterator[Pool]:
+    """A pool on a Dask cluster of this machine."""
     from distributed import LocalCluster
 
     from workbench.tuning.cluster import DaskPool
 
-    cluster = LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None)
-    stack.enter_context(cluster)
-    return stack.enter_context(closing(DaskPool(job, cluster.scheduler_address, _TIMEOUT)))
+    size = {"n_workers": WORKERS, "threads_per_worker": 1}
+    with (
+        LocalCluster(**size, dashboard_address=None) as cluster,
+        closing(DaskPool(job, cluster.scheduler_address, _TIMEOUT)) as pool,
+    ):
+        yield pool
+
+
+def _judge(pool: Pool, candidates: Sequence[Candidate]) -> list[float]:
+    """The z of candidates; the first time that a pool is asked, it starts its workers."""
+    return [verdict.z for verdict in judge_all(pool, candidates, len(candidates[0].order))]
 
 
 def _rates(pools: Sequence[Pool], candidates: Sequence[Candidate]) -> list[float]:
     """Candidates per second of each pool; in turns, so that they meet the same load."""
-    cases = len(candidates[0].order)
-    # The first time is not counted: it starts the workers.
-    z = [[verdict.z for verdict in judge_all(pool, candidates, cases)] for pool in pools]
-    if not np.isfinite(z).all() or any(other != z[0] for other in z):
-        raise ArithmeticError("candidates failed, or workers of different pools disagree about z")
     spent: list[list[float]] = [[] for _ in pools]
     for _ in range(_REPEATS):
         for pool, times in zip(pools, spent, strict=True):
             begin = time.perf_counter()
-            judge_all(pool, candidates, cases)
+            _judge(pool, candidates)
             times.append(time.perf_counter() - begin)
     return [len(candidates) / statistics.median(times) for times in spent]
 

@@ -32,6 +32,7 @@ _RIVALS = 5  # effects that are fitted in full before one is named
 _NEAR = 0.4  # share of the best score from which on an effect is a rival
 _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
 _BEGUN = 2  # rounds after which a rival that is far behind is given up
+_HALVINGS = 2  # of the size that a fit begins with
 _BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 6  # of Gauss-Newton
 
@@ -268,16 +269,23 @@ def _fall(before: Fitted, after: Fitted) -> float:
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
     """Fits with one more effect, best first; those that fall far behind are not finished."""
-    begun = sorted(
-        (
-            fitted(fit, joined(best.point, rival), (*best.active, rival.effect), _BEGUN)
-            for rival in rivals
-        ),
-        key=lambda one: one.misfit,
-    )
+    begun = sorted((_begun(fit, best, rival) for rival in rivals), key=lambda one: one.misfit)
     near = [one for one in begun if one.misfit < _BEHIND * begun[0].misfit]
     finished = [fitted(fit, one.point, one.active, _ROUNDS) for one in near]
     return sorted([*finished, *begun[len(near) :]], key=lambda one: one.misfit)
+
+
+def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
+    """First rounds of a fit with one more effect, begun at half the size where it was too much."""
+    active = (*best.active, rival.effect)
+    one = fitted(fit, joined(best.point, rival), active, _BEGUN)
+    for _ in range(_HALVINGS):
+        if one.misfit < best.misfit:
+            break
+        # A law bends: half the contact's stiffness is twice the slip.
+        rival = replace(rival, size=0.5 * rival.size)
+        one = fitted(fit, joined(best.point, rival), active, _BEGUN)
+    return one
 
 
 def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter) -> Trial:

@@ -140,7 +140,7 @@ def judge_all(pool: Pool, candidates: Sequence[Candidate], cases: int) -> list[V
     """
     verdicts: dict[int, Verdict] = {}
     everything = range(len(candidates))
-    tasks = shares(everything, pool.size)
+    tasks = portions(everything, pool.size)
     lost = _judge_tasks(pool, candidates, tasks, 2 * pool.size, verdicts)
     for i in lost:
         # Alone, so that nothing is blamed for the death of another.
@@ -149,14 +149,14 @@ def judge_all(pool: Pool, candidates: Sequence[Candidate], cases: int) -> list[V
     return [verdicts[i] for i in everything]
 
 
-def shares(candidates: range, workers: int) -> list[range]:
+def portions(candidates: range, workers: int) -> list[range]:
     """Tasks that shrink: few, because each costs some milliseconds, and small at the end.
 
     Each is half of what a worker would get of the rest, so that all end together however their
     costs differ. Source: C. Polychronopoulos, D. Kuck (1987), Guided Self-Scheduling, IEEE
     Transactions on Computers C-36.
 
-    >>> [len(task) for task in shares(range(20), 2)]
+    >>> [len(task) for task in portions(range(20), 2)]
     [5, 3, 3, 2, 1, 1, 1, 1, 1, 1, 1]
     """
     tasks = []

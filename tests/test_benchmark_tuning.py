@@ -1,0 +1,124 @@
+"""The tuning's benchmark compares what gives the same, and counts every process."""
+
+import functools
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.benchmark import fmpy_loops
+from workbench.benchmark.memory import peak_memory, watch_command
+from workbench.benchmark.tuning import (
+    EvaluationTimes,
+    TuningMemory,
+    WorkerRates,
+    evaluate_by_fmpy,
+    format_tuning,
+    measure_evaluation,
+    measure_evaluations,
+    measure_memory,
+    measure_workers,
+    tuning_job,
+)
+from workbench.case import Case
+from workbench.objective import Weights
+from workbench.observers import DisturbanceObserver
+
+SAMPLES = slice(700, 1300)  # 3 s: first pressure and the beginning of the stop
+MB = 1e6
+
+
+@pytest.fixture(scope="module")
+def case(dry_case: Case) -> Case:
+    signals = ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
+    return replace(dry_case, **{name: getattr(dry_case, name)[SAMPLES] for name in signals})
+
+
+def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(
+    root: Path, minimal_path: Path, case: Case
+) -> None:
+    full = root / "fmus" / "fmi2" / "FullObserver.fmu"
+    rows = measure_evaluations(case, minimal_path, full)
+    assert [row.estimator for row in rows] == ["disturbance_observer", "parameter_estimator"]
+    for row in rows:
+        assert row.steps == 600
+        assert row.z > 0.0
+        # 600 calls of four or more methods from Python, beside one of a compiled loop.
+        assert row.fmpy > row.ours > 0.0
+        assert row.ratios() == {"fmpy": row.fmpy / row.ours}
+
+
+def test_times_of_evaluations_that_disagree_are_refused(minimal_path: Path, case: Case) -> None:
+    """The other counts the force a millionth more."""
+    job = tuning_job(DisturbanceObserver.name, minimal_path, [case])
+    heavier = replace(job, weights=Weights(cF=1.000001e-3))
+    with fmpy_loops.FMPyModel(minimal_path) as model:
+        loop = functools.partial(fmpy_loops.disturbance_observer, model)
+        with pytest.raises(ArithmeticError, match="not those of the same evaluation"):
+            measure_evaluation(job, functools.partial(evaluate_by_fmpy, heavier, loop))
+
+
+def test_rates_of_workers_are_measured(minimal_path: Path, case: Case) -> None:
+    rates = measure_workers([case], minimal_path, candidates=4)
+    assert (rates.cases, rates.candidates) == (1, 4)
+    assert min(rates.one, rates.two) > 0.0
+    assert rates.ratios()["two"] == rates.two / rates.one
+    if find_spec("distributed"):
+        assert rates.dask is not None
+        assert rates.ratios()["dask"] == rates.dask / rates.two
+    else:
+        assert rates.dask is None
+
+
+def test_memory_of_master_and_workers_is_measured(
+    root: Path, minimal_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(root)
+    memory = measure_memory([root / "cases" / "03_dry_120_3.6"], minimal_path)
+    # numba and its compiler alone take 80 MB in each.
+    assert min(memory.master, memory.worker) > 80 * MB
+    # A worker as large as the other within a fifth, and Python's process that clears up.
+    assert memory.total > memory.master + 1.8 * memory.worker
+
+
+def test_a_process_does_not_have_the_peak_of_the_one_that_started_it() -> None:
+    """It does by `getrusage`."""
+    ballast = np.ones(50_000_000)  # 400 MB
+    program = "from workbench.benchmark.memory import peak_memory; print(peak_memory())"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert peak_memory() > ballast.nbytes
+    assert int(run.stdout) < 100 * MB
+
+
+def test_a_watched_command_counts_with_what_it_starts() -> None:
+    """100 MB in a process that lives for half a second, 25 looks, beside 200 MB in the first."""
+    program = (
+        "import subprocess, sys, time\n"
+        "kept = b'x' * int(sys.argv[1])\n"
+        "if len(sys.argv) > 2:\n"
+        "    subprocess.run([sys.executable, '-c', sys.argv[2], '100000000'], check=True)\n"
+        "time.sleep(0.5)\n"
+    )
+    peaks = watch_command([sys.executable, "-c", program, "200000000", program])
+    assert len(peaks) == 2
+    # Python itself takes 10 MB.
+    assert 200 * MB < peaks[0] < 230 * MB
+    assert 100 * MB < peaks[1] < 130 * MB
+    with pytest.raises(subprocess.CalledProcessError, match="status 3"):
+        watch_command([sys.executable, "-c", "raise SystemExit(3)"])
+
+
+def test_the_table_has_the_ratios_and_says_what_was_not_measured() -> None:
+    evaluations = [EvaluationTimes("disturbance_observer", 6233, 0.003, 0.45, 0.1)]
+    memory = TuningMemory(master=290_000_000, worker=270_000_000, total=840_000_000)
+    rates = WorkerRates(cases=14, candidates=60, one=15.0, two=28.5, dask=27.0)
+    table = format_tuning(evaluations, rates, memory)
+    for said in ("150x", "1.90 times as many", "0.95 times as many", "840 MB in all processes"):
+        assert said in table
+    assert "no package 'distributed'" in format_tuning(
+        evaluations, replace(rates, dask=None), memory
+    )
