@@ -253,7 +253,8 @@ def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., J
 
     def prepared(gains: Gains, weights: Weights, *cases: Case) -> Job:
         recordings = tuple(map(recording, cases))
-        return Job("disturbance_observer", path.read_bytes(), {}, gains, recordings, weights)
+        model = path.read_bytes()
+        return Job("disturbance_observer", model, {}, gains, recordings, weights, np.inf)
 
     return prepared
 

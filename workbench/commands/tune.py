@@ -59,7 +59,7 @@ from workbench.tuning import (
 )
 
 TIMEOUT = 60  # [s] for one candidate, which takes about 0.1 s
-RADIUS_ERROR = 0.1  # [%] what the Kalman filters' noise of omegaW allows for, too
+RADIUS_ERROR = 0.05  # [%] a wheel measured to a quarter of a millimetre
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 

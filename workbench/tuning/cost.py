@@ -14,6 +14,7 @@ from workbench.errors import InputError
 from workbench.fmu import FMU, FMUError, Matrix, Vector
 from workbench.objective import Weights, integrate, samples
 from workbench.observers import ESTIMATE, Estimator
+from workbench.tuning.settling import SETTLED, Settling
 from workbench.tuning.space import Gains, build, from_vector
 
 PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
@@ -84,7 +85,7 @@ def _with_wheel(one: Recording, error: float) -> Recording:
     y, judged = one.y.copy(), one.judged.copy()
     y[:, 0] *= 1.0 + error
     judged[:, 0] *= 1.0 + error
-    return one._replace(name=f"{one.stop}, omegaW {error:+.1%}", y=y, judged=judged)
+    return one._replace(name=f"{one.stop}, omegaW {error:+.2%}", y=y, judged=judged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +98,8 @@ class Job:
     fmu : the file's bytes.
     names : our names of variables to those in the FMU.
     gains : reasoned gains; what is not tuned is taken from them.
+    friction_left : share of a step of muDC from which on an observer finds friction too slowly [1],
+        infinite to ask for no friction.
     """
 
     estimator: str
@@ -105,6 +108,7 @@ class Job:
     gains: Gains
     recordings: tuple[Recording, ...]
     weights: Weights
+    friction_left: float = SETTLED
 
 
 class Candidate(NamedTuple):
@@ -127,7 +131,7 @@ class Verdict(NamedTuple):
 
     Attributes
     ----------
-    z : worst of z_k; infinite if the candidate has lost or failed.
+    z : worst of z_k; infinite if the candidate has lost, failed or finds friction too slowly.
     z_k : (k,) of all cases of the job; infinite where not known.
     samples : how many were evaluated.
     unstable : case in which the estimate diverged or the FMU failed; -1 if none.
@@ -150,6 +154,7 @@ class Bench:
             path = Path(folder) / "model.fmu"
             path.write_bytes(job.fmu)
             self._fmu = FMU(path, job.names)
+        self._settling = Settling(self._fmu) if np.isfinite(job.friction_left) else None
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))
         self._judge_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
@@ -159,15 +164,15 @@ class Bench:
         self._fmu.close()
 
     def judge(self, candidate: Candidate) -> Verdict:
-        """Judge a candidate until it has lost, or to the end.
+        """Judge a candidate until it has lost, or to the end; none that finds no friction.
 
         The integral of equation (12) only grows, piece by piece and in floating point too, so what
         is dropped has lost for certain.
         """
         job = self._job
         gains = from_vector(job.gains, candidate.values)
-        estimator = build(job.estimator, self._fmu, gains)
         z_k = np.full(len(job.recordings), np.inf)
+        estimator = build(job.estimator, self._fmu, gains)
         samples = 0
         limit = min(candidate.limit, DIVERGED)
         for k in candidate.order:
@@ -177,6 +182,10 @@ class Bench:
                 nothing = np.full(z_k.size, np.inf)
                 return Verdict(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
             z_k[k] = z
+        # Last, because few candidates come this far.
+        slow = self._settling is not None and not self._settling.left(gains) < job.friction_left
+        if slow:
+            return Verdict(np.inf, np.full(z_k.size, np.inf), samples, -1)
         return Verdict(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
 
     def _judge_case(self, estimator: Estimator, case: Recording, limit: float) -> tuple[float, int]:

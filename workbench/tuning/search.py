@@ -72,7 +72,7 @@ class Search:
 def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> str:
     """Hash of everything that a search depends on, but for its length."""
     digest = hashlib.sha256(job.fmu)
-    what = [job.estimator, dict(job.names), vars(job.weights), list(cases)]
+    what = [job.estimator, dict(job.names), vars(job.weights), job.friction_left, list(cases)]
     digest.update(json.dumps([*what, plan.population, plan.seed]).encode())
     for recording in job.recordings:
         digest.update(recording.name.encode())
