@@ -12,6 +12,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from dataclasses import dataclass
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from workbench import diagnosis, rig
 from workbench.case import read_cases
 from workbench.diagnosis import CATALOGUE
@@ -148,6 +150,8 @@ def _begin(scratch: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_master, daemon=True).start()
     tempfile.tempdir = scratch
+    # Matrices are small: with a pool of BLAS threads each, processes wait for one another.
+    threadpool_limits(1)
 
 
 def _end_with_master() -> None:

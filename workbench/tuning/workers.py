@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from workbench.tuning.cost import Bench, Candidate, Job, Verdict
 
@@ -115,6 +116,8 @@ def equip(job: Job, timeout: float) -> None:
         for bench, _ in _equipment:
             bench.close()
         faulthandler.dump_traceback_later(_PREPARATION, exit=True)
+        # Matrices are small: with a pool of BLAS threads each, workers wait for one another.
+        threadpool_limits(1)
         _equipment[:] = [(Bench(job), timeout)]
         faulthandler.cancel_dump_traceback_later()
 
