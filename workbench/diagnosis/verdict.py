@@ -15,6 +15,7 @@ from workbench.diagnosis.search import (
     Score,
     Step,
     Trial,
+    examine,
     fitted,
     joined,
     lesser,
@@ -30,6 +31,7 @@ _QUANTILE = 1.96  # of a normal distribution, 95 %
 _TWIN = 0.98  # cosine of signatures from which on an effect is fitted in full, to be told apart
 _CLOSE = 40.0  # of chi-squared: less does not tell fitted effects apart, whose laws are simplified
 _CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
+_IDLE = 0.05  # share of the explainable below which an effect beside others is no cause
 _EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
 _FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
@@ -119,6 +121,10 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     base = fitted(fit, fit.start(), ())
     best, steps, trial = search(fit, catalogue, base, report)
     best, trial = pruned(fit, catalogue, best, trial, report)
+    while (idle := _idle(fit, best)) is not None:
+        report(f"dropping {idle.name}")
+        best = lesser(fit, best, idle)
+        trial = examine(fit, best, catalogue, report)
     clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
     if not clean and not (best.active and _share(base, best) > _EXPLAINED):
@@ -144,6 +150,24 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         names=names,
         cosines=cosines,
     )
+
+
+def _idle(fit: Fit, best: Fitted) -> Effect | None:
+    """A cause that beside others explains next to nothing on held-out stops, if there is one."""
+    if len(best.active) < 2:
+        return None
+    shares = {effect: _explained(fit, best, effect)[0] for effect in best.active}
+    weakest = min(shares, key=lambda effect: shares[effect])
+    return weakest if shares[weakest] < _IDLE else None
+
+
+def _explained(fit: Fit, best: Fitted, effect: Effect) -> tuple[float, float]:
+    """Share of the explainable that one effect explains on held-out stops; error without it."""
+    before, after = (
+        float(held_out(fit, one, fast=effect.order_locked).mean())
+        for one in (lesser(fit, best, effect), best)
+    )
+    return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
 
 def _share(before: Fitted, after: Fitted) -> float:
@@ -198,11 +222,7 @@ def _causes(
     sigma = np.sqrt(np.diag(trial.covariance()))
     causes, lacking = [], {}
     for effect in best.active:
-        before, after = (
-            float(held_out(fit, one, fast=effect.order_locked).mean())
-            for one in (lesser(fit, best, effect), best)
-        )
-        lacking[effect.name] = before
+        explained, lacking[effect.name] = _explained(fit, best, effect)
         parameters = {}
         for key, value in best.point.sizes.items():
             if key[0] != effect.name:
@@ -223,7 +243,7 @@ def _causes(
                 effect=effect,
                 parameters=parameters,
                 confusable_with=_twins(fit, effect, best, steps, names, cosines),
-                explained=float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)),
+                explained=explained,
                 phases=best.point.phases.get(effect.name),
             )
         )
