@@ -193,7 +193,11 @@ def test_unstable_candidates_are_counted_and_cost_little(
 
 
 def test_folds_are_judged_by_gains_that_have_not_seen_them(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    root: Path,
+    problem: tuple[Job, SearchSpace],
+    pool: Pool,
+    stop_beginnings: list[Case],
+    tmp_path: Path,
 ) -> None:
     job, space = problem
     plan = Plan(generations=1, population=1, seed=3)
@@ -204,12 +208,19 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
         return search(pool, job, space, on, plan, tmp_path / f"{number}.json")
 
     reasoned = to_vector(job.gains)
-    folds = cross_validate(pool, job, reasoned, 3, tune)
+    folds = cross_validate(pool, job, stop_beginnings, reasoned, 3, tune)
     assert seen == [[1, 2], [0, 2], [0, 1]]
     z_k = judge_gains(pool, job, [reasoned])[0]
     assert [fold.cases for fold in folds] == [(r.name,) for r in job.recordings]
     assert_array_equal([fold.reasoned for fold in folds], z_k)
     assert all(np.isfinite(fold.tuned) for fold in folds)
+    with FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as fmu:
+        observer = DisturbanceObserver(fmu, reasoned_gains(job.estimator, fmu))
+        for fold, case in zip(folds, stop_beginnings, strict=True):
+            expected = score(case, observe(case, observer), fmu.defaults["rR"], Weights())
+            assert fold.force_reasoned == expected.Fx_nrmse
+    # Held-out force is judged by the gains that were found, not by the reasoned ones.
+    assert all(0.0 < fold.force != fold.force_reasoned for fold in folds)
 
 
 def test_a_gain_without_effect_does_not_matter(

@@ -212,6 +212,7 @@ def test_gains_that_were_not_improved_are_not_praised(
 
 def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
     del changed["cases"][HOSTILE]
+    changed["provenance"]["cases"].remove(HOSTILE)
     page = written(changed, tmp_path)
     assert "tuned on one recorded stop" in text(page.find(".//h1"))
     assert "the only case is 03_dry_120_3.6" in headline(page)
@@ -325,6 +326,8 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(
         assert row["z, reasoned"] == fold["reasoned"]
         assert row["z, tuned without them"] == fold["tuned"]
         assert row["z of the cases tuned on"] == fold["z"]
+        assert row["error of Fx, reasoned"] == fold["force_reasoned"]
+        assert row["error of Fx, tuned without them"] == fold["force"]
     better, lost = changed["folds"]
     better["tuned"], lost["tuned"] = 0.9 * better["reasoned"], float("inf")
     one_lost = written(changed, tmp_path)
@@ -336,6 +339,12 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(
     without = written(changed, tmp_path)
     assert not without.xpath("//*[@id='fold-table']|//a[@href='#folds']")
     assert "not seen" not in news(without)
+
+
+def test_folds_that_were_not_done_are_told(changed: dict[str, Any], tmp_path: Path) -> None:
+    assert "interrupted after" not in news(written(changed, tmp_path))
+    del changed["folds"][1]
+    assert "without each fold was interrupted after 1 of 2" in news(written(changed, tmp_path))
 
 
 def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], results: Path) -> None:

@@ -73,6 +73,25 @@ def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
     assert_array_equal(found.z_k, alone.z_k)
 
 
+def test_a_worker_that_is_killed_as_it_starts_is_started_again(
+    problem: tuple[Job, SearchSpace], pool: Pool
+) -> None:
+    """Before it has read its job, which takes seconds of imports and compilation."""
+    job, _ = problem
+    candidates = [Candidate(to_vector(job.gains), np.inf, (0, 1, 2))]
+    one = ProcessPool(job, 1, 60.0)
+    try:
+        first = one.submit(candidates)
+        os.kill(next(iter(one._executor._processes)), signal.SIGKILL)
+        with pytest.raises(BrokenExecutor):
+            first.result(timeout=60.0)
+        [verdict] = judge_all(one, candidates, 3)
+    finally:
+        one.close()
+    assert not verdict.crashed
+    assert verdict.z == judge_all(pool, candidates, 3)[0].z
+
+
 def test_a_cluster_finds_the_same_gains(
     problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
 ) -> None:

@@ -245,11 +245,12 @@ def _tune(options: argparse.Namespace) -> int:
                     print(f"fold {number + 1} of {options.folds}", flush=True)
                     return tune(f"checkpoint_fold{number + 1}", on)
 
-                folds = cross_validate(pool, job, reasoned, options.folds, without)
+                folds = cross_validate(pool, job, cases, reasoned, options.folds, without)
     z_k_before = dict(zip(z_k, before.tolist(), strict=True))
     summary = _summary(
         found, reasoned, z_k_before, z_k, folds, effects, beside, job, space, provenance
     )
+    summary["work"]["folds"] = options.folds
     if not _written(out / "summary.json", json.dumps(summary, indent=2) + "\n"):
         return 1
     draw_convergence(found.history, out / "convergence.png")
@@ -419,7 +420,10 @@ def _summary(
             }
             for e in effects
         },
-        "folds": [{**asdict(fold), "tuned": _finite(fold.tuned)} for fold in folds],
+        "folds": [
+            {name: _finite(v) if isinstance(v, float) else v for name, v in asdict(fold).items()}
+            for fold in folds
+        ],
         "beside": {
             name: {"z": _finite(float(z_k.max())), "worst": list(after)[int(z_k.argmax())]}
             for name, z_k in beside.items()
@@ -465,11 +469,13 @@ def _format(
         idle = [effect.gain for effect in effects if not effect.matters]
         lines.append(f"gains that do not matter (z within 1 %): {', '.join(idle) or 'none'}")
     for name, one in summary["beside"].items():
-        lines.append(f"{name}, not tuned: z = {one['z']:.5f}, worst {one['worst']}")
+        z = "diverges" if one["z"] is None else f"z = {one['z']:.5f}"
+        lines.append(f"{name}, not tuned: {z}, worst {one['worst']}")
     for fold in folds:
         verdict = "better" if fold.tuned < fold.reasoned else "not better"
         lines.append(
             f"not seen: {', '.join(fold.cases)}: z {fold.tuned:.4f}, {verdict} than reasoned "
-            f"{fold.reasoned:.4f}; seen: {fold.z:.4f}"
+            f"{fold.reasoned:.4f}; seen: {fold.z:.4f}; error of Fx {fold.force:.2%}, reasoned "
+            f"{fold.force_reasoned:.2%}"
         )
     return "\n".join(lines)

@@ -14,6 +14,7 @@ from workbench.objective import BANDWIDTH
 from workbench.report.drawing import _ticks
 from workbench.report.results import _write, label
 from workbench.report.templates import environment
+from workbench.tuning.settling import SETTLED
 from workbench.tuning.validation import NEGLIGIBLE, STEP
 
 _REASONED, _TUNED = "0", "2"  # styles of curves
@@ -89,6 +90,11 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
             "or how the gains do on cases they have not seen. The same command with --resume goes "
             "on from there."
         )
+    elif (done := len(summary["folds"])) < (asked := summary["work"]["folds"]):
+        news.append(
+            f"Incomplete: the search without each fold was interrupted after {done} of {asked}. "
+            "The same command with --resume goes on from there."
+        )
     if worse := [case for case in _worst_first(summary) if case["z_k"] > case["z_k_reasoned"]]:
         cases = ", ".join(
             f"{case['name']} ({case['z_k_reasoned']:.4g} to {case['z_k']:.4g})" for case in worse
@@ -137,6 +143,7 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
             styles={"reasoned": _REASONED, "tuned": _TUNED},
             gains_path=shlex.quote(str(folder / "gains.toml")),
             bandwidth=BANDWIDTH,
+            settled=SETTLED,
             negligible=NEGLIGIBLE,
             step=STEP,
         )

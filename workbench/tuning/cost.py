@@ -111,6 +111,14 @@ class Job:
     friction_left: float = SETTLED
 
 
+def load_model(job: Job) -> FMU:
+    """Open the model of a job, on any machine."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.fmu"
+        path.write_bytes(job.fmu)
+        return FMU(path, job.names)
+
+
 class Candidate(NamedTuple):
     """Gains to be judged.
 
@@ -150,10 +158,7 @@ class Bench:
 
     def __init__(self, job: Job) -> None:
         self._job = job
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "model.fmu"
-            path.write_bytes(job.fmu)
-            self._fmu = FMU(path, job.names)
+        self._fmu = load_model(job)
         self._settling = Settling(self._fmu) if np.isfinite(job.friction_left) else None
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))

@@ -1,8 +1,7 @@
 """How fast a tuned observer finds the friction of the pads, by its linearisation.
 
 z judges speeds and force. An observer may have them right by correcting its speeds directly, while
-its friction drifts behind, and friction is what it is asked for. Such candidates are refused before
-a sample is evaluated.
+its friction drifts behind, and friction is what it is asked for. Such candidates are refused.
 """
 
 import numpy as np

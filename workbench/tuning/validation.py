@@ -1,15 +1,19 @@
 """What tuned gains are worth: on cases they have not seen, and each gain by itself."""
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.case import Case
+from workbench.cosim import observe
 from workbench.fmu import Matrix, Vector
+from workbench.objective import score
 from workbench.observers import ExtendedKalmanFilter, FilterNoise
-from workbench.tuning.cost import DIVERGED, Bench, Candidate, Job
+from workbench.tuning.cost import DIVERGED, Bench, Candidate, Job, load_model
 from workbench.tuning.search import Search
-from workbench.tuning.space import SearchSpace, gain_names, to_vector
+from workbench.tuning.space import SearchSpace, build, from_vector, gain_names, to_vector
 from workbench.tuning.workers import Pool, judge_all
 
 STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
@@ -26,12 +30,16 @@ class Fold:
     tuned : worst z_k over them with gains tuned on the others.
     reasoned : the same with untuned gains.
     z : worst z_k over the cases that were tuned on.
+    force, force_reasoned : worst error of the creep force over the cases left out, rms over mean
+        below 5 Hz [1], with tuned and with untuned gains; nan where it cannot be judged.
     """
 
     cases: tuple[str, ...]
     tuned: float
     reasoned: float
     z: float
+    force: float
+    force_reasoned: float
 
 
 @dataclass(frozen=True)
@@ -65,11 +73,26 @@ def judge_gains(pool: Pool, job: Job, gains: Sequence[Vector]) -> Matrix:
 
 def untuned_filter(job: Job) -> Vector:
     """z_k of an EKF with the noise levels of the sensors, which nobody tuned, (k,)."""
-    bench = Bench(replace(job, estimator=ExtendedKalmanFilter.name, gains=FilterNoise()))
+    kalman = replace(
+        job, estimator=ExtendedKalmanFilter.name, gains=FilterNoise(), friction_left=np.inf
+    )
     order = tuple(range(len(job.recordings)))
-    verdict = bench.judge(Candidate(to_vector(FilterNoise()), np.inf, order))
-    bench.close()
-    return verdict.z_k
+    with closing(Bench(kalman)) as bench:
+        return bench.judge(Candidate(to_vector(FilterNoise()), np.inf, order)).z_k
+
+
+def force_errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
+    """Error of the creep force by gains in each case, (g, k), as `Score.Fx_nrmse` [1].
+
+    nan where a run failed or a case cannot be judged.
+    """
+    with load_model(job) as fmu:
+        radius = fmu.defaults["rR"]
+        errors = [
+            [score(case, observe(case, one), radius, job.weights).Fx_nrmse for case in cases]
+            for one in (build(job.estimator, fmu, from_vector(job.gains, g)) for g in gains)
+        ]
+    return np.array(errors, dtype=float)
 
 
 def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
@@ -86,6 +109,7 @@ def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
 def cross_validate(
     pool: Pool,
     job: Job,
+    cases: Sequence[Case],
     reasoned: Vector,
     folds: int,
     tune: Callable[[int, Sequence[int]], Search | None],
@@ -94,6 +118,7 @@ def cross_validate(
 
     Parameters
     ----------
+    cases : that the job's recordings were made from.
     reasoned : (n,) untuned gains.
     tune : searches on some cases; called with the number of the fold and the cases. Ends the whole
         by returning None or an interrupted search.
@@ -105,12 +130,17 @@ def cross_validate(
         if found is None or found.interrupted:
             break
         tuned, untuned = judge_gains(pool, job, [found.best, reasoned])
+        names = tuple(dict.fromkeys(job.recordings[k].stop for k in held_out))
+        left_out = [case for case in cases if case.name in names]
+        force, force_untuned = force_errors(job, left_out, [found.best, reasoned]).max(axis=1)
         results.append(
             Fold(
-                cases=tuple(dict.fromkeys(job.recordings[k].stop for k in held_out)),
+                cases=names,
                 tuned=float(tuned[list(held_out)].max()),
                 reasoned=float(untuned[list(held_out)].max()),
                 z=found.z,
+                force=float(force),
+                force_reasoned=float(force_untuned),
             )
         )
     return results
