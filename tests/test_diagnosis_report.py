@@ -3,6 +3,9 @@
 import dataclasses
 import json
 import re
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -283,6 +286,8 @@ def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str,
     falls = table["fall, held out"].astype(float)
     assert sorted(table.index) == sorted({one["effect"] for one in summary["candidates"]})
     assert falls.is_monotonic_decreasing
+    units = {text(row[0]): text(row[3]) for row in page.xpath("//*[@id='candidate-table']//tr")}
+    assert (units["FxOffset"], units["WheelRadius"], units["BrakeFade"]) == ("N", "m", "1/K")
     for name, fall in falls.items():
         best = max(o["held_out"] for o in summary["candidates"] if o["effect"] == name)
         assert fall == best
@@ -350,6 +355,29 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
 
 
 # --- other verdicts ---
+
+
+def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_path: Path) -> None:
+    """Ctrl-C while a second cause is sought."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "workbench", *arguments]
+    searches = 0
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        for line in run.stdout:
+            searches += "signatures" in line
+            if searches == 2 and "signatures" in line:
+                run.send_signal(signal.SIGINT)
+    assert run.returncode == 130
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    (cause,) = summary["causes"]
+    assert cause["effect"] in TWINS
+    assert summary["gain"]["after"] < summary["gain"]["before"]
+    assert Path(summary["model"]["fmu"]).is_file()
+    page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
+    assert "interrupted" in text(page.find_class("warning")[0])
+    assert "more may be missing" in text(page.get_element_by_id("verdict"))
 
 
 def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
@@ -458,7 +486,7 @@ const press = (column) => {
   table.tHead.rows[0].cells[column].querySelector("button").click();
   return order();
 };
-told.orders = [order(), press(0), press(4), press(4)];
+told.orders = [order(), press(0), press(5), press(5)];
 const tools = document.querySelectorAll(".tools");
 told.tools = tools.length;
 const view = () => plots[0].querySelector(".panel").getAttribute("viewBox").split(" ").map(Number);

@@ -33,7 +33,7 @@ NAMES = {
     "muWR": "adhesionLevel",
     "muDC": "padLevel",
     "rW": "rollingRadius",
-    "rR": "rollerRadius",
+    "rR": "radiusOfRoller",
     "JR": "rollerInertia",
 }
 

@@ -213,6 +213,7 @@ def test_gains_that_were_not_improved_are_not_praised(
 def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
     del changed["cases"][HOSTILE]
     changed["provenance"]["cases"].remove(HOSTILE)
+    changed["folds"] = []
     page = written(changed, tmp_path)
     assert "tuned on one recorded stop" in text(page.find(".//h1"))
     assert "the only case is 03_dry_120_3.6" in headline(page)
@@ -332,6 +333,11 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(
     better["tuned"], lost["tuned"] = 0.9 * better["reasoned"], float("inf")
     one_lost = written(changed, tmp_path)
     assert "not better than the reasoned ones in 1 of 2 folds" in news(one_lost)
+    case = changed["cases"][lost["worst"]]
+    case["z_k"] = 0.9 * case["z_k_reasoned"]
+    assert "asks of the gains what no case asks" in news(written(changed, tmp_path))
+    case["z_k"] = 1.1 * case["z_k_reasoned"]
+    assert "the worst case gains at its cost" in news(written(changed, tmp_path))
     verdicts = data(one_lost, "fold-table")["verdict"]
     assert list(verdicts.index) == [", ".join(fold["cases"]) for fold in (lost, better)]
     assert list(verdicts) == ["⚠ not better", "better"]
@@ -394,6 +400,7 @@ def test_what_got_worse_comes_before_the_tables(changed: dict[str, Any], tmp_pat
     assert "Worse" not in news(written(changed, tmp_path))
     changed["cases"][HOSTILE]["z_k_reasoned"] = 0.5 * changed["cases"][HOSTILE]["z_k"]
     changed["work"]["crashed"] = 3
+    changed["folds"] = []
     told = news(written(changed, tmp_path))
     assert f"Worse than with the reasoned gains: {HOSTILE} (" in told
     assert "03_dry_120_3.6 (" not in told

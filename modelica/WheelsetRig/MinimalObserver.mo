@@ -37,15 +37,17 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Brakes.PartialPadFriction(
     level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW) "Pad friction";
   replaceable Contact.ConstantAdhesion adhesion(
-    level=muWR + dmuWR, w=slip, v=rR*omegaR, Fx=Fx/2.0)
+    level=muWR + dmuWR, w=slip, v=rollerRadius.actual*omegaR, Fx=Fx/2.0)
     constrainedby Contact.PartialAdhesion(
-    level=muWR + dmuWR, w=slip, v=rR*omegaR, Fx=Fx/2.0) "Contact friction";
+    level=muWR + dmuWR, w=slip, v=rollerRadius.actual*omegaR, Fx=Fx/2.0) "Contact friction";
   replaceable Losses.WheelsetLoss wheelsetLoss(omega=omegaW)
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
   replaceable Quantities.Unchanged wheelRadius(nominal=rW, omega=omegaW)
     constrainedby Quantities.PartialQuantity(nominal=rW, omega=omegaW) "Wheel radius";
+  replaceable Quantities.Unchanged rollerRadius(nominal=rR, omega=omegaR)
+    constrainedby Quantities.PartialQuantity(nominal=rR, omega=omegaR) "Roller radius";
   replaceable Quantities.Unchanged wheelLoad(nominal=Fz, omega=omegaW)
     constrainedby Quantities.PartialQuantity(nominal=Fz, omega=omegaW) "Wheel load";
   replaceable Quantities.Unchanged creepStiffness(
@@ -67,13 +69,14 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
 protected
   Units.Torque tauB "Torque of the pads on the wheelset";
 equation
-  slip = rR*omegaR - wheelRadius.actual*omegaW;
+  slip = rollerRadius.actual*omegaR - wheelRadius.actual*omegaW;
   Fx = 2.0*Contact.creepForce(
-    slip, rR*omegaR, wheelLoad.actual, creepStiffness.actual, adhesion.mu0, polach);
+    slip, rollerRadius.actual*omegaR, wheelLoad.actual, creepStiffness.actual, adhesion.mu0, polach);
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
   wheelInertia.actual*der(omegaW) =
     wheelRadius.actual*Fx - tauB - wheelsetLoss.tau + wheelInertia.actual*correctionW;
-  JR*der(omegaR) = driveTorque.actual - rR*Fx - rollerLoss.tau + JR*correctionR;
+  JR*der(omegaR) =
+    driveTorque.actual - rollerRadius.actual*Fx - rollerLoss.tau + JR*correctionR;
   annotation (
     experiment(StopTime=40.0, Tolerance=1e-6),
     Documentation(info="<html>

@@ -34,7 +34,8 @@ def add_diagnose(commands: Commands) -> None:
         "wrong, name the physical cause, say what cannot be told apart, extend the Modelica model, "
         "and measure the gain on stops that were held out. Writes a page to read (index.html), "
         "summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs the extra "
-        "[compiler]. Exit status 0 for any verdict.",
+        "[compiler]. Ctrl-C ends the search for more causes and keeps those that were found. Exit "
+        "status 0 for any verdict.",
         epilog="examples:\n"
         "  python -m workbench diagnose my_stops --out results/mine\n"
         "  python -m workbench diagnose my_stops --effects BrakeFade CylinderLag\n"
@@ -100,4 +101,4 @@ def _diagnose(options: argparse.Namespace) -> int:
     report("done")
     print(format_diagnosis(summary))
     print(f"to read: {page}, data and figures beside it")
-    return 0
+    return 130 if summary["interrupted"] else 0

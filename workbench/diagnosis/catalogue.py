@@ -100,6 +100,8 @@ CATALOGUE: tuple[Effect, ...] = (
            "a wheel radius other than entered", "a tape measure on wheel and roller"),
     Effect("OutOfRoundWheel", "Effects", ("wheelRadius",), "cosine", 2e-5, 1e-5,
            "a wheel that is out of round", _RUNDOWN),
+    Effect("RollerRadius", "Effects", ("rollerRadius",), "delta", 2e-4, 1e-4,
+           "a roller radius other than entered", "a tape measure on wheel and roller"),
     Effect("WheelLoad", "Effects", ("wheelLoad",), "gain", 0.01, 0.02,
            "a wheel load other than nominal", _LOAD),
     Effect("CreepStiffness", "Effects", ("creepStiffness",), "gain", 0.01, 0.02,

@@ -193,4 +193,9 @@ class Court:
         # Long stops first: the last one to finish leaves the other processors idle.
         order = np.argsort([-stop.time.size for stop in self.stops])
         tasks = {int(k): self._pool.submit(_work, int(k), points[k], columns[k]) for k in order}
-        return [tasks[k].result() for k in range(len(self.stops))]
+        try:
+            return [tasks[k].result() for k in range(len(self.stops))]
+        finally:
+            # After Ctrl-C nobody waits for the others.
+            for task in tasks.values():
+                task.cancel()

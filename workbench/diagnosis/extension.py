@@ -36,6 +36,7 @@ _SLOTS = {
     "wheelsetLoss": _LOSS,
     "rollerLoss": _LOSS,
     "wheelRadius": _QUANTITY,
+    "rollerRadius": _QUANTITY,
     "wheelLoad": _QUANTITY,
     "creepStiffness": _QUANTITY,
     "wheelInertia": _QUANTITY,

@@ -39,6 +39,7 @@ _FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
 # (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
 Key = tuple[str, str]
 _STOP = ""
+_LATE: Key = (FORCE_DELAY, "load cell")
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Point:
     Attributes
     ----------
     sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
-    levels : common level by quantity and surface, as ("muDC", "dry").
+    levels : common level by quantity and surface, as ("muDC", "dry"), or sensor.
     deviations : of each stop from the common values, in standard deviations, (K, 5).
     phases : [rad] of order-locked effects, (K,) by effect.
     """
@@ -136,7 +137,7 @@ class Fit:
 
     def start(self) -> Point:
         """The nominal model."""
-        levels = {(FORCE_DELAY, "dry"): 0.0}
+        levels: dict[Key, float] = {_LATE: 0.0}
         for case in self._court.cases:
             levels["muDC", _discs(case)] = self._court.nominal["muDC"]
             rail = case.conditions.wheel_rail
@@ -164,7 +165,7 @@ class Fit:
         case = self._court.cases[k]
         values = {
             **_RAIL[case.conditions.wheel_rail],
-            FORCE_DELAY: point.levels[FORCE_DELAY, "dry"],
+            FORCE_DELAY: point.levels[_LATE],
         }
         for j, (name, tolerance) in enumerate(TOLERANCES.items()):
             common = self._common(point, name, case)
@@ -256,7 +257,7 @@ class Fit:
         at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
-            if key == (FORCE_DELAY, "dry"):
+            if key == _LATE:
                 J[:, j] = at[_STOP, FORCE_DELAY]
             elif key in point.levels:
                 name, surface = key

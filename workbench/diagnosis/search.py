@@ -44,7 +44,8 @@ class Score:
     Attributes
     ----------
     effect, shape : the candidate, and the shape it was tried with.
-    size, sigma : estimate of its size and standard deviation, SI.
+    size, sigma : estimate of its size and standard deviation.
+    units : of the size and of the parameters of the shape, by name.
     gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
     held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
     phases : (K,) [rad] of an order-locked effect.
@@ -54,6 +55,7 @@ class Score:
     shape: Mapping[str, float]
     size: float
     sigma: float
+    units: Mapping[str, str]
     gain: float
     held_out: Vector
     phases: Vector
@@ -166,6 +168,7 @@ class Trial:
             shape=shape,
             size=size,
             sigma=sigma,
+            units={name: self._fit.unit(effect, name) for name in (effect.size, *shape)},
             gain=self._reference - total.at(best),
             held_out=self._without - _held_out(alone, prior),
             phases=phases,
@@ -230,7 +233,7 @@ class Step:
 
 def search(
     fit: Fit, catalogue: Sequence[Effect], best: Fitted, report: Reporter
-) -> tuple[Fitted, list[Step], Trial]:
+) -> tuple[Fitted, list[Step], Trial, bool]:
     """Find what is missing.
 
     Parameters
@@ -242,20 +245,33 @@ def search(
     best : the effects that are needed, fitted.
     steps : how they were found.
     trial : all other effects about the best point.
+    interrupted : whether Ctrl-C ended it; before anything was found it ends the diagnosis.
     """
     steps: list[Step] = []
-    while True:
-        trial = examine(fit, best, catalogue, report)
-        scores = tuple(trial.scores())
-        rivals = _rivals(scores, best) if len(best.active) < _MOST else []
-        if not rivals:
-            return best, steps, trial
-        report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
-        fits = _fits(fit, best, rivals)
-        if _fall(best, fits[0]) < _HELD_OUT:
-            return best, steps, trial
-        steps.append(Step(best, scores, tuple(fits)))
-        best = fits[0]
+    try:
+        while True:
+            trial = examine(fit, best, catalogue, report)
+            step = _step(fit, best, trial, report)
+            if step is None:
+                return best, steps, trial, False
+            steps.append(step)
+            best = step.rivals[0]
+    except KeyboardInterrupt:
+        if not steps:
+            raise
+        report("interrupted: no more causes are sought, what was found is finished")
+        return best, steps, examine(fit, best, catalogue, report), True
+
+
+def _step(fit: Fit, best: Fitted, trial: Trial, report: Reporter) -> Step | None:
+    """One more effect, or none if the data do not ask for it."""
+    scores = tuple(trial.scores())
+    rivals = _rivals(scores, best) if len(best.active) < _MOST else []
+    if not rivals:
+        return None
+    report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
+    fits = _fits(fit, best, rivals)
+    return None if _fall(best, fits[0]) < _HELD_OUT else Step(best, scores, tuple(fits))
 
 
 def _fall(before: Fitted, after: Fitted) -> float:

@@ -94,6 +94,7 @@ class Diagnosis:
     Attributes
     ----------
     verdict : see `Verdict`.
+    interrupted : whether the search was ended before its end, so that there may be more causes.
     causes : strongest first; empty unless something was found.
     gain : None when nothing was extended.
     partial : effects that explain a part of what remains unexplained.
@@ -104,6 +105,7 @@ class Diagnosis:
     """
 
     verdict: Verdict
+    interrupted: bool
     causes: tuple[Cause, ...]
     gain: Gain | None
     partial: tuple[str, ...]
@@ -119,7 +121,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of stops."""
     report("nominal model, levels calibrated")
     base = fitted(fit, fit.start(), ())
-    best, steps, trial = search(fit, catalogue, base, report)
+    best, steps, trial, interrupted = search(fit, catalogue, base, report)
     best, trial = pruned(fit, catalogue, best, trial, report)
     while (idle := _idle(fit, best)) is not None:
         report(f"dropping {idle.name}")
@@ -127,7 +129,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         trial = examine(fit, best, catalogue, report)
     clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
-    if not clean and not (best.active and _share(base, best) > _EXPLAINED):
+    if not clean and not (best.active and (interrupted or _share(base, best) > _EXPLAINED)):
         verdict = "unexplained"
     names, cosines = _confusability(trial, catalogue)
     causes: list[Cause] = []
@@ -140,6 +142,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         causes = _causes(fit, best, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
+        interrupted=interrupted,
         causes=tuple(causes),
         gain=gain,
         partial=tuple(effect.name for effect in best.active) if not causes else (),

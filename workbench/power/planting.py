@@ -61,6 +61,7 @@ PLANTABLE = (
     Plantable("return_spring", "ReturnSpringPressure"),
     Plantable("pressure_offset", "PressureSensorOffset", sensed=True),
     Plantable("wheel_radius", "WheelRadius"),
+    Plantable("roller_radius", "RollerRadius"),
     Plantable("out_of_round", "OutOfRoundWheel", signed=False),
     Plantable("wheel_load", "WheelLoad"),
     Plantable("creep_stiffness", "CreepStiffness"),
@@ -80,7 +81,6 @@ PLANTABLE = (
     Plantable("friction_ripple", outside=0.01),
     Plantable("drive_beat", sensed=True, outside=0.005),
     Plantable("force_drift", sensed=True, outside=2.0),
-    Plantable("roller_radius", outside=1e-4),
 )
 BY_NAME = {one.name: one for one in PLANTABLE}
 

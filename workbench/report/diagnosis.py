@@ -48,6 +48,7 @@ def summarise_diagnosis(
     return {
         "verdict": found.verdict,
         "sentence": sentence(outcome),
+        "interrupted": found.interrupted,
         "causes": [_cause(cause) for cause in found.causes],
         "gain": None
         if gain is None
@@ -93,6 +94,8 @@ def summarise_diagnosis(
                 "shape": dict(score.shape),
                 "size": score.size,
                 "sigma": _known(score.sigma),
+                "unit": score.units[score.effect.size],
+                "shape_units": {name: score.units[name] for name in score.shape},
                 "gain": score.gain,
                 "held_out": float(score.held_out.sum()),
             }
@@ -175,9 +178,10 @@ def sentence(outcome: Outcome) -> str:
         unit = "" if one.unit == "1" else f" {one.unit}"
         names.append(f"{cause.effect.name}{twins}, {label} {one.value:.3g}{unit}")
     assert found.gain is not None
+    more = " The search was interrupted: more may be missing." if found.interrupted else ""
     return (
         f"The model lacks {'; and '.join(names)}: on held-out stops its error falls from "
-        f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise.{cost}"
+        f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise.{more}{cost}"
     )
 
 
@@ -269,7 +273,8 @@ def _write_stop(one: Residuals, path: Path) -> None:
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
     """Data of the figures that show all stops."""
-    rows = [{**one, "shape": json.dumps(one["shape"])} for one in summary["candidates"]]
+    nested = ("shape", "shape_units")
+    rows = [{**one, **{k: json.dumps(one[k]) for k in nested}} for one in summary["candidates"]]
     _write(out / "candidates.csv", _csv(pd.DataFrame(rows)))
     _write(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]

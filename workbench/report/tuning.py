@@ -101,10 +101,10 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
         )
         news.append(f"Worse than with the reasoned gains: {cases}.")
     folds = _folds(summary)
-    if missed := sum(not fold["better"] for fold in folds):
+    if missed := [fold for fold in folds if not fold["better"]]:
         news.append(
             f"On cases they have not seen, tuned gains are not better than the reasoned ones in "
-            f"{missed} of {len(folds)} folds."
+            f"{len(missed)} of {len(folds)} folds: {'; '.join(_why(summary, f) for f in missed)}."
         )
     for name, one in summary.get("beside", {}).items():
         if one["z"] is not None and one["z"] < summary["z"]:
@@ -213,6 +213,17 @@ def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     rows[0]["found"] = True
     rows += [{"name": label(name), **one} for name, one in summary["beside"].items()]
     return sorted(rows, key=lambda row: np.inf if row["z"] is None else row["z"])
+
+
+def _why(summary: Mapping[str, Any], fold: Mapping[str, Any]) -> str:
+    """Why tuned gains are not better on a fold, by what its worst case does when it is tuned on."""
+    worst, tuned = fold["worst"], fold["tuned"]
+    case = summary["cases"][worst]
+    change = f"{worst} ({case['z_k_reasoned']:.4g} to "
+    change += "no estimate)" if tuned is None else f"{tuned:.4g})"
+    if case["z_k"] < case["z_k_reasoned"]:
+        return f"{change} asks of the gains what no case asks that was tuned on"
+    return f"{change} loses also where it is tuned on, because the worst case gains at its cost"
 
 
 def _dots(summary: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,6 +27,7 @@ class Fold:
     Attributes
     ----------
     cases : left out.
+    worst : the recording that is worst among them with tuned gains.
     tuned : worst z_k over them with gains tuned on the others.
     reasoned : the same with untuned gains.
     z : worst z_k over the cases that were tuned on.
@@ -35,6 +36,7 @@ class Fold:
     """
 
     cases: tuple[str, ...]
+    worst: str
     tuned: float
     reasoned: float
     z: float
@@ -133,10 +135,12 @@ def cross_validate(
         names = tuple(dict.fromkeys(job.recordings[k].stop for k in held_out))
         left_out = [case for case in cases if case.name in names]
         force, force_untuned = force_errors(job, left_out, [found.best, reasoned]).max(axis=1)
+        worst = max(held_out, key=lambda k: float(tuned[k]))
         results.append(
             Fold(
                 cases=names,
-                tuned=float(tuned[list(held_out)].max()),
+                worst=job.recordings[worst].name,
+                tuned=float(tuned[worst]),
                 reasoned=float(untuned[list(held_out)].max()),
                 z=found.z,
                 force=float(force),

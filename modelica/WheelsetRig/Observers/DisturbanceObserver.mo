@@ -37,9 +37,9 @@ equation
   omegaREstimate = plant.omegaR;
   Fx = plant.Fx;
   slip = plant.slip;
-  v = plant.rR*omegaR;
+  v = plant.rollerRadius.actual*omegaR;
   actualWR = 2.0*plant.wheelRadius.actual/plant.wheelInertia.actual*creepForceByFriction(
-    plant.slip, plant.rR*plant.omegaR, plant.wheelLoad.actual, plant.creepStiffness.actual,
+    plant.slip, plant.rollerRadius.actual*plant.omegaR, plant.wheelLoad.actual, plant.creepStiffness.actual,
     plant.adhesion.mu0, plant.polach);
   actualDC = -plant.nDiscs*plant.actuation.Fperp*plant.rB*tanh(plant.omegaW/plant.omega0)
     /plant.wheelInertia.actual;

@@ -1,6 +1,6 @@
 within WheelsetRig.Quantities;
 partial model PartialQuantity "Slot: what changes a quantity of the rig"
   input Real nominal "Nominal value, in the unit of the quantity";
-  input Units.AngularVelocity omega "Angular velocity of the wheelset";
+  input Units.AngularVelocity omega "Angular velocity of the body it belongs to";
   output Real actual "Value that acts, in the same unit";
 end PartialQuantity;

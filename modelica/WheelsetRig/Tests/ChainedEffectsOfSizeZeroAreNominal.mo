@@ -53,7 +53,8 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
   model AllEffects "Observer model with all effects"
     extends MinimalObserver(
       redeclare PadFriction padFriction, redeclare Cylinder cylinder,
-      redeclare WheelRadius wheelRadius, redeclare Effects.WheelLoad wheelLoad,
+      redeclare WheelRadius wheelRadius, redeclare Effects.RollerRadius rollerRadius,
+      redeclare Effects.WheelLoad wheelLoad,
       redeclare Effects.CreepStiffness creepStiffness,
       redeclare Effects.WheelInertia wheelInertia, redeclare Effects.DriveTorqueGain driveTorque,
       redeclare Effects.AdhesionRecovery adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
