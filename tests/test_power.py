@@ -208,17 +208,27 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
         said({"fade": 1e-4}, named("BrakeFade", fade=(1e-4, 9e-5, 1.1e-4)), named("FxGain")),
         said({"fade": 1e-4}, named("WaterFilm")),
         said({"wheel_inertia": 0.8}),
+        dataclasses.replace(said({"wheel_load": 0.08}), clearness=3.9),
+        dataclasses.replace(said({"wheel_load": 0.08}), clearness=4.1),
         said({"fx_gain": 0.008, "fade": 1e-4}, named("BrakeFade"), named("FxGain"), kind="pair"),
         said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"),
         said({"friction_step": 0.04}, kind="outside", other="unexplained"),
         said({"drive_beat": 0.02}, kind="outside", other="failed"),
     ]
     found = summarise(results)
-    shares = ("false_alarms", "right_first", "right_alone", "unexplained", "coverage")
+    shares = (
+        "false_alarms",
+        "right_first",
+        "right_first_above_noise",
+        "right_alone",
+        "unexplained",
+        "coverage",
+    )
     assert {key: (found[key]["hits"], found[key]["of"]) for key in shares} == {
         "false_alarms": (1, 2),
-        "right_first": (2, 3),  # the inertia cannot be seen, and is no miss
-        "right_alone": (1, 3),
+        "right_first": (2, 5),  # the inertia cannot be seen, and is no miss
+        "right_first_above_noise": (2, 4),
+        "right_alone": (1, 5),
         "unexplained": (1, 3),
         "coverage": (1, 1),
     }

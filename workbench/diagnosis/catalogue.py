@@ -1,7 +1,8 @@
 """The physical effects that the workbench knows: one Modelica class each, and its entry here.
 
 Units, bounds and defaults of the parameters stand in the Modelica classes alone. What an entry
-adds is where the effect is plugged in and how large it must be to matter.
+adds is where the effect is plugged in and how large it must be to matter. Of effects that nothing
+in the data tells apart, the usual one stands first.
 """
 
 from collections.abc import Sequence
@@ -90,7 +91,7 @@ CATALOGUE: tuple[Effect, ...] = (
            "discs of uneven thickness", _RUNDOWN),
     Effect("CylinderLag", "Effects", _CYLINDER, "lag", 0.005, 0.003,
            "pads that lag behind the measured pressure", _SINE),
-    Effect("CaliperHysteresis", "Effects", _CYLINDER, "share", 0.01, 0.02,
+    Effect("CaliperHysteresis", "Effects", _CYLINDER, "share", 0.01, 0.03,
            "friction in the caliper", _DRAG),
     Effect("ReturnSpringPressure", "Effects", _CYLINDER, "increase", 500.0, 500.0,
            "a stiffer return spring", "the pressure of first contact, read at standstill"),

@@ -35,6 +35,7 @@ _BEGUN = 2  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
 _BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 6  # of Gauss-Newton
+_TIED = 10.0  # of chi-squared, in units of what lasts, that decides between nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +224,7 @@ class Step:
     Attributes
     ----------
     scores : of all candidates, linearised, best first.
-    rivals : fitted in full, best first; the first was taken.
+    rivals : fitted in full; the first was taken, the others best first.
     """
 
     before: Fitted
@@ -251,7 +252,7 @@ def search(
     try:
         while True:
             trial = examine(fit, best, catalogue, report)
-            step = _step(fit, best, trial, report)
+            step = _step(fit, catalogue, best, trial, report)
             if step is None:
                 return best, steps, trial, False
             steps.append(step)
@@ -263,15 +264,22 @@ def search(
         return best, steps, examine(fit, best, catalogue, report), True
 
 
-def _step(fit: Fit, best: Fitted, trial: Trial, report: Reporter) -> Step | None:
-    """One more effect, or none if the data do not ask for it."""
+def _step(
+    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+) -> Step | None:
+    """One more effect, or none if the data do not ask for it; of equals the usual one."""
     scores = tuple(trial.scores())
     rivals = _rivals(scores, best) if len(best.active) < _MOST else []
     if not rivals:
         return None
     report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
     fits = _fits(fit, best, rivals)
-    return None if _fall(best, fits[0]) < _HELD_OUT else Step(best, scores, tuple(fits))
+    if _fall(best, fits[0]) < _HELD_OUT:
+        return None
+    decisive = fits[0].misfit + _TIED * fits[0].lasting
+    equals = [one for one in fits if one.misfit < decisive]
+    first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
+    return Step(best, scores, (first, *(one for one in fits if one is not first)))
 
 
 def _fall(before: Fitted, after: Fitted) -> float:

@@ -159,17 +159,17 @@ def _idle(fit: Fit, best: Fitted) -> Effect | None:
     """A cause that beside others explains next to nothing on held-out stops, if there is one."""
     if len(best.active) < 2:
         return None
-    shares = {effect: _explained(fit, best, effect)[0] for effect in best.active}
+    shares = {
+        effect: _explained(fit, lesser(fit, best, effect), best, fast=effect.order_locked)[0]
+        for effect in best.active
+    }
     weakest = min(shares, key=lambda effect: shares[effect])
     return weakest if shares[weakest] < _IDLE else None
 
 
-def _explained(fit: Fit, best: Fitted, effect: Effect) -> tuple[float, float]:
-    """Share of the explainable that one effect explains on held-out stops; error without it."""
-    before, after = (
-        float(held_out(fit, one, fast=effect.order_locked).mean())
-        for one in (lesser(fit, best, effect), best)
-    )
+def _explained(fit: Fit, less: Fitted, best: Fitted, *, fast: bool) -> tuple[float, float]:
+    """Share of the explainable by which two fits differ on held-out stops; error of the first."""
+    before, after = (float(held_out(fit, one, fast=fast).mean()) for one in (less, best))
     return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
 
@@ -225,7 +225,9 @@ def _causes(
     sigma = np.sqrt(np.diag(trial.covariance()))
     causes, lacking = [], {}
     for effect in best.active:
-        explained, lacking[effect.name] = _explained(fit, best, effect)
+        less = lesser(fit, best, effect)
+        fast = effect.order_locked
+        explained, lacking[effect.name] = _explained(fit, less, best, fast=fast)
         parameters = {}
         for key, value in best.point.sizes.items():
             if key[0] != effect.name:
@@ -245,7 +247,7 @@ def _causes(
             Cause(
                 effect=effect,
                 parameters=parameters,
-                confusable_with=_twins(fit, effect, best, steps, names, cosines),
+                confusable_with=_twins(fit, effect, best, less, steps, names, cosines),
                 explained=explained,
                 phases=best.point.phases.get(effect.name),
             )
@@ -258,27 +260,47 @@ def _twins(
     fit: Fit,
     effect: Effect,
     best: Fitted,
+    less: Fitted,
     steps: Sequence[Step],
     names: Sequence[str],
     cosines: Matrix,
 ) -> tuple[str, ...]:
-    """Effects that, fitted in full in place of this one, explain the data as well."""
+    """Effects that, fitted in full in place of this one, explain the data as well.
+
+    Rivals of the step that named it are judged as they were then. Effects of a like signature, and
+    rivals that it met where another was named which it has replaced since, beside the other causes.
+
+    Parameters
+    ----------
+    less : the best fit without the effect.
+    """
     row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
+    alike = {name for name in names if row[name] > _TWIN}
     found: list[str] = []
+    judged = {one.name for one in best.active}
     for step in steps:
         winner = step.rivals[0]
-        if winner.active[-1] is not effect:
-            continue
-        fits = {rival.active[-1].name: rival for rival in step.rivals[1:]}
-        for score in step.scores:
-            name = score.effect.name
-            if row.get(name, 0.0) > _TWIN and name not in fits and name != effect.name:
-                start = joined(step.before.point, score)
-                fits[name] = fitted(fit, start, (*step.before.active, score.effect))
-        close = max(_CLOSE * winner.lasting, _CLOSE_SHARE * (step.before.misfit - winner.misfit))
-        found += [name for name, one in fits.items() if one.misfit - winner.misfit < close]
+        rivals = {rival.active[-1].name: rival for rival in step.rivals}
+        if winner.active[-1] is effect:
+            close = _close(step.before, winner)
+            found += [name for name, one in rivals.items() if one.misfit - winner.misfit < close]
+            judged |= set(rivals)
+        elif effect.name in rivals:
+            alike |= set(rivals)
+    for score in (score for step in steps for score in step.scores):
+        name = score.effect.name
+        if name in alike and name not in judged:
+            judged.add(name)
+            one = fitted(fit, joined(less.point, score), (*less.active, score.effect))
+            if one.misfit - best.misfit < _close(less, best):
+                found.append(name)
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
+
+
+def _close(before: Fitted, after: Fitted) -> float:
+    """Difference in chi-squared that does not tell two effects apart, either of which explains."""
+    return max(_CLOSE * after.lasting, _CLOSE_SHARE * (before.misfit - after.misfit))
 
 
 def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:

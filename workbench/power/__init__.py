@@ -6,9 +6,10 @@ plan -> sets of stops by the reference model -> verdicts -> statistics
 from workbench.power.journal import Journal, Judged, Named
 from workbench.power.planting import PLANTABLE, Plantable, Planting, plan
 from workbench.power.run import measure
-from workbench.power.statistics import VISIBLE, share, summarise
+from workbench.power.statistics import CLEAR, VISIBLE, share, summarise
 
 __all__ = [
+    "CLEAR",
     "PLANTABLE",
     "VISIBLE",
     "Journal",

@@ -9,7 +9,7 @@ from typing import Any
 
 from workbench.diagnosis import Diagnosis
 from workbench.errors import InputError
-from workbench.power.planting import Planting
+from workbench.power.planting import BY_NAME, Planting
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class Judged:
     before, after : held-out error of both models, None if nothing was found.
     seconds : of computing.
     error : why it failed.
+    clearness : size that was planted, over the standard deviation of its estimate about the
+        nominal model; None if that was not one effect of the catalogue.
     """
 
     planting: Planting
@@ -51,6 +53,7 @@ class Judged:
     after: float | None
     seconds: float
     error: str = ""
+    clearness: float | None = None
 
     @property
     def first(self) -> str:
@@ -73,7 +76,21 @@ def judged(planting: Planting, diagnosis: Diagnosis, seconds: float) -> Judged:
     )
     gain = diagnosis.gain
     before, after = (None, None) if gain is None else (gain.before, gain.after)
-    return Judged(planting, diagnosis.verdict, causes, before, after, seconds)
+    clearness = _clearness(planting, diagnosis)
+    return Judged(planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness)
+
+
+def _clearness(planting: Planting, diagnosis: Diagnosis) -> float | None:
+    if len(planting.gains) != 1:
+        return None
+    ((name, gain),) = planting.gains.items()
+    planted = BY_NAME[name]
+    sigmas = [
+        score.sigma
+        for score in diagnosis.scores
+        if score.effect.name == planted.effect and dict(score.shape) == dict(planted.shapes)
+    ]
+    return float(abs(gain) / sigmas[0]) if sigmas else None
 
 
 class Journal:

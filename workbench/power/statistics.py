@@ -14,6 +14,7 @@ from workbench.power.planting import BY_NAME, HIDDEN, PLANTABLE
 from workbench.rig import Effects
 
 VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
+CLEAR = 4.0  # standard deviations that a size must have to be more than noise
 _LABELS = {effect.name: effect.label for effect in CATALOGUE}
 _UNITS = {one.name: one.metadata["unit"] for one in fields(Effects)}
 
@@ -44,6 +45,15 @@ def named_right(result: Judged) -> bool:
     return bool(result.causes) and any(
         BY_NAME[name].effect in result.causes[0].group for name in result.planting.gains
     )
+
+
+def above_noise(result: Judged) -> bool:
+    """Whether anything was seen, or could have been: the planted size is clear of its scatter.
+
+    The scatter is the least that any estimate from these stops has, by the noise of their sensors,
+    the tolerances of the plant and all other effects at sizes that do not matter.
+    """
+    return result.verdict != "nothing" or (result.clearness or 0.0) > CLEAR
 
 
 def named_all(result: Judged) -> bool:
@@ -104,6 +114,7 @@ def summarise(results: Sequence[Judged]) -> dict[str, Any]:
         ],
         "false_alarms": share(one.verdict != "nothing" for one in kinds["clean"]),
         "right_first": share(map(named_right, visible)),
+        "right_first_above_noise": share(map(named_right, filter(above_noise, visible))),
         "right_alone": share(named_right(one) and len(one.causes) == 1 for one in visible),
         "pairs": _pairs(kinds["pair"], by_name),
         "unexplained": share(

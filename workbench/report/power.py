@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workbench.diagnosis import CATALOGUE
-from workbench.power import VISIBLE
+from workbench.power import CLEAR, VISIBLE
 from workbench.report.diagnosis_figures import _heat, _save
 from workbench.report.figures import _STYLE, LIGHT
 from workbench.report.results import _write
@@ -110,6 +110,8 @@ def format_power(summary: Mapping[str, Any]) -> str:
         f"false alarms on clean sets          {_text(summary['false_alarms'])}",
         f"right cause or its group first      {_text(summary['right_first'])}   from {VISIBLE:g} "
         "times the size that matters",
+        f"... where it is above noise         {_text(summary['right_first_above_noise'])}   from "
+        f"{CLEAR:g} standard deviations on",
         f"... and no other cause              {_text(summary['right_alone'])}",
         f"both of a pair                      {_text(summary['pairs']['both'])}",
         f"... each of which is found alone    {_text(summary['pairs']['both_seen_alone'])}",
