@@ -54,6 +54,7 @@ PLANTED = {
     "speed_delay": ("SpeedSignalDelay", "delay", 0.008),
     "pole_ring": ("PoleRingEccentricity", "amplitude", 1e-3),
     "time_skew": ("LoggerTimeSkew", "skew", 0.025),
+    "roller_radius": ("RollerRadius", "delta", -5e-4),
 }
 # Dry stops in which pressure only rises and no wheel slides do not show these.
 HIDDEN = {"caliper_hysteresis", "adhesion_recovery", "wheel_inertia"}
@@ -210,3 +211,59 @@ def test_clean_recordings_of_an_independent_simulator_stay_clean(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
     assert diagnosed(read_cases([LABELLED / "clean"])).verdict == "nothing"
+
+
+def late(values: np.ndarray) -> np.ndarray:
+    """One sample of 5 ms late."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+# What a wrong sensor makes of recordings is known exactly, whoever made them.
+WRONG_SENSORS: dict[str, tuple[Callable[[Case], Case], str, str, float]] = {
+    "gain of the load cells": (lambda c: replace(c, Fx=0.99 * c.Fx), "FxGain", "gain", -0.01),
+    "late wheel speed": (
+        lambda c: replace(c, omegaW=late(c.omegaW)),
+        "SpeedSignalDelay",
+        "delay",
+        5e-3,
+    ),
+    "wheel radius": (
+        lambda c: replace(c, omegaW=c.omegaW * 0.46 / (0.46 - 5e-4)),
+        "WheelRadius",
+        "delta",
+        -5e-4,
+    ),
+}
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+@pytest.mark.parametrize("sensor", WRONG_SENSORS)
+def test_a_wrong_sensor_on_an_independent_simulator_is_named(
+    sensor: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    wrong, name, parameter, size = WRONG_SENSORS[sensor]
+    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"])])
+    assert found.verdict == "found"
+    (cause,) = found.causes
+    assert name in (cause.effect.name, *cause.confusable_with)
+    if cause.effect.name == name:
+        assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
+    diagnosed: Callable[[Sequence[Case]], Diagnosis],
+) -> None:
+    """300 N over a stop, a hundredth of the force, which no effect of the catalogue does."""
+    cases = read_cases([LABELLED / "clean"])
+    drifting = [replace(c, Fx=c.Fx + np.linspace(0.0, 300.0, c.time.size)) for c in cases]
+    assert diagnosed(drifting).verdict == "unexplained"
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
+    diagnosed: Callable[[Sequence[Case]], Diagnosis],
+) -> None:
+    wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
+    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"])])
+    assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}

@@ -32,7 +32,7 @@ from workbench.tuning.cost import Bench, Candidate
 from workbench.tuning.workers import judge_all
 
 WORKERS = 2
-CANDIDATES = 60  # some seconds of work
+CANDIDATES = 270  # a generation: 15 for each of 18 gains
 _REPEATS = 3
 _EVALUATIONS = 15  # of ours, in each repeat of one by FMPy
 _VARIATION = 0.01  # of gains: candidates differ, and all of them are stable
