@@ -16,7 +16,7 @@ from workbench.diagnosis import Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import BLOCK, CHANNELS
 from workbench.fmu import Matrix, Vector
-from workbench.report.figures import _STYLE, LIGHT, CaseFigure, Curve, Panel
+from workbench.report.figures import LIGHT, STYLE, CaseFigure, Curve, Panel
 
 NOMINAL, EXTENDED, NOISE = "0", "2", "raw"  # styles of curves
 LASTING = 10  # blocks of 50 ms: half a second, as the residuals are smoothed
@@ -139,7 +139,7 @@ def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[P
     """Draw what errors go with, before and after, to each path (PNG or SVG by suffix)."""
     channels = list(dict.fromkeys(one["channel"] for one in dependences))
     influences = list(dict.fromkeys(one["influence"] for one in dependences))
-    with mpl.rc_context(_STYLE | {"axes.grid": False}):
+    with mpl.rc_context(STYLE | {"axes.grid": False}):
         sheet = Figure(figsize=(7.5, 4.0), layout="constrained")
         plots = sheet.subplots(1, 2, sharey=True)
         for axes, key in zip(plots, ("before", "after"), strict=True):
@@ -147,27 +147,27 @@ def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[P
             for one in dependences:
                 at = influences.index(one["influence"]), channels.index(one["channel"])
                 share[at] = 100.0 * one[key]
-            _heat(axes, share, 100.0)
+            draw_heat(axes, share, 100.0)
             axes.set_xticks(range(len(channels)), channels)
             axes.set_yticks(range(len(influences)), influences)
             axes.set_title({"before": "nominal model", "after": "with what was added"}[key])
         sheet.suptitle("Share of an error's variance that follows an influence [%]")
-        _save(sheet, paths)
+        save_figure(sheet, paths)
 
 
 def draw_confusability(
     names: Sequence[str], cosines: Matrix, found: Sequence[str], paths: Iterable[Path]
 ) -> None:
     """Draw the similarity of the signatures of effects; those found are marked."""
-    with mpl.rc_context(_STYLE | {"axes.grid": False, "font.size": 7}):
+    with mpl.rc_context(STYLE | {"axes.grid": False, "font.size": 7}):
         sheet = Figure(figsize=(9.0, 9.0), layout="constrained")
         axes = sheet.subplots()
-        _heat(axes, 100.0 * cosines, 100.0, least=50.0)
+        draw_heat(axes, 100.0 * cosines, 100.0, least=50.0)
         marked = [f"▸ {name}" if name in found else name for name in names]
         axes.set_xticks(range(len(names)), names, rotation=90)
         axes.set_yticks(range(len(names)), marked)
         axes.set_title("Similarity of signatures in these data: 100 cannot be told apart")
-        _save(sheet, paths)
+        save_figure(sheet, paths)
 
 
 def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
@@ -176,7 +176,7 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
     rows = [*stops, "all stops"]
     before = [*(one["before"] for one in stops.values()), gain["before"]]
     after = [*(one["after"] for one in stops.values()), gain["after"]]
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(7.5, 1.5 + 0.3 * len(rows)), layout="constrained")
         axes = sheet.subplots()
         heights = range(len(rows))
@@ -191,7 +191,7 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
         axes.invert_yaxis()
         axes.set_xlabel("error on stops held out, in units of the noise")
         sheet.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-        _save(sheet, paths)
+        save_figure(sheet, paths)
 
 
 def _runs(time: Vector) -> list[slice]:
@@ -244,7 +244,7 @@ def _finding(errors: Lasting, extension: str, span: int) -> str:
     )
 
 
-def _heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> None:
+def draw_heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> None:
     """A matrix of whole percents, written into their cells from `least` on."""
     axes.imshow(percents, cmap="Blues", vmin=0.0, vmax=1.6 * most, aspect="auto")
     for (row, column), value in np.ndenumerate(percents):
@@ -252,7 +252,8 @@ def _heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> None
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7)
 
 
-def _save(sheet: Figure, paths: Iterable[Path]) -> None:
+def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
+    """Write one figure in each format, without the date, so that equal figures are equal files."""
     for path in paths:
         stamp = "Date" if path.suffix == ".svg" else "Software"
         sheet.savefig(path, dpi=110, metadata={stamp: None})

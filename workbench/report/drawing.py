@@ -41,7 +41,7 @@ def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
                 "high": panel.high,
                 "ticks": [
                     (top + height * (panel.high - value) / (panel.high - panel.low), text)
-                    for value, text in _ticks(panel.low, panel.high, max(3, height // 28))
+                    for value, text in ticks_within(panel.low, panel.high, max(3, height // 28))
                 ],
                 "zero": round(_LEVELS * panel.high / (panel.high - panel.low))
                 if panel.low < 0 < panel.high
@@ -65,13 +65,14 @@ def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
         else [round(1e3 * (edge - begin)) for edge in figure.window],
         "ticks": [
             (_LEFT + _WIDTH * (value - begin) / (end - begin), text)
-            for value, text in _ticks(begin, end, 12)
+            for value, text in ticks_within(begin, end, 12)
         ],
         "panels": panels,
     }
 
 
-def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
+def ticks_within(low: float, high: float, most: int) -> list[tuple[float, str]]:
+    """Round values from low to high, at most so many, each with its text."""
     values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
     inside = [float(value) for value in values if low <= value <= high]
     return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]

@@ -48,7 +48,7 @@ DARK = {
     "7": "#ff8f80",
 }
 ESTIMATORS = tuple(style for style in LIGHT if style.isdigit())
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -185,7 +185,7 @@ def case_figure(result: CaseResult, roller_radius: float) -> CaseFigure:
 
 def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
     """Draw a case with matplotlib, once, to each path (PNG or SVG by suffix)."""
-    style = _STYLE | {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
+    style = STYLE | {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
     with mpl.rc_context(style):
         sheet = Figure(figsize=(9.0, 11.0), layout="constrained")
         rows = sheet.subplots(

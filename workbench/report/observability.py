@@ -25,8 +25,8 @@ from workbench.observability import (
     SensorNoise,
     WindowTest,
 )
-from workbench.report.figures import _STYLE
-from workbench.report.results import _write
+from workbench.report.figures import STYLE
+from workbench.report.results import write_text
 
 _COLOURS = ("#0072B2", "#D55E00")
 _LINES = ("-", "--")
@@ -56,7 +56,7 @@ def draw_observability(stop: StopObservability, path: Path) -> None:
     Bounds are drawn at the end of their window and shaded where the first model's are useful.
     """
     case = stop.case
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
         inputs, *rows = figure.subplots(3, 1, sharex=True)
         figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
@@ -114,7 +114,7 @@ def write_windows(stop: StopObservability, path: Path) -> None:
             columns[f"{test.model}.bound_{name} [1]"] = test.bound[:, j]
         for j, name in enumerate(test.states):
             columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
-    _write(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
+    write_text(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
 
 
 def write_observability(
@@ -143,7 +143,7 @@ def write_observability(
             for stop in stops
         },
     }
-    _write(path, json.dumps(summary, indent=2) + "\n")
+    write_text(path, json.dumps(summary, indent=2) + "\n")
 
 
 def _linear(test: LinearTest) -> dict[str, Any]:

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from workbench.diagnosis import CATALOGUE
 from workbench.power import CLEAR, VISIBLE
-from workbench.report.diagnosis_figures import _heat, _save
-from workbench.report.figures import _STYLE, LIGHT
-from workbench.report.results import _write
+from workbench.report.diagnosis_figures import draw_heat, save_figure
+from workbench.report.figures import LIGHT, STYLE
+from workbench.report.results import write_text
 
 _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
@@ -21,14 +21,16 @@ _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 def write_power(summary: Mapping[str, Any], provenance: Mapping[str, Any], out: Path) -> None:
     """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage."""
-    _write(out / "power.json", json.dumps({"provenance": provenance, **summary}, indent=2) + "\n")
+    write_text(
+        out / "power.json", json.dumps({"provenance": provenance, **summary}, indent=2) + "\n"
+    )
     effects = summary["effects"]
-    with mpl.rc_context(_STYLE | {"font.size": 8}):
+    with mpl.rc_context(STYLE | {"font.size": 8}):
         figures = {"confusion": _confusion(summary["confusion"])} if summary["sets"] else {}
         if effects:
             figures |= {"power": _curves(effects), "coverage": _coverage(summary)}
         for name, figure in figures.items():
-            _save(figure, [out / f"{name}.png", out / f"{name}.svg"])
+            save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
 
 
 def _curves(effects: Mapping[str, Any]) -> Figure:
@@ -71,7 +73,7 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]]) -> Figure:
     )
     axes = sheet.subplots()
     axes.grid(visible=False)
-    _heat(axes, table, 100.0)
+    draw_heat(axes, table, 100.0)
     axes.set_xticks(range(len(columns)), columns, rotation=90)
     labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
     axes.set_yticks(range(len(confusion)), labels)

@@ -73,7 +73,7 @@ def write_estimates(result: CaseResult, path: Path) -> None:
         if error is not None:
             columns[f"{name}.Fx_error [N]"] = error
     text = pd.DataFrame(columns).to_csv(index=False, float_format="%.7g")
-    _write(path, text)
+    write_text(path, text)
 
 
 def summarise(
@@ -102,7 +102,7 @@ def summarise(
 
 def write_summary(summary: Mapping[str, Any], path: Path) -> None:
     """Write summary.json."""
-    _write(path, json.dumps(summary, indent=2) + "\n")
+    write_text(path, json.dumps(summary, indent=2) + "\n")
 
 
 def label(name: str) -> str:
@@ -124,7 +124,7 @@ def percent(share: float) -> str:
     return f"{100 * share:.2f} %"
 
 
-def _write(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
     """Write whole or not at all."""
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
     with os.fdopen(handle, "w") as stream:

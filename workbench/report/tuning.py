@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from workbench.objective import BANDWIDTH
-from workbench.report.drawing import _ticks
-from workbench.report.results import _write, label
+from workbench.report.drawing import ticks_within
+from workbench.report.results import label, write_text
 from workbench.report.templates import environment
 from workbench.tuning.settling import SETTLED
 from workbench.tuning.validation import NEGLIGIBLE, STEP
@@ -149,7 +149,7 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
         )
     )
     path = folder / "index.html"
-    _write(path, text)
+    write_text(path, text)
     return path
 
 
@@ -247,7 +247,7 @@ def _dots(summary: Mapping[str, Any]) -> dict[str, Any]:
             for k, case in enumerate(cases)
         ],
         "z": at(summary["z"]),
-        "ticks": [(at(value), text) for value, text in _ticks(0.0, high, 8)],
+        "ticks": [(at(value), text) for value, text in ticks_within(0.0, high, 8)],
         "bottom": top + row * len(cases),
         "total": left + width + 40,
     }
@@ -269,14 +269,14 @@ def _convergence(summary: Mapping[str, Any]) -> dict[str, Any]:
         return float(top + height * (high - z) / (high - low))
 
     steps = (f"H{across(k):.1f}V{down(z):.1f}" for k, z in enumerate(best))
-    whole = ((value, text) for value, text in _ticks(0.0, max(last, 1), 10) if value % 1 == 0)
+    whole = ((value, text) for value, text in ticks_within(0.0, max(last, 1), 10) if value % 1 == 0)
     return {
         **_CURVE,
         "path": f"M{across(0):.1f} {down(best[0]):.1f}" + "".join(steps),
         "end": (across(last), down(best[-1])),
         "before": down(before),
         "across": [(across(value), text) for value, text in whole],
-        "down": [(down(value), text) for value, text in _ticks(low, high, 6)],
+        "down": [(down(value), text) for value, text in ticks_within(low, high, 6)],
         "bottom": top + height,
         "total": left + width + 40,
     }
