@@ -104,6 +104,10 @@ class Linearised:
         """Chi-squared of all stops at the point, in units of the noise."""
         return float(sum(one.residual @ one.residual for one in self.evidence))
 
+    def weighed(self, inflation: Vector) -> float:
+        """Chi-squared, each channel in units of what is wrong with it, (m,)."""
+        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
+
 
 class Fit:
     """Unknowns, evidence and least squares of one set of stops.
@@ -312,10 +316,12 @@ class Fit:
         point = self._stepped(best)
         for _ in range(rounds):
             tried = self.linearise(point, active)
-            if not tried.misfit < best.misfit + _WORSE:
+            # By the weights that the step was made with, or it may be no descent.
+            before, after = (one.weighed(best.inflation) for one in (best, tried))
+            if not after < before + _WORSE:
                 point = _between(best.point, point)
                 continue
-            settled = best.misfit - tried.misfit < max(_WORSE, _SETTLED * tried.misfit)
+            settled = before - after < max(_WORSE, _SETTLED * after)
             best, point = tried, self._stepped(tried)
             if settled:
                 break

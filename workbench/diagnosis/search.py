@@ -34,8 +34,8 @@ _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that mat
 _BEGUN = 2  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
 _BEHIND = 3.0  # times the chi-squared of the best
-_ROUNDS = 6  # of Gauss-Newton
-_TIED = 10.0  # of chi-squared, in units of what lasts, that decides between nothing
+_ROUNDS = 12  # of Gauss-Newton, most
+_TIED = 10.0  # of chi-squared: decides between nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,14 +207,12 @@ class Fitted:
     Attributes
     ----------
     misfit : chi-squared of all stops at the point, in units of the noise.
-    lasting : variance of errors that last a second, mean over channels, 1 if only noise is left.
     """
 
     active: tuple[Effect, ...]
     point: Point
     linearised: Linearised
     misfit: float
-    lasting: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +274,7 @@ def _step(
     fits = _fits(fit, best, rivals)
     if _fall(best, fits[0]) < _HELD_OUT:
         return None
-    decisive = fits[0].misfit + _TIED * fits[0].lasting
-    equals = [one for one in fits if one.misfit < decisive]
+    equals = [one for one in fits if beyond(one, fits[0]) < _TIED]
     first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
     return Step(best, scores, (first, *(one for one in fits if one is not first)))
 
@@ -291,12 +288,32 @@ def _fall(before: Fitted, after: Fitted) -> float:
     return float(((was - left) / before.linearised.inflation).sum())
 
 
+def beyond(one: Fitted, other: Fitted) -> float:
+    """Chi-squared that one leaves and another does not.
+
+    Each channel in units of the lesser of what they leave wrong there: where both leave much, that
+    one leaves a little more means nothing.
+    """
+    inflation = np.minimum(one.linearised.inflation, other.linearised.inflation)
+    return one.linearised.weighed(inflation) - other.linearised.weighed(inflation)
+
+
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
     """Fits with one more effect, best first; those that fall far behind are not finished."""
-    begun = sorted((_begun(fit, best, rival) for rival in rivals), key=lambda one: one.misfit)
-    near = [one for one in begun if one.misfit < _BEHIND * begun[0].misfit]
-    finished = [fitted(fit, one.point, one.active, _ROUNDS) for one in near]
-    return sorted([*finished, *begun[len(near) :]], key=lambda one: one.misfit)
+    begun = [_begun(fit, best, rival) for rival in rivals]
+    misfits = _misfits(begun)
+    near = misfits < _BEHIND * misfits.min()
+    every = [
+        fitted(fit, one.point, one.active) if worth else one
+        for one, worth in zip(begun, near, strict=True)
+    ]
+    return [every[i] for i in np.argsort(_misfits(every))]
+
+
+def _misfits(fits: Sequence[Fitted]) -> Vector:
+    """Chi-squared of each, channels in units of the least that any of them leaves wrong, (f,)."""
+    inflation = np.min([one.linearised.inflation for one in fits], axis=0)
+    return np.array([one.linearised.weighed(inflation) for one in fits])
 
 
 def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
@@ -304,7 +321,8 @@ def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
     active = (*best.active, rival.effect)
     one = fitted(fit, joined(best.point, rival), active, _BEGUN)
     for _ in range(_HALVINGS):
-        if one.misfit < best.misfit:
+        before = best.linearised.inflation
+        if one.linearised.weighed(before) < best.linearised.weighed(before):
             break
         # A law bends: half the contact's stiffness is twice the slip.
         rival = replace(rival, size=0.5 * rival.size)
@@ -337,8 +355,8 @@ def pruned(
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
             ratios[effect] = min(clear, size / effect.matters)
             if len(best.active) > 1:
-                needed = lesser(fit, best, effect).misfit - best.misfit
-                ratios[effect] = min(ratios[effect], needed / (_NEEDED * best.lasting))
+                needed = beyond(lesser(fit, best, effect), best)
+                ratios[effect] = min(ratios[effect], needed / _NEEDED)
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
@@ -366,7 +384,7 @@ def without(point: Point, effect: Effect) -> Point:
 def fitted(fit: Fit, point: Point, active: tuple[Effect, ...], rounds: int = _ROUNDS) -> Fitted:
     """Fit a set of effects, from a point that has them."""
     lin = fit.refine(point, active, rounds)
-    return Fitted(active, lin.point, lin, lin.misfit, float(lin.inflation.mean()))
+    return Fitted(active, lin.point, lin, lin.misfit)
 
 
 def joined(point: Point, rival: Score) -> Point:

@@ -15,6 +15,7 @@ from workbench.diagnosis.search import (
     Score,
     Step,
     Trial,
+    beyond,
     examine,
     fitted,
     joined,
@@ -282,8 +283,7 @@ def _twins(
         winner = step.rivals[0]
         rivals = {rival.active[-1].name: rival for rival in step.rivals}
         if winner.active[-1] is effect:
-            close = _close(step.before, winner)
-            found += [name for name, one in rivals.items() if one.misfit - winner.misfit < close]
+            found += [name for name, one in rivals.items() if _close(step.before, one, winner)]
             judged |= set(rivals)
         elif effect.name in rivals:
             alike |= set(rivals)
@@ -292,15 +292,15 @@ def _twins(
         if name in alike and name not in judged:
             judged.add(name)
             one = fitted(fit, joined(less.point, score), (*less.active, score.effect))
-            if one.misfit - best.misfit < _close(less, best):
+            if _close(less, one, best):
                 found.append(name)
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
 
 
-def _close(before: Fitted, after: Fitted) -> float:
-    """Difference in chi-squared that does not tell two effects apart, either of which explains."""
-    return max(_CLOSE * after.lasting, _CLOSE_SHARE * (before.misfit - after.misfit))
+def _close(before: Fitted, one: Fitted, best: Fitted) -> bool:
+    """Whether chi-squared does not tell two effects apart, either of which explains."""
+    return beyond(one, best) < max(_CLOSE, _CLOSE_SHARE * beyond(before, best))
 
 
 def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
