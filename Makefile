@@ -34,7 +34,7 @@ simulate: $(VENV)/run.stamp
 
 tune: $(VENV)/run.stamp
 	# It can answer a wrong radius by friction alone, and gains little by being asked to.
-	$(RUN) -m workbench tune parameter_estimator --radius-error 0 --out results/tune/parameter_estimator
+	$(RUN) -m workbench tune parameter_estimator --out results/tune/parameter_estimator
 	$(RUN) -m workbench tune disturbance_observer --out results/tune/disturbance_observer
 
 diagnose: $(VENV)/dev.stamp
