@@ -108,7 +108,10 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
         )
     for name, one in summary.get("beside", {}).items():
         if one["z"] is not None and one["z"] < summary["z"]:
-            news.append(f"Better without any tuning: {label(name)}, z = {one['z']:.4g}.")
+            news.append(
+                f"Better without any tuning: {label(name)}, z = {one['z']:.4g}. It makes its gains "
+                "anew at every sample, where these are the same at every speed and pressure."
+            )
     falls = {name: fall for name, e in summary["sensitivity"].items() if (fall := _fall(e))}
     if falls:
         news.append(
