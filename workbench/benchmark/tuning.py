@@ -204,7 +204,8 @@ def _cluster(job: Job) -> Iterator[Pool]:
 
     from workbench.tuning.cluster import DaskPool
 
-    size = {"n_workers": WORKERS, "threads_per_worker": 1}
+    # Workers need a third of a gigabyte each, which nobody has to watch ten times a second.
+    size = {"n_workers": WORKERS, "threads_per_worker": 1, "memory_limit": 0}
     with (
         LocalCluster(**size, dashboard_address=None) as cluster,
         closing(DaskPool(job, cluster.scheduler_address, _TIMEOUT)) as pool,
