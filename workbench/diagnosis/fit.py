@@ -7,7 +7,7 @@ are made of.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -306,23 +306,24 @@ class Fit:
         Parameters
         ----------
         point : where to begin.
-        rounds : most evaluations; a step that made things worse is halved, which costs one.
+        rounds : most evaluations; a step that made things worse is tried with all channels alike,
+            then halved, each of which costs one.
 
         Returns
         -------
         best : about the best point that was met.
         """
         best = self.linearise(point, active)
-        point = self._stepped(best)
+        point, plain = self._stepped(best), False
         for _ in range(rounds):
             tried = self.linearise(point, active)
-            # By the weights that the step was made with, or it may be no descent.
-            before, after = (one.weighed(best.inflation) for one in (best, tried))
-            if not after < before + _WORSE:
-                point = _between(best.point, point)
+            if not tried.misfit < best.misfit + _WORSE:
+                # A channel that counts for little, as much is wrong with it, may have got worse.
+                point = _between(best.point, point) if plain else self._stepped(_unweighed(best))
+                plain = True
                 continue
-            settled = before - after < max(_WORSE, _SETTLED * after)
-            best, point = tried, self._stepped(tried)
+            settled = best.misfit - tried.misfit < max(_WORSE, _SETTLED * tried.misfit)
+            best, point, plain = tried, self._stepped(tried), False
             if settled:
                 break
         return best
@@ -481,6 +482,11 @@ def slowness(evidence: Sequence[Evidence]) -> Vector:
     lasting = np.concatenate([seconds(one.errors) for one in evidence])
     slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
     return slow
+
+
+def _unweighed(lin: Linearised) -> Linearised:
+    """The same with all channels in units of their noise, however wrong."""
+    return replace(lin, inflation=np.ones_like(lin.inflation))
 
 
 def _between(one: Point, other: Point) -> Point:
