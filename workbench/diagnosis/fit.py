@@ -31,6 +31,7 @@ _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncerta
 _WORSE = 1.0  # of chi-squared, which no step is worth
 _SETTLED = 1e-3  # share of it
 _SECOND = 20  # blocks
+_GROSS = 100.0  # of inflation: ten times the noise, which no tolerance explains
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 
 _FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
@@ -306,8 +307,8 @@ class Fit:
         Parameters
         ----------
         point : where to begin.
-        rounds : most evaluations; a step that made things worse is tried with all channels alike,
-            then halved, each of which costs one.
+        rounds : most evaluations; a step that made things worse is halved, which costs one, or
+            first, while an effect leaves gross errors, made with all channels alike.
 
         Returns
         -------
@@ -319,7 +320,8 @@ class Fit:
             tried = self.linearise(point, active)
             if not tried.misfit < best.misfit + _WORSE:
                 # A channel that counts for little, as much is wrong with it, may have got worse.
-                point = _between(best.point, point) if plain else self._stepped(_unweighed(best))
+                gross = bool(active) and best.inflation.max() > _GROSS and not plain
+                point = self._stepped(_unweighed(best)) if gross else _between(best.point, point)
                 plain = True
                 continue
             settled = best.misfit - tried.misfit < max(_WORSE, _SETTLED * tried.misfit)
