@@ -267,3 +267,21 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
     wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
     found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"])])
     assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(
+    diagnosed: Callable[[Sequence[Case]], Diagnosis],
+) -> None:
+    """The law of the pads leaves 350 times the noise, the pole ring 2 times."""
+
+    def eccentric(case: Case) -> Case:
+        angle = np.cumsum(case.omegaW * np.diff(case.time, prepend=case.time[0]))
+        return replace(case, omegaW=case.omegaW * (1.0 + 1e-3 * np.cos(angle)))
+
+    found = diagnosed([eccentric(case) for case in read_cases([LABELLED / "speed_friction"])])
+    law, ring = found.causes
+    assert law.effect.name == "SpeedDependentPadFriction"
+    assert law.parameters["slope"].low <= 0.22 <= law.parameters["slope"].high
+    assert ring.effect.name == "PoleRingEccentricity"
+    assert ring.parameters["amplitude"].low <= 1e-3 <= ring.parameters["amplitude"].high

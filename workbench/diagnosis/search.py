@@ -6,17 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import (
-    Fit,
-    Joint,
-    Linearised,
-    Point,
-    Quadratic,
-    add,
-    covariance,
-    minimum,
-    variant,
-)
+from workbench.diagnosis.fit import Fit, Joint, Linearised, Point, variant
+from workbench.diagnosis.quadratic import Quadratic, add, covariance, minimum
 from workbench.fmu import Matrix, Vector
 
 Reporter = Callable[[str], None]

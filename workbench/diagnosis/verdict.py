@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, Quadratic, add, minimum, seconds, variant
+from workbench.diagnosis.fit import Fit, seconds, variant
+from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
     WRONG,
     Fitted,
@@ -124,9 +125,11 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     base = fitted(fit, fit.start(), ())
     best, steps, trial, interrupted = search(fit, catalogue, base, report)
     best, trial = pruned(fit, catalogue, best, trial, report)
-    while (idle := _idle(fit, best)) is not None:
+    less = _less(fit, best)
+    while (idle := _idle(fit, best, less)) is not None:
         report(f"dropping {idle.name}")
-        best = lesser(fit, best, idle)
+        best = less[idle]
+        less = _less(fit, best)
         trial = examine(fit, best, catalogue, report)
     clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
@@ -140,7 +143,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         fast = any(effect.order_locked for effect in best.active)
         before, after = (held_out(fit, one, fast=fast) for one in (base, best))
         gain = _gain(fit.names, before, after)
-        causes = _causes(fit, best, steps, trial, names, cosines)
+        causes = _causes(fit, best, less, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
         interrupted=interrupted,
@@ -156,13 +159,18 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     )
 
 
-def _idle(fit: Fit, best: Fitted) -> Effect | None:
+def _less(fit: Fit, best: Fitted) -> dict[Effect, Fitted]:
+    """The best fit without each of the effects."""
+    return {effect: lesser(fit, best, effect) for effect in best.active}
+
+
+def _idle(fit: Fit, best: Fitted, less: Mapping[Effect, Fitted]) -> Effect | None:
     """A cause that beside others explains next to nothing on held-out stops, if there is one."""
     if len(best.active) < 2:
         return None
     shares = {
-        effect: _explained(fit, lesser(fit, best, effect), best, fast=effect.order_locked)[0]
-        for effect in best.active
+        effect: _explained(fit, one, best, fast=effect.order_locked)[0]
+        for effect, one in less.items()
     }
     weakest = min(shares, key=lambda effect: shares[effect])
     return weakest if shares[weakest] < _IDLE else None
@@ -218,6 +226,7 @@ def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
 def _causes(
     fit: Fit,
     best: Fitted,
+    less: Mapping[Effect, Fitted],
     steps: Sequence[Step],
     trial: Trial,
     names: Sequence[str],
@@ -226,9 +235,8 @@ def _causes(
     sigma = np.sqrt(np.diag(trial.covariance()))
     causes, lacking = [], {}
     for effect in best.active:
-        less = lesser(fit, best, effect)
         fast = effect.order_locked
-        explained, lacking[effect.name] = _explained(fit, less, best, fast=fast)
+        explained, lacking[effect.name] = _explained(fit, less[effect], best, fast=fast)
         parameters = {}
         for key, value in best.point.sizes.items():
             if key[0] != effect.name:
@@ -248,7 +256,7 @@ def _causes(
             Cause(
                 effect=effect,
                 parameters=parameters,
-                confusable_with=_twins(fit, effect, best, less, steps, names, cosines),
+                confusable_with=_twins(fit, effect, best, less[effect], steps, names, cosines),
                 explained=explained,
                 phases=best.point.phases.get(effect.name),
             )
