@@ -11,8 +11,9 @@ pytest.importorskip("rumoca")
 from workbench.case import Case, Conditions
 from workbench.diagnosis import CATALOGUE, choose
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import StopSystem, add, covariance, minimum
+from workbench.diagnosis.fit import StopSystem
 from workbench.diagnosis.prediction import Predictor
+from workbench.diagnosis.quadratic import add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Vector
