@@ -9,14 +9,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import lxml.html
 import pytest
 
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
 from workbench.objective import Weights
+from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
 from workbench.tuning.cost import Bench, Candidate, Verdict
+
+# Before they are imported, for asserts in them to tell values as those of the tests do.
+pytest.register_assert_rewrite(
+    "tests.case_folders", "tests.diagnosis_pages", "tests.runtime_instances"
+)
+
+from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
+from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
 
@@ -122,6 +132,42 @@ def inline() -> Iterator[Callable[[Job], Pool]]:
 @pytest.fixture
 def pool(inline: Callable[[Job], Pool], problem: tuple[Job, SearchSpace]) -> Pool:
     return inline(problem[0])
+
+
+# --- the C runtime ---
+
+
+@pytest.fixture(scope="session")
+def open_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Fmu]:
+    """Opens an instance of a model; compiles each library once."""
+    root = tmp_path_factory.mktemp("runtime")
+
+    def open_(model: str, version: int, slave: bool = True, **options: str | bool) -> Fmu:
+        folder = root / f"{model}{version}"
+        platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+        library = folder / "binaries" / platform / f"{model}{fmpy.sharedLibraryExtension}"
+        if not library.exists():
+            compile_model(model, version, library)
+        return Fmu(folder, model, version, slave, **options)
+
+    return open_
+
+
+# --- diagnosis ---
+
+
+@pytest.fixture(scope="session")
+def stops(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """Three stops of the virtual rig, whose load cells have a wrong zero."""
+    folder = tmp_path_factory.mktemp("stops")
+    effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
+    for seed, (name, speed) in enumerate(STOPS.items()):
+        usual = SCENARIOS[name]
+        conditions = replace(usual.conditions, initial_speed=speed / 3.6)
+        short = replace(usual, conditions=conditions)
+        stop = simulate(short, seed, effects, root / "fmus" / "fmi2" / "Reference.fmu")
+        write_recording(stop, effects, 200, folder / name)
+    return folder
 
 
 # --- pages ---

@@ -1,10 +1,8 @@
-"""Stage 1: what is read, in which units and dialects, and what is refused with which words."""
+"""Stage 1: what is read, in which units and dialects."""
 
 import math
-import pickle
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,85 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.case import Case, read_case, read_cases
-from workbench.errors import InputError
+from workbench.case import read_case, read_cases
+
+from .case_folders import (
+    LINES,
+    ROUNDING,
+    ROWS,
+    SI_OF_UNITS,
+    TOML,
+    UNITS,
+    assert_refused,
+    assert_same,
+    german,
+    in_unit,
+    write,
+)
 
 STANDARD = Path(__file__).parents[1] / "cases"
-ROUNDING = 1e-14  # some ten roundings of 1.1e-16: text, unit factor, product
-
-TOML = """\
-title = "80 km/h, 1.5 bar"
-[conditions]
-initial_speed = "80 km/h"
-brake_pressure = "1.5 bar"
-wheel_rail = "dry"
-discs = ["dry", "wet", "dry"]
-direction = -1
-[measurement]
-file = "measured.csv"
-"""
-UNITS = {
-    "time": "s",
-    "pB": "bar",
-    "tauR": "N.m",
-    "omegaW": "rad/s",
-    "omegaR": "rad/s",
-    "Fx": "N",
-}
-SI_OF_UNITS = {"bar": 1e5}  # every other unit above is SI already
-ROWS = 25
-LINES = [
-    ",".join(f"{name} [{unit}]" for name, unit in UNITS.items()),
-    *(f"{k / 10:.1f},{k / 50:.2f},-{k},-48.25,-31.75,-120.5" for k in range(ROWS)),
-]
-
-Text = str | bytes
-
-
-def write(folder: Path, csv: Text | list[str] = LINES, toml: Text = TOML) -> Path:
-    """Write a case folder; a list is the lines of the CSV."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, content in (("measured.csv", csv), ("case.toml", toml)):
-        if isinstance(content, list):
-            content = "\n".join(content) + "\n"
-        data = content if isinstance(content, bytes) else content.encode()
-        (folder / name).write_bytes(data)
-    return folder
-
-
-def with_line(line: int, text: str) -> list[str]:
-    """Return LINES with one line replaced; lines count from 1 as in an editor."""
-    return [*LINES[: line - 1], text, *LINES[line:]]
-
-
-def with_field(line: int, name: str, field: str) -> list[str]:
-    fields = LINES[line - 1].split(",")
-    fields[list(UNITS).index(name)] = field
-    return with_line(line, ",".join(fields))
-
-
-def german(lines: list[str]) -> list[str]:
-    header, *rows = (line.replace(",", ";") for line in lines)
-    return [header, *(row.replace(".", ",") for row in rows)]
-
-
-def assert_refused(match: str, read: Callable[[], object]) -> InputError:
-    """Assert an InputError with this message whose four parts all say something."""
-    with pytest.raises(InputError, match=match) as caught:
-        read()
-    error = caught.value
-    parts = [error.where, error.found, error.expected, error.remedy]
-    assert all(part.strip() for part in parts)
-    assert all(part in str(error) for part in parts)
-    return error
-
-
-def assert_same(case: Case, other: Case, rtol: float = ROUNDING) -> None:
-    assert case.conditions == other.conditions
-    assert (case.Fx is None) == (other.Fx is None)
-    for name in UNITS:
-        assert_allclose(getattr(case, name), getattr(other, name), rtol=rtol)
-
 
 # What is read
 
@@ -204,11 +140,6 @@ ACCEPTED = [
 ]
 
 
-def in_unit(name: str, unit: str) -> list[str]:
-    """Return LINES with another unit in the header, the numbers as they are."""
-    return with_line(1, LINES[0].replace(f"{name} [{UNITS[name]}]", f"{name} [{unit}]"))
-
-
 @pytest.mark.parametrize(("name", "unit", "factor"), ACCEPTED)
 def test_a_recording_in_other_units_gives_the_same_case(tmp_path, name, unit, factor):
     column = list(UNITS).index(name)
@@ -218,27 +149,6 @@ def test_a_recording_in_other_units_gives_the_same_case(tmp_path, name, unit, fa
         row[column] = repr(float(row[column]) * old_factor / factor)
     lines = [in_unit(name, unit)[0], *(",".join(row) for row in rows)]
     assert_same(read_case(write(tmp_path / "a", lines)), read_case(write(tmp_path / "b")))
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "match"),
-    [
-        ("omegaW", "N", r"column 'omegaW': found \[N\], a unit of another dimension"),
-        ("omegaW", "km/h", "another dimension.*rad/s"),
-        ("omegaW", "Hz", r"\[Hz\], which leaves open whether it counts revolutions or radians"),
-        ("omegaR", "1/s", "leaves open whether it counts revolutions or radians"),
-        ("Fx", "1/min", "another dimension"),
-        ("time", "m", "another dimension.*s or ms"),
-        ("tauR", "nm", r"unknown unit \[nm\].*case matters"),
-        ("pB", "kpa", r"unknown unit \[kpa\].*Pa, kPa or bar"),
-        ("pB", "2 Pa", r"unknown unit \[2 Pa\]"),
-        ("pB", "Pa)", r"unknown unit \[Pa\)\]"),
-        ("pB", "nan", r"unknown unit \[nan\]"),
-        ("pB", "", r"line 1, column 'pB': found no unit in 'pB \[\]'"),
-    ],
-)
-def test_units_that_do_not_fit_are_refused(tmp_path, name, unit, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, in_unit(name, unit))))
 
 
 # Everything a recording may look like
@@ -302,187 +212,6 @@ def test_a_field_is_read_as_the_number_it_shows_or_refused_at_its_line(
         shutil.rmtree(folder)
 
 
-# Recordings that are refused
-
-
-@pytest.mark.parametrize(
-    ("field", "match"),
-    [
-        ("", "line 7, column 'pB': found an empty field; expected a finite number"),
-        ("  ", "found an empty field"),
-        ("nan", "line 7, column 'pB': found 'nan'"),
-        ("-inf", "found '-inf'"),
-        ("1e999", "found '1e999'; expected a finite number"),
-        ("error", "found 'error'"),
-        ("1_000", "found '1_000'"),
-        ("1 000", "found '1 000'"),
-        ("0x10", "found '0x10'"),
-        ("1.234.567", "found '1.234.567', which is ambiguous.*no thousands separators"),
-        ('"1,234"', "found '1,234', which is ambiguous"),
-    ],
-)
-def test_a_field_that_is_no_finite_number_is_refused(tmp_path, field, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, with_field(7, "pB", field))))
-
-
-def test_the_first_of_several_bad_fields_is_named(tmp_path):
-    lines = with_field(9, "time", "x")
-    lines[4] = lines[4].replace("-48.25", "y")
-    assert_refused("line 5, column 'omegaW'", lambda: read_case(write(tmp_path, lines)))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "match"),
-    [
-        ("-120,5", "1.234,5", "line 4, column 'Fx': found '1.234,5', which is ambiguous"),
-        ("-120,5", "1.234", "line 4, column 'Fx': found '1.234' after '0,0' .*line 2.*ambiguous"),
-        ("-120,5", "-120.5", "found '-120.5' after '0,0'"),
-        ("-120,5", "n.a.", "found 'n.a.'; expected a finite number"),
-    ],
-)
-def test_points_among_decimal_commas_are_refused(tmp_path, old, new, match):
-    lines = german(LINES)
-    lines[3] = lines[3].replace(old, new)
-    assert_refused(match, lambda: read_case(write(tmp_path, lines)))
-
-
-def test_quoted_decimal_commas_between_commas_are_refused(tmp_path):
-    quoted = ['"' + line.replace(";", '","') + '"' for line in german(LINES)]
-    match = "line 2, column 'time': found '0,0', which is ambiguous"
-    assert_refused(match, lambda: read_case(write(tmp_path, quoted)))
-
-
-@pytest.mark.parametrize("mark", [",", "."])
-def test_numbers_that_may_all_have_thousands_separators_are_refused(tmp_path, mark):
-    rows = [f"{k};0;1{mark}234;-48;-32;-120" for k in range(ROWS)]
-    lines = [LINES[0].replace(",", ";"), *rows]
-    match = "line 2, column 'tauR': found '1.234' and no number that tells"
-    assert_refused(match, lambda: read_case(write(tmp_path / "a", lines)))
-    lines[5] = lines[5].replace("-48", f"-48{mark}25")  # this number can only have decimals
-    assert_array_equal(read_case(write(tmp_path / "b", lines)).tauR, 1.234)
-
-
-@pytest.mark.parametrize(
-    ("line", "text", "match"),
-    [
-        (8, "0.6,1,2,3,4", "line 8: found 5 fields .*expected 6 as in the header"),
-        (8, "0.6,1,1,234,3,4,5", "line 8: found 7 fields .*decimal commas .*semicolons"),
-        (8, "", "line 8: found 0 fields"),
-        (8, '0.6,1,"2,3,4,5', "line 8: found a quotation that does not end"),
-        (8, '0.6,1,x"2,"3,4,5', "line 8: found a quotation that does not end"),
-        (8, '0.6,1,"2"3,4,5', "line 8: found a quotation that does not end"),
-        (
-            4,
-            "0.1,0,-1,-48,-31,-120",
-            "line 4, column 'time': found 0.1 s after 0.1 s.*strictly increasing",
-        ),
-        (4, "0.05,0,-1,-48,-31,-120", "line 4, column 'time': found 0.05 s after 0.1 s"),
-        (1, "", "line 1: found an empty file or an empty first line"),
-        (1, "time [s] pB [bar]", "line 1: found no separator in 'time "),
-        (1, LINES[0].replace(",", ";", 1), "line 1: found commas and semicolons; expected .*one"),
-        (1, LINES[0].replace("pB", "PB"), r"column 'pB': found no such .*\(closest: 'PB'\)"),
-        (1, LINES[0].replace("Fx", "pB"), "line 1, column 'pB': found 2 columns of this name"),
-        (1, LINES[0].replace(" [rad/s]", "", 1), "'omegaW': found no unit in 'omegaW'"),
-    ],
-)
-def test_a_line_that_breaks_the_format_is_refused(tmp_path, line, text, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, with_line(line, text))))
-
-
-@pytest.mark.parametrize(
-    ("csv", "match"),
-    [
-        ("", "line 1: found an empty file"),
-        (LINES[0], "line 2: found the end of the file after the header"),
-        ("\n".join(LINES).encode("utf-16"), "found UTF-16 or binary data.*expected UTF-8"),
-        ("\n".join(LINES).encode("utf-16-le"), "found UTF-16 or binary data"),
-        (
-            "\n".join([*LINES[:2], "0.1 °"]).encode("latin-1"),
-            "line 3: found byte 0xB0, as in Latin-1.*To do: save the file as UTF-8",
-        ),
-        ("\n".join(LINES[:20]), "found 19 samples over 1.8 s; expected at least 20 .*noise"),
-        ("\n".join(LINES[:21]), "found 20 samples over 1.9 s; expected .*a brake stop"),
-        ("\n".join([*LINES[:5], *LINES[24:]]), "found 6 samples over 2.4 s"),
-    ],
-)
-def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, csv)))
-
-
-# case.toml
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "match"),
-    [
-        ('"dry"\n', "dry\n", "case.toml, line 5: found text that is no TOML"),
-        ("[measurement]", "[measurement", "line 8: found text that is no TOML"),
-        ('title = "80 km/h, 1.5 bar"', "", "case.toml: found no 'title'"),
-        ('title = "80 km/h, 1.5 bar"', 'title = ""', "title: found ''; expected a text"),
-        ("title", "titel", r"found unknown key 'titel' \(closest: 'title'\)"),
-        ("direction = -1", "direktion = -1", r"\[conditions\]: .*'direktion' \(closest: 'dir"),
-        ("file", "fil", r"\[measurement\]: found unknown key 'fil' \(closest: 'file'\)"),
-        ("direction = -1", "", r"\[conditions\]: found no 'direction'"),
-        ("direction = -1", "direction = 0", "direction: found 0; expected 1 .* or -1"),
-        ("direction = -1", "direction = true", "direction: found True; expected a whole number"),
-        ("direction = -1", 'direction = "1"', "direction: found '1'; expected a whole number"),
-        ('"80 km/h"', "80", "initial_speed: found 80; expected a text"),
-        ('"80 km/h"', '"80"', "initial_speed: found '80'; expected a number .* and a unit"),
-        ('"80 km/h"', '"80,5 km/h"', "found '80,5 km/h'; expected a number with a decimal point"),
-        ('"80 km/h"', '"80 bar"', r"initial_speed: found \[bar\], a unit of another dimension"),
-        ('"80 km/h"', '"80 kmh"', r"found unknown unit \[kmh\].*m/s or km/h"),
-        ('"80 km/h"', '"-80 km/h"', "expected a speed above zero.*'direction' holds the sign"),
-        ('"1.5 bar"', '"-1.5 bar"', "brake_pressure: found '-1.5 bar'; expected .*zero or more"),
-        ('= "dry"', '= "damp"', "wheel_rail: found 'damp'; expected 'dry' or 'wet'"),
-        ('"dry", "wet"', '"dry", "Wet"', r"discs\[1\]: found 'Wet'; expected 'dry' or 'wet'"),
-        ('"dry", "wet"', '"dry", 1', r"discs\[1\]: found 1;"),
-        ('"dry", "wet", "dry"', '"dry"', "discs: found 1 entries; expected 3"),
-        ('["dry", "wet", "dry"]', '"dry"', "discs: found 'dry'; expected a list"),
-        ('"measured.csv"', "1", "file: found 1; expected a text"),
-        ('"measured.csv"', '"other.csv"', "other.csv: found no such file.*'file' in the table"),
-        ('"measured.csv"', '"."', r"found a file that cannot be read \(Is a directory\)"),
-    ],
-)
-def test_a_wrong_entry_of_the_conditions_is_refused(tmp_path, old, new, match):
-    assert old in TOML
-    folder = write(tmp_path, toml=TOML.replace(old, new, 1))
-    assert_refused(match, lambda: read_case(folder))
-
-
-@pytest.mark.parametrize(
-    ("columns", "match"),
-    [
-        ('pb = "p"', r"columns: found unknown key 'pb' \(closest: 'pB'\)"),
-        ("pB = 2", "columns pB: found 2; expected a text"),
-        ('pB = "p_cyl"', "column 'p_cyl': found no such column among time, pB, "),
-        ('Fx = "force"', "column 'force': found no such column"),
-        ('omegaR = "omegaW"', "columns omegaR: found column 'omegaW', .* already omegaW"),
-    ],
-)
-def test_a_wrong_name_of_a_column_is_refused(tmp_path, columns, match):
-    folder = write(tmp_path, toml=f"{TOML}[measurement.columns]\n{columns}\n")
-    assert_refused(match, lambda: read_case(folder))
-
-
-@pytest.mark.parametrize("table", ["conditions", "measurement"])
-def test_a_table_that_is_missing_or_no_table_is_refused(tmp_path, table):
-    lines = TOML.splitlines()
-    begin = lines.index(f"[{table}]")
-    end = next((i for i in range(begin + 1, len(lines)) if lines[i][0] == "["), len(lines))
-    rest = "\n".join(lines[:begin] + lines[end:])
-    missing = write(tmp_path / "a", toml=rest)
-    assert_refused(f"found no '{table}'", lambda: read_case(missing))
-    number = write(tmp_path / "b", toml=f"{table} = 1\n{rest}")
-    assert_refused(f"{table}: found 1; expected a table", lambda: read_case(number))
-
-
-def test_a_toml_file_in_another_encoding_is_refused(tmp_path):
-    toml = TOML.replace("title = ", "title = 'ä' #").encode("latin-1")
-    assert_refused(
-        "case.toml, line 1: found byte 0xE4", lambda: read_case(write(tmp_path, toml=toml))
-    )
-
-
 # Folders
 
 
@@ -498,30 +227,3 @@ def test_folders_of_cases_and_cases_are_read_together(tmp_path):
 def test_a_case_is_named_by_its_folder_however_the_path_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(write(tmp_path / "01_a"))
     assert read_case(Path()).name == "01_a"
-
-
-def test_two_cases_of_one_name_are_refused(tmp_path):
-    first, second = write(tmp_path / "x" / "01_a"), write(tmp_path / "y" / "01_a")
-    match = "y/01_a: found a second case '01_a' beside .*x/01_a"
-    assert_refused(match, lambda: read_cases([first, second]))
-
-
-def test_a_numbered_folder_without_case_toml_is_refused_not_skipped(tmp_path):
-    write(tmp_path / "01_a")
-    (tmp_path / "02_b").mkdir()
-    assert_refused("02_b/case.toml: found no such file", lambda: read_cases([tmp_path]))
-
-
-def test_a_path_without_a_case_is_refused(tmp_path):
-    file = tmp_path / "file"
-    file.touch()
-    assert_refused("found no case.toml", lambda: read_cases([tmp_path]))
-    assert_refused("file: found a file;", lambda: read_cases([file]))
-    assert_refused("none: found no such folder", lambda: read_cases([tmp_path / "none"]))
-    assert_refused("none/case.toml: found no such file", lambda: read_case(tmp_path / "none"))
-
-
-def test_input_errors_survive_the_way_between_processes():
-    error = InputError(where="a", found="b", expected="c", remedy="d")
-    copy = pickle.loads(pickle.dumps(error))
-    assert (str(copy), copy.remedy) == (str(error), "d")

@@ -3,9 +3,6 @@
 import dataclasses
 import json
 import re
-import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,40 +14,12 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.__main__ import main
 from workbench.case import Case
-from workbench.diagnosis import Residuals
-from workbench.report.diagnosis_figures import FAST, LASTING, lasting, stop_figure
+from workbench.report.diagnosis_figures import LASTING, stop_figure
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import CaseFigure
-from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 
-STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
-PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second
-TWINS = {"FxOffset", "ApexOffset"}  # of which either may be named first
-EFFECTS = ["BrakeFade", "BeddingIn", "WheelRadius", *sorted(TWINS)]
-
-
-@pytest.fixture(scope="session")
-def stops(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
-    """Three stops of the virtual rig, whose load cells have a wrong zero."""
-    folder = tmp_path_factory.mktemp("stops")
-    effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
-    for seed, (name, speed) in enumerate(STOPS.items()):
-        usual = SCENARIOS[name]
-        conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
-        short = dataclasses.replace(usual, conditions=conditions)
-        stop = simulate(short, seed, effects, root / "fmus" / "fmi2" / "Reference.fmu")
-        write_recording(stop, effects, 200, folder / name)
-    return folder
-
-
-def diagnose(root: Path, stops: Path, out: Path) -> Path:
-    """Through the command line, with few effects to be quick."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(root)
-        assert main(["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(out)]) == 0
-    return out
+from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
 
 
 @pytest.fixture(scope="session")
@@ -67,29 +36,6 @@ def summary(results: Path) -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def page(results: Path) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
-
-
-@pytest.fixture(scope="session")
-def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The page of the same stops without Fx, in which nothing is wrong then."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
-    folder = tmp_path_factory.mktemp("forceless")
-    for name in STOPS:
-        (folder / name).mkdir()
-        (folder / name / "case.toml").write_text((stops / name / "case.toml").read_text())
-        table = pd.read_csv(stops / name / "measured.csv")
-        forces = [column for column in table if column.startswith("Fx")]
-        table.drop(columns=forces).to_csv(folder / name / "measured.csv", index=False)
-    out = diagnose(root, folder, tmp_path_factory.mktemp("forceless_out"))
-    return lxml.html.fromstring((out / "index.html").read_bytes())
-
-
-def text(element: Any) -> str:
-    return " ".join(element.text_content().split())
-
-
-def section(page: Any, name: str) -> Any:
-    return page.xpath(f"//section[@aria-labelledby='{name}']")[0]
 
 
 def data(table: Any) -> pd.DataFrame:
@@ -201,56 +147,6 @@ def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(
         assert (abs(table["lasting_before.Fx [N]"]) < band).mean() < 0.3
 
 
-def residuals(gap: bool) -> Residuals:
-    """A stop of 40 s with white noise, an error in its second half, and perhaps a slide."""
-    rng = np.random.default_rng(1)
-    time = np.arange(800) * 0.05
-    kept = (time < 10.0) | (time > 15.0) if gap else time >= 0.0
-    after = rng.normal(size=(kept.sum(), 3))
-    step = np.where(time[kept] > 12.0, 10.0, 0.0)
-    return Residuals(
-        name="stop",
-        time=time,
-        values={"slip": np.where(kept, 1e-3, np.nan)},
-        block_time=time[kept],
-        before=after + step[:, None],
-        after=after,
-        sigma=np.ones_like(after),
-    )
-
-
-def test_noise_alone_leaves_one_and_a_lasting_error_stands_out() -> None:
-    before, after = lasting(residuals(gap=False), LASTING).noises()
-    # 80 independent means: one standard deviation of their rms is 8 %.
-    assert_allclose(after, 1.0, atol=0.3)
-    # Ten sigma of a block, in means over ten blocks, for 70 % of the time.
-    assert_allclose(before, 10.0 * np.sqrt(10.0 * 0.7), rtol=0.05)
-
-
-def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(
-    dry_case: Case,
-) -> None:
-    one = residuals(gap=False)
-    turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
-    one = dataclasses.replace(one, before=turning)
-    assert (lasting(one, LASTING).noises()[0] < 1.5).all()
-    assert (lasting(one, FAST).noises()[0] > 4.5).all()
-    assert "means over 0.05 s" in stop_figure(one, dry_case, "with X", FAST).finding
-
-
-def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case: Case) -> None:
-    one = residuals(gap=True)
-    quiet, loud = one.block_time < 10.0, one.block_time > 15.0
-    assert abs(lasting(one, LASTING).before[quiet]).max() < 3.0
-    assert lasting(one, LASTING).before[loud].min() > 7.0
-    figure = stop_figure(one, dry_case, "with X", LASTING)
-    inside = (figure.time > 10.0) & (figure.time < 15.0)
-    for panel in figure.panels:
-        for curve in panel.curves:
-            assert np.isnan(curve.values[inside]).all()
-            assert np.isfinite(curve.values[~inside]).all()
-
-
 # --- evidence in tables ---
 
 
@@ -354,48 +250,7 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
         assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
 
 
-# --- other verdicts ---
-
-
-def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_path: Path) -> None:
-    """Ctrl-C while a second cause is sought."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
-    arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
-    command = [sys.executable, "-m", "workbench", *arguments]
-    searches = 0
-    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as run:
-        assert run.stdout is not None
-        for line in run.stdout:
-            searches += "signatures" in line
-            if searches == 2 and "signatures" in line:
-                run.send_signal(signal.SIGINT)
-    assert run.returncode == 130
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    (cause,) = summary["causes"]
-    assert cause["effect"] in TWINS
-    assert summary["gain"]["after"] < summary["gain"]["before"]
-    assert Path(summary["model"]["fmu"]).is_file()
-    page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
-    assert "interrupted" in text(page.find_class("warning")[0])
-    assert "more may be missing" in text(page.get_element_by_id("verdict"))
-
-
-def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
-    headline = text(forceless.find_class("headline")[0])
-    assert headline.startswith("Nothing.")
-    assert "Without a measured force" in headline
-    assert any("Fx was not measured" in text(one) for one in forceless.find_class("warning"))
-    titles = [text(title) for title in forceless.xpath("//text[@class='title']")]
-    assert not [title for title in titles if "force" in title or "balance" in title]
-
-
-def test_where_nothing_is_missing_nothing_is_claimed(forceless: Any) -> None:
-    assert not forceless.find_class("dots")
-    assert not forceless.xpath("//section[@aria-labelledby='model']")
-    assert not forceless.xpath("//a[@href='#model']")
-    assert "Nothing was extended" in text(section(forceless, "gain"))
-    assert not forceless.xpath("//path[contains(@class, 'style-2')]")
-    assert text(section(forceless, "causes")).startswith("Causes, strongest first None.")
+# --- summaries that were changed ---
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The page of `simulate`: what a colleague reads, sees, hears and prints without the tool."""
+"""What `simulate` shows: the page that a colleague opens without the tool, and the live window."""
 
 import json
 import os
@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -16,38 +15,14 @@ import lxml.html
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
-from workbench.case import Case
-from workbench.cosim import observe
-from workbench.fmu import FMU
-from workbench.objective import Weights, score
-from workbench.observers import DirectInversion, OpenLoop
-from workbench.report import (
-    CaseResult,
-    case_figure,
-    summarise,
-    write_estimates,
-    write_page,
-)
-from workbench.report.drawing import extremes
-from workbench.report.figures import DARK, LIGHT
 from workbench.report.page import standings
 from workbench.report.results import label
 
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
 UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
-PROVENANCE = {
-    "workbench": "0",
-    "commit": None,
-    "python": "3",
-    "packages": {},
-    "fmu": {"file": "a.fmu", "model": "A", "sha256": "0" * 64},
-}
-SCORE = {"Fx_nrmse": None, "Fx_rms_N": 1.0, "z": 1.0, "seconds": 1.0, "reason": ""}
 
 
 @pytest.fixture(scope="module")
@@ -231,132 +206,6 @@ def test_curve_of_the_page_is_that_of_the_data(results: Path, page: Any) -> None
     shown = high - y * (high - low) / levels
     # Half a level of rounding; the CSV has seven digits.
     assert_allclose(shown[inside], error[inside], rtol=0, atol=0.51 * (high - low) / levels)
-
-
-@given(
-    values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=200),
-    blocks=st.integers(1, 50),
-)
-def test_decimation_keeps_ends_and_extremes(values: list[float], blocks: int) -> None:
-    signal = np.array(values)
-    kept = extremes(signal, blocks)
-    assert kept[0] == 0
-    assert kept[-1] == signal.size - 1
-    assert (np.diff(kept) > 0).all()
-    assert kept.size <= 2 * blocks + 2
-    assert signal[kept].min() == signal.min()
-    assert signal[kept].max() == signal.max()
-
-
-def contrast(one: str, other: str) -> float:
-    """Contrast of two colours, WCAG 2.2."""
-
-    def luminance(colour: str) -> float:
-        c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-        linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-        return float(linear @ [0.2126, 0.7152, 0.0722])
-
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
-
-
-@pytest.mark.parametrize(("theme", "curves"), [(0, LIGHT), (1, DARK)])
-def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[str, str]) -> None:
-    """WCAG 2.2 AA: 4.5 for text, 3 for graphics."""
-    css = (root / "workbench" / "report" / "page.css").read_text()
-    named = dict(re.findall(r"--(\w+): (#\w{6});", css.split(":root {")[1 + theme]))
-    for text in ("text", "quiet", "accent", "warning"):
-        assert contrast(named[text], named["ground"]) >= 4.5
-        assert contrast(named[text], named["raised"]) >= 4.5
-    for colour in curves.values():
-        assert contrast(colour, named["ground"]) >= 3.0
-
-
-@pytest.fixture(scope="module")
-def uncertain(dry_case: Case, minimal_path: Path) -> CaseResult:
-    """Two estimators, the second with a standard deviation of Fx in the first half."""
-    with FMU(minimal_path) as fmu:
-        radius = fmu.defaults["rR"]
-        runs = {e.name: observe(dry_case, e) for e in (OpenLoop(fmu), DirectInversion(fmu))}
-    sigma = np.full_like(runs["direct_inversion"].estimate, np.nan)
-    sigma[: len(sigma) // 2, 6] = 1e3  # [N], column of Fx
-    runs["direct_inversion"] = replace(runs["direct_inversion"], sigma=sigma)
-    scores = {name: score(dry_case, run, radius, Weights()) for name, run in runs.items()}
-    return CaseResult(dry_case, runs, scores)
-
-
-def write(result: CaseResult, path: Path, planned: int) -> Any:
-    """A page of one case."""
-    summary = summarise([result], Weights(), PROVENANCE)
-    write_page(summary, [case_figure(result, 0.7)], planned, path)
-    return lxml.html.fromstring(path.read_bytes())
-
-
-def test_standard_deviations_become_bands_and_columns(
-    uncertain: CaseResult, tmp_path: Path
-) -> None:
-    page = write(uncertain, tmp_path / "index.html", planned=1)
-    bands = page.xpath("//path[contains(@class, 'band')]")
-    assert [band.get("data-style") for band in bands] == ["1"]
-    panel = bands[0].xpath("./ancestor::g[1]")[0]
-    assert "Creep force" in panel.xpath("string(text)")
-    steps = np.array(re.findall(r"-?\d+", bands[0].get("d")), dtype=float).reshape(-1, 2)
-    x, y = np.cumsum(steps, axis=0).T
-    half = 1e3 * (uncertain.case.time[-1] - uncertain.case.time[0]) / 2
-    assert_allclose(x.max(), half, rtol=0, atol=200.0)  # [ms] two blocks of the band
-    # The band closes with the lower edge below the upper one by two standard deviations.
-    height = (y[-1] - y[0]) / 4000 * (float(panel.get("data-high")) - float(panel.get("data-low")))
-    assert_allclose(height, 2.0, rtol=0.01)  # [kN] rounded to levels of some 10 N
-    write_estimates(uncertain, tmp_path / "case.csv")
-    table = pd.read_csv(tmp_path / "case.csv")
-    assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]
-
-
-def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
-    uncertain: CaseResult, tmp_path: Path
-) -> None:
-    run = uncertain.runs["direct_inversion"]
-    rng = np.random.default_rng(1)
-    noise = rng.normal(1.0, 0.1, (run.time.size, 1))
-    estimate = np.nan_to_num(run.estimate, nan=0.3) * noise
-    noisy = replace(run, estimate=estimate, sigma=0.1 * np.abs(estimate))
-    names = [f"estimator_{k}" for k in range(6)]
-    figure = case_figure(
-        CaseResult(
-            uncertain.case,
-            dict.fromkeys(names, noisy),
-            dict.fromkeys(names, uncertain.scores["direct_inversion"]),
-        ),
-        roller_radius=0.7,
-    )
-    estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
-    cases = {f"case_{k}": {"title": "", "estimators": estimators} for k in range(14)}
-    figures = [replace(figure, name=name) for name in cases]
-    summary = {"provenance": PROVENANCE, "weights": {"cW": 1, "cR": 1, "cF": 1}, "cases": cases}
-    write_page(summary, figures, len(cases), tmp_path / "index.html")
-    assert 1e6 < (tmp_path / "index.html").stat().st_size < 5e6
-
-
-def test_an_interrupted_run_says_so(uncertain: CaseResult, tmp_path: Path) -> None:
-    page = write(uncertain, tmp_path / "index.html", planned=3)
-    assert "1 of 3 cases" in page.find_class("warning")[0].text_content()
-    assert not write(uncertain, tmp_path / "index.html", planned=1).find_class("warning")
-
-
-def test_an_estimator_that_fails_on_a_hard_case_does_not_win() -> None:
-    cases = {
-        "easy": {
-            "estimators": {
-                "brave": {**SCORE, "Fx_nrmse": 0.02},
-                "brittle": {**SCORE, "Fx_nrmse": 0.01},
-            }
-        },
-        "hard": {"estimators": {"brave": {**SCORE, "Fx_nrmse": 0.05}, "brittle": SCORE}},
-    }
-    ranking = standings({"cases": cases})
-    assert [standing.name for standing in ranking] == ["brave", "brittle"]
-    assert (ranking[0].case, ranking[0].worst) == ("hard", 0.05)
-    assert (ranking[1].judged, ranking[1].worst) == (1, 0.01)
 
 
 PROBE = """

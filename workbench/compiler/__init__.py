@@ -7,25 +7,12 @@ import json
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-import fmpy
-
-from workbench.compiler.archive import (
-    PLATFORMS,
-    RUNTIME,
-    compile_library,
-    digest,
-    digest_file,
-    library_sources,
-    native,
-    pack,
-    write_sources,
-)
-from workbench.compiler.ccode import generate, identifier
-from workbench.compiler.description import describe
+from workbench.compiler.archive import PLATFORMS, RUNTIME, digest, digest_file, native
+from workbench.compiler.assembly import BuiltFMU, Law, assemble
 from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError
@@ -33,6 +20,8 @@ from workbench.errors import InputError
 __all__ = [
     "PLATFORMS",
     "BuiltFMU",
+    "Law",
+    "assemble",
     "build",
     "build_all",
     "differences",
@@ -43,19 +32,6 @@ __all__ = [
 # What `fmus/` holds: every model in both versions of FMI.
 MODELS = ("Reference", "FullObserver", "MinimalObserver")
 FMI_VERSIONS = (2, 3)
-
-_HEADERS = Path(fmpy.__file__).parent / "c-code"
-
-
-@dataclass(frozen=True)
-class BuiltFMU:
-    """A built FMU and what made it."""
-
-    path: Path
-    model: str
-    fmi: int
-    token: str
-    sha256: str
 
 
 def source_hash(package: Path) -> str:
@@ -103,45 +79,7 @@ def build(
             expected=", ".join(PLATFORMS),
             remedy="choose from the list",
         )
-    state_space = make_explicit(flatten(package, model))
-    # The token must change with anything that changes the FMU's behaviour, and be in the code.
-    draft = generate(state_space, "")
-    runtime = [p.read_bytes() for p in sorted(RUNTIME.iterdir()) if p.suffix in (".c", ".h")]
-    digits = digest([draft.header, draft.source, *runtime, str(fmi)])
-    token = (
-        "{"
-        + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32]))
-        + "}"
-    )
-    code = generate(state_space, token)
-    tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / identifier(model)
-        sources = folder / "sources"
-        generated = {"model.c": code.source, "model_data.h": code.header}
-        write_sources(sources, fmi, generated, _HEADERS)
-        for name in platforms:
-            fmi2_name, fmi3_name, target, suffix = PLATFORMS[name]
-            binaries = folder / "binaries" / (fmi2_name if fmi == 2 else fmi3_name)
-            compile_library(sources, binaries / f"{identifier(model)}{suffix}", fmi, target)
-        files = library_sources(fmi)
-        (folder / "modelDescription.xml").write_text(
-            describe(state_space, code, token, fmi, tool, files)
-        )
-        if fmi == 3:
-            (sources / "buildDescription.xml").write_text(_build_description(model, files))
-        pack(folder, fmu)
-    return BuiltFMU(fmu, model, fmi, token, digest_file(fmu))
-
-
-def _build_description(model: str, files: Sequence[str]) -> str:
-    listed = "\n".join(f'      <SourceFile name="{name}"/>' for name in files)
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
-        f'  <BuildConfiguration modelIdentifier="{identifier(model)}">\n'
-        f'    <SourceFileSet language="C99">\n{listed}\n    </SourceFileSet>\n'
-        "  </BuildConfiguration>\n</fmiBuildDescription>\n"
-    )
+    return assemble(make_explicit(flatten(package, model)), model, fmu, fmi, platforms)
 
 
 def build_all(package: Path, folder: Path) -> list[BuiltFMU]:

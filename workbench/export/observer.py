@@ -5,29 +5,13 @@ makes C of the model, and `sampled.c` takes the place of the integrator.
 """
 
 import math
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TypeAlias
 
-import fmpy
-
-from workbench.compiler import BuiltFMU
-from workbench.compiler.archive import (
-    PLATFORMS,
-    RUNTIME,
-    compile_library,
-    digest,
-    digest_file,
-    library_sources,
-    pack,
-    write_sources,
-)
-from workbench.compiler.ccode import generate, identifier
-from workbench.compiler.description import describe
+from workbench.compiler import PLATFORMS, BuiltFMU, Law, assemble
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
 from workbench.observers import (
@@ -47,7 +31,6 @@ OBSERVERS = {
 }
 
 _LAW = Path(__file__).with_name("sampled.c")
-_HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 # States by the last part of their name, that of the output of Observers.Sampled and .Applied.
 _KINDS = {"held": "TAKEN", "acting": "APPLIED"}
@@ -95,39 +78,13 @@ def build_observer(
     space = _with_gains(make_explicit(flatten(observer.package, observer.model)), observer.gains)
     # As in Python: the parameter estimator is quiet at standstill without it.
     tables = _tables(space, sticks=isinstance(observer.gains, DisturbanceGains))
-    draft = generate(space, "")
-    runtime = [file.read_bytes() for file in [*sorted(RUNTIME.glob("*.[ch]")), _LAW]]
-    digits = digest([draft.header, draft.source, tables, *runtime, str(fmi)])
-    parts = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])
-    token = "{" + "-".join(parts) + "}"
-    code = generate(space, token)
-    name = identifier(observer.model)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / name
-        sources = folder / "sources"
-        generated = {
-            "model.c": code.source,
-            "model_data.h": code.header,
-            "sampled_data.h": tables,
-        }
-        write_sources(sources, fmi, generated, _HEADERS)
-        # Under the name of the file that it replaces, so that the list of sources stays right.
-        (sources / "integrator.c").write_bytes(_LAW.read_bytes())
-        for platform in platforms:
-            report(platform)
-            fmi2_name, fmi3_name, target, suffix = PLATFORMS[platform]
-            binaries = folder / "binaries" / (fmi2_name if fmi == 2 else fmi3_name)
-            compile_library(sources, binaries / f"{name}{suffix}", fmi, target)
-        tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
-        files = library_sources(fmi)
-        description = describe(space, code, token, fmi, tool, files)
-        (folder / "modelDescription.xml").write_text(_sampled(description, space))
-        if fmi == 3:
-            (sources / "buildDescription.xml").write_text(_build_description(name, files))
-        (folder / "resources").mkdir()
-        (folder / "resources" / "gains.toml").write_text(observer.gains_file)
-        pack(folder, fmu)
-    return BuiltFMU(fmu, observer.model, fmi, token, digest_file(fmu))
+    law = Law(
+        source=_LAW,
+        tables={"sampled_data.h": tables},
+        described=lambda description: _sampled(description, space),
+        resources={"gains.toml": observer.gains_file},
+    )
+    return assemble(space, observer.model, fmu, fmi, platforms, law, report)
 
 
 def parameter_values(gains: Gains) -> dict[str, float]:
@@ -188,14 +145,4 @@ def _sampled(description: str, space: StateSpace) -> str:
         root.remove(exchange)
     (experiment,) = root.findall("DefaultExperiment")
     experiment.set("stepSize", repr(space.experiment["Interval"]))
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _build_description(name: str, files: list[str]) -> str:
-    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
-    listed = ET.SubElement(configuration, "SourceFileSet", language="C99")
-    for file in files:
-        ET.SubElement(listed, "SourceFile", name=file)
-    ET.indent(root, "  ")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,90 @@
+"""Case folders written line by line, and what reading them gives or refuses."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.case import Case
+from workbench.errors import InputError
+
+ROUNDING = 1e-14  # some ten roundings of 1.1e-16: text, unit factor, product
+
+TOML = """\
+title = "80 km/h, 1.5 bar"
+[conditions]
+initial_speed = "80 km/h"
+brake_pressure = "1.5 bar"
+wheel_rail = "dry"
+discs = ["dry", "wet", "dry"]
+direction = -1
+[measurement]
+file = "measured.csv"
+"""
+UNITS = {
+    "time": "s",
+    "pB": "bar",
+    "tauR": "N.m",
+    "omegaW": "rad/s",
+    "omegaR": "rad/s",
+    "Fx": "N",
+}
+SI_OF_UNITS = {"bar": 1e5}  # every other unit above is SI already
+ROWS = 25
+LINES = [
+    ",".join(f"{name} [{unit}]" for name, unit in UNITS.items()),
+    *(f"{k / 10:.1f},{k / 50:.2f},-{k},-48.25,-31.75,-120.5" for k in range(ROWS)),
+]
+
+Text = str | bytes
+
+
+def write(folder: Path, csv: Text | list[str] = LINES, toml: Text = TOML) -> Path:
+    """Write a case folder; a list is the lines of the CSV."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in (("measured.csv", csv), ("case.toml", toml)):
+        if isinstance(content, list):
+            content = "\n".join(content) + "\n"
+        data = content if isinstance(content, bytes) else content.encode()
+        (folder / name).write_bytes(data)
+    return folder
+
+
+def with_line(line: int, text: str) -> list[str]:
+    """Return LINES with one line replaced; lines count from 1 as in an editor."""
+    return [*LINES[: line - 1], text, *LINES[line:]]
+
+
+def with_field(line: int, name: str, field: str) -> list[str]:
+    fields = LINES[line - 1].split(",")
+    fields[list(UNITS).index(name)] = field
+    return with_line(line, ",".join(fields))
+
+
+def german(lines: list[str]) -> list[str]:
+    header, *rows = (line.replace(",", ";") for line in lines)
+    return [header, *(row.replace(".", ",") for row in rows)]
+
+
+def assert_refused(match: str, read: Callable[[], object]) -> InputError:
+    """Assert an InputError with this message whose four parts all say something."""
+    with pytest.raises(InputError, match=match) as caught:
+        read()
+    error = caught.value
+    parts = [error.where, error.found, error.expected, error.remedy]
+    assert all(part.strip() for part in parts)
+    assert all(part in str(error) for part in parts)
+    return error
+
+
+def assert_same(case: Case, other: Case, rtol: float = ROUNDING) -> None:
+    assert case.conditions == other.conditions
+    assert (case.Fx is None) == (other.Fx is None)
+    for name in UNITS:
+        assert_allclose(getattr(case, name), getattr(other, name), rtol=rtol)
+
+
+def in_unit(name: str, unit: str) -> list[str]:
+    """Return LINES with another unit in the header, the numbers as they are."""
+    return with_line(1, LINES[0].replace(f"{name} [{UNITS[name]}]", f"{name} [{unit}]"))
