@@ -158,7 +158,14 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(
 
 @pytest.mark.parametrize(
     ("one", "other"),
-    [("fade", "wheel_radius"), ("speed_friction", "fx_offset"), ("cylinder_lag", "roller_losses")],
+    [
+        ("fade", "wheel_radius"),
+        ("speed_friction", "fx_offset"),
+        ("cylinder_lag", "roller_losses"),
+        # Either alone leaves some channel worse than without it.
+        ("pressure_offset", "cylinder_lag"),
+        ("torque_gain", "apex_offset"),
+    ],
 )
 def test_two_effects_are_found_one_after_the_other(
     one: str, other: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]

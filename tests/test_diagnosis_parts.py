@@ -10,13 +10,14 @@ pytest.importorskip("rumoca")
 
 from workbench.case import Case, Conditions
 from workbench.diagnosis import CATALOGUE, choose
+from workbench.diagnosis.evidence import Evidence
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import StopSystem
+from workbench.diagnosis.fit import Linearised, Point, StopSystem
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
-from workbench.fmu import FMU, CoSimulation, Vector
+from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
@@ -176,6 +177,35 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     np.testing.assert_allclose(covariance(total.N), full, rtol=1e-6)
     local = systems[2].local(step)
     np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
+
+
+def linearised(errors: Matrix) -> Linearised:
+    evidence = (Evidence(errors, 0.0, np.zeros((errors.size + 1, 0))),)
+    return Linearised(Point({}, {}, np.zeros((1, 5)), {}), (), evidence, np.ones(3), 0.0)
+
+
+def test_deviance_is_chi_squared_where_errors_are_noise() -> None:
+    lin = linearised(np.random.default_rng(4).standard_normal((400, 3)))
+    assert lin.deviance == pytest.approx(lin.misfit, rel=1e-12)
+    assert lin.spread.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_chi_squared_over_spread_is_the_slope_of_the_deviance() -> None:
+    errors = np.random.default_rng(4).standard_normal((400, 3)) * [1.0, 3.0, 200.0]
+    lin, step = linearised(errors), 1e-6
+    for j, spread in enumerate(lin.spread):
+        scale = np.ones(3)
+        scale[j] += step
+        slope = (linearised(errors * scale).deviance - lin.deviance) / step
+        # Second order: a part in a million of the slope, which is of the order of the step.
+        assert slope == pytest.approx(2.0 * np.square(errors[:, j]).sum() / spread, rel=1e-5)
+
+
+def test_to_spoil_a_clean_channel_for_a_wrong_one_is_no_gain() -> None:
+    errors = np.random.default_rng(4).standard_normal((400, 3)) * [1.0, 1.0, 40.0]
+    traded = linearised(errors * [1.0, 10.0, 0.5])
+    assert traded.misfit < linearised(errors).misfit
+    assert traded.deviance > linearised(errors).deviance
 
 
 def test_covariance_is_the_same_in_any_unit() -> None:

@@ -29,10 +29,10 @@ _RAIL: Mapping[Surface, Mapping[str, float]] = {
 }
 _RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
 _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
-_WORSE = 1.0  # of chi-squared, which no step is worth
-_SETTLED = 1e-3  # share of it
+_NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
+_WORSE = 1.0  # of deviance, which no step is worth
+_HALVED = 4  # times: after that a step is given up
 _SECOND = 20  # blocks
-_GROSS = 100.0  # of inflation: ten times the noise, which no tolerance explains
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 
 _FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
@@ -70,17 +70,45 @@ class Linearised:
     ----------
     keys : of the columns of each jacobian: TOLERANCES, then (effect, parameter).
     inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
+    away : chi-squared of levels and deviations against what tolerances say of them.
     """
 
     point: Point
     keys: tuple[Key, ...]
     evidence: tuple[Evidence, ...]
     inflation: Vector
+    away: float
 
     @property
     def misfit(self) -> float:
         """Chi-squared of all stops at the point, in units of the noise."""
         return float(sum(one.residual @ one.residual for one in self.evidence))
+
+    @property
+    def _squares(self) -> tuple[int, Vector]:
+        """Number of blocks, and mean square of their errors by channel (m,)."""
+        errors = np.concatenate([one.errors for one in self.evidence])
+        return len(errors), np.square(errors).mean(axis=0)
+
+    @property
+    def deviance(self) -> float:
+        """What a fit makes least: minus twice the log likelihood, up to a constant.
+
+        Of a channel that is wrong, the variance is unknown, and errors that last count once in a
+        second: its logarithm counts. To spoil one channel for another is no gain then.
+        Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
+        """
+        count, mean = self._squares
+        noise = count * np.minimum(mean, _NOISE)
+        wrong = count / _SECOND * np.log(self.spread)
+        rest = sum(one.rest**2 for one in self.evidence)
+        return float((noise + wrong).sum()) + rest + self.away
+
+    @property
+    def spread(self) -> Vector:
+        """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
+        spread: Vector = 1.0 + _SECOND * np.maximum(0.0, self._squares[1] - _NOISE)
+        return spread
 
     def weighed(self, inflation: Vector) -> float:
         """Chi-squared, each channel in units of what is wrong with it, (m,)."""
@@ -216,7 +244,8 @@ class Fit:
                 columns.append(Column(variables(effect, parameter), effect.step, setting))
                 keys.append((variant(effect, shape), parameter))
         evidence = self._court.hear(self.values(point), [columns] * self.count)
-        return Linearised(point, tuple(keys), tuple(evidence), slowness(evidence))
+        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
+        return Linearised(point, tuple(keys), tuple(evidence), slowness(evidence), away)
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> "Joint":
         """Every stop over the common unknowns, local ones eliminated.
@@ -278,37 +307,37 @@ class Fit:
                 N[j, j], g[j], c = 1.0 / sigma**2, away / sigma, c + away**2
         return Quadratic(N, g, c, 0)
 
-    def refine(self, point: Point, active: Sequence[Effect], rounds: int) -> Linearised:
-        """Gauss-Newton over all unknowns, with noise as large as what the last round left.
+    def refine(
+        self, point: Point, active: Sequence[Effect], rounds: int, spread: Vector | None = None
+    ) -> Linearised:
+        """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
         Parameters
         ----------
         point : where to begin.
-        rounds : most evaluations; a step that made things worse is halved, which costs one, or
-            first, while an effect leaves gross errors, made with all channels alike.
+        rounds : most evaluations; a step that made things worse is halved, which costs one.
+        spread : (m,) for the first step, if not that of the point: an effect that has only just
+            been put beside levels fitted without it makes all channels wrong.
 
         Returns
         -------
         best : about the best point that was met.
         """
         best = self.linearise(point, active)
-        point, plain = self._stepped(best), False
+        point, halved = self._stepped(best, best.spread if spread is None else spread), 0
         for _ in range(rounds):
             tried = self.linearise(point, active)
-            if not tried.misfit < best.misfit + _WORSE:
-                # A channel that counts for little, as much is wrong with it, may have got worse.
-                gross = bool(active) and best.inflation.max() > _GROSS and not plain
-                point = self._stepped(_unweighed(best)) if gross else _between(best.point, point)
-                plain = True
-                continue
-            settled = best.misfit - tried.misfit < max(_WORSE, _SETTLED * tried.misfit)
-            best, point, plain = tried, self._stepped(tried), False
-            if settled:
+            fall = best.deviance - tried.deviance
+            if fall > -_WORSE:
+                best, point, halved = tried, self._stepped(tried, tried.spread), 0
+            else:
+                point, halved = _between(best.point, point), halved + 1
+            if abs(fall) < _WORSE or halved > _HALVED:
                 break
         return best
 
-    def _stepped(self, lin: Linearised) -> Point:
-        joint = self.quadratics(lin)
+    def _stepped(self, lin: Linearised, spread: Vector) -> Point:
+        joint = self.quadratics(replace(lin, inflation=spread))
         return self._moved(lin.point, joint, joint.solve())
 
     def _moved(self, point: Point, joint: "Joint", step: Vector) -> Point:
@@ -428,11 +457,6 @@ def slowness(evidence: Sequence[Evidence]) -> Vector:
     lasting = np.concatenate([seconds(one.errors) for one in evidence])
     slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
     return slow
-
-
-def _unweighed(lin: Linearised) -> Linearised:
-    """The same with all channels in units of their noise, however wrong."""
-    return replace(lin, inflation=np.ones_like(lin.inflation))
 
 
 def _between(one: Point, other: Point) -> Point:

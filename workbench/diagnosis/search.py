@@ -22,7 +22,7 @@ _NEEDED = 60.0  # fall of chi-squared by an effect beside others, which may bend
 _RIVALS = 5  # effects that are fitted in full before one is named
 _NEAR = 0.4  # share of the best score from which on an effect is a rival
 _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
-_BEGUN = 2  # rounds after which a rival that is far behind is given up
+_BEGUN = 3  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
 _BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 12  # of Gauss-Newton, most
@@ -263,20 +263,16 @@ def _step(
         return None
     report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
     fits = _fits(fit, best, rivals)
-    if _fall(best, fits[0]) < _HELD_OUT:
+    if not fits:
         return None
     equals = [one for one in fits if beyond(one, fits[0]) < _TIED]
     first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
     return Step(best, scores, (first, *(one for one in fits if one is not first)))
 
 
-def _fall(before: Fitted, after: Fitted) -> float:
-    """Fall of chi-squared, each channel against what is wrong with it before."""
-    was, left = (
-        np.sum([np.square(one.errors).sum(axis=0) for one in fit.linearised.evidence], axis=0)
-        for fit in (before, after)
-    )
-    return float(((was - left) / before.linearised.inflation).sum())
+def _gains(before: Fitted, after: Fitted) -> bool:
+    """Whether an effect is worth a step."""
+    return before.linearised.deviance - after.linearised.deviance > _HELD_OUT
 
 
 def beyond(one: Fitted, other: Fitted) -> float:
@@ -290,8 +286,10 @@ def beyond(one: Fitted, other: Fitted) -> float:
 
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
-    """Fits with one more effect, best first; those that fall far behind are not finished."""
-    begun = [_begun(fit, best, rival) for rival in rivals]
+    """Fits with one more effect that gain by it, best first; one far behind is not finished."""
+    begun = [one for one in (_begun(fit, best, rival) for rival in rivals) if _gains(best, one)]
+    if not begun:
+        return []
     misfits = _misfits(begun)
     near = misfits < _BEHIND * misfits.min()
     every = [
@@ -309,15 +307,14 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
 
 def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
     """First rounds of a fit with one more effect, begun at half the size where it was too much."""
-    active = (*best.active, rival.effect)
-    one = fitted(fit, joined(best.point, rival), active, _BEGUN)
+    active, before = (*best.active, rival.effect), best.linearised
+    one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
     for _ in range(_HALVINGS):
-        before = best.linearised.inflation
-        if one.linearised.weighed(before) < best.linearised.weighed(before):
+        if _gains(best, one):
             break
         # A law bends: half the contact's stiffness is twice the slip.
         rival = replace(rival, size=0.5 * rival.size)
-        one = fitted(fit, joined(best.point, rival), active, _BEGUN)
+        one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
     return one
 
 
@@ -372,9 +369,15 @@ def without(point: Point, effect: Effect) -> Point:
     )
 
 
-def fitted(fit: Fit, point: Point, active: tuple[Effect, ...], rounds: int = _ROUNDS) -> Fitted:
-    """Fit a set of effects, from a point that has them."""
-    lin = fit.refine(point, active, rounds)
+def fitted(
+    fit: Fit,
+    point: Point,
+    active: tuple[Effect, ...],
+    rounds: int = _ROUNDS,
+    spread: Vector | None = None,
+) -> Fitted:
+    """Fit a set of effects, from a point that has them; see `Fit.refine`."""
+    lin = fit.refine(point, active, rounds, spread)
     return Fitted(active, lin.point, lin, lin.misfit)
 
 

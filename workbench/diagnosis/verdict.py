@@ -299,7 +299,8 @@ def _twins(
         name = score.effect.name
         if name in alike and name not in judged:
             judged.add(name)
-            one = fitted(fit, joined(less.point, score), (*less.active, score.effect))
+            point, effects = joined(less.point, score), (*less.active, score.effect)
+            one = fitted(fit, point, effects, spread=less.linearised.spread)
             if _close(less, one, best):
                 found.append(name)
     active = {one.name for one in best.active}
