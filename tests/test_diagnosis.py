@@ -79,9 +79,9 @@ def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
     return run
 
 
-def recorded(folder: Path, effects: Effects, seed: int) -> list[Case]:
+def recorded(folder: Path, effects: Effects, seed: int, names: Sequence[str] = STOPS) -> list[Case]:
     """Stops on the rig, with pads of constant friction but for what is planted."""
-    for scenario in select(STOPS):
+    for scenario in select(names):
         stop = simulate(scenario, seed, effects, ROOT / "fmus" / "fmi2" / "Reference.fmu")
         write_recording(stop, effects, 200, folder / scenario.name)
     return read_cases([folder])
@@ -125,6 +125,16 @@ def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     sizes = {"caliper_hysteresis": 0.03, "adhesion_recovery": 0.3, "wheel_inertia": 0.2}
     found = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
     assert found.verdict == "nothing"
+
+
+def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
+    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    stairs = ("staircase_160", "staircase_120_rev", "dry_120_3.6")
+    found = diagnosed(recorded(tmp_path, Effects(caliper_hysteresis=0.05), 78, stairs))
+    assert [cause.effect.name for cause in found.causes] == ["CaliperHysteresis"]
+    share = found.causes[0].parameters["share"]
+    assert share.low <= 0.05 <= share.high
 
 
 def test_nothing_is_found_where_nothing_is_missing(

@@ -206,7 +206,7 @@ def _brake_to_standstill(
         elif scenario.protected and k % every == 0:
             valve = protection.step(abs(omegaW) * nominal["rW"])
 
-        brake.step(conditions.brake_pressure if braking >= DEAD_TIME else 0.0, valve)
+        brake.step(scenario.demand(braking) if braking >= DEAD_TIME else 0.0, valve)
         ratio = kappa * brake.efficiency
         force = ratio * max(0.0, brake.pads - p0)
         turn = phiW + 0.5 * dt * omegaW  # in the middle of the time for which inputs are held

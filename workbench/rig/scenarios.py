@@ -1,4 +1,4 @@
-"""The stops that the rig can make: fourteen standard cases, and one that no rig would dare."""
+"""The stops that the rig can make: fourteen standard cases, and some that are none."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,6 +30,7 @@ class Scenario:
     muWR : friction of the contact at zero slip velocity.
     patch : spell of lower friction, or None.
     protected : whether the wheel-slide protection is switched on.
+    steps : demands that follow the first, (time after that [s], pressure [Pa]) each.
     """
 
     name: str
@@ -37,6 +38,12 @@ class Scenario:
     muWR: float
     patch: Patch | None
     protected: bool
+    steps: tuple[tuple[float, float], ...] = ()
+
+    def demand(self, braking: float) -> float:
+        """Brake pressure that is asked for [Pa], a time [s] after the first demand."""
+        asked = [pressure for begin, pressure in self.steps if braking >= begin]
+        return asked[-1] if asked else self.conditions.brake_pressure
 
     @property
     def number(self) -> int:
@@ -67,12 +74,18 @@ def _stop(
     muWR: float | None = None,
     patch: Patch | None = None,
     protected: bool = True,
+    steps: tuple[tuple[float, float], ...] = (),
 ) -> Scenario:
     """One row of the table: speed in km/h, pressure in bar, numbers of the wet discs."""
     discs: tuple[Surface, ...] = tuple("wet" if i in wet_discs else "dry" for i in (1, 2, 3))
     conditions = Conditions(speed / 3.6, pressure * 1e5, wheel_rail, discs, direction)
     usual = _WET_FRICTION if wheel_rail == "wet" else _DRY_FRICTION
-    return Scenario(name, conditions, usual if muWR is None else muWR, patch, protected)
+    return Scenario(name, conditions, usual if muWR is None else muWR, patch, protected, steps)
+
+
+def _stairs(*pressures: float) -> tuple[tuple[float, float], ...]:
+    """Demands of so many bar, one after the other, for 5 s each."""
+    return tuple((5.0 * i, pressure * 1e5) for i, pressure in enumerate(pressures, start=1))
 
 
 # Polach's wet 0.30 carries the stop at 4.2 bar; case 9 takes less, so that the patch costs grip.
@@ -98,8 +111,14 @@ _STANDARD = (
 # Full brake on a greasy rail without protection: the wheel locks, and stays locked to the end.
 _DARING = (_stop("15_locked_wheel", 100, 4.2, "wet", (), +1, muWR=0.12, protected=False),)
 
+# Pressure up and down: in a stop in which it only rises, calipers hide their hysteresis.
+_STAIRCASES = (
+    _stop("16_staircase_160", 160, 1.5, "dry", (), +1, steps=_stairs(3.0, 4.2, 2.4, 1.2, 3.6, 1.8)),
+    _stop("17_staircase_120_rev", 120, 3.6, "dry", (), -1, steps=_stairs(1.8, 3.0, 1.2, 2.4)),
+)
+
 STANDARD = tuple(scenario.name for scenario in _STANDARD)
-SCENARIOS = {scenario.name: scenario for scenario in _STANDARD + _DARING}
+SCENARIOS = {scenario.name: scenario for scenario in _STANDARD + _DARING + _STAIRCASES}
 
 
 def select(names: Sequence[str]) -> list[Scenario]:

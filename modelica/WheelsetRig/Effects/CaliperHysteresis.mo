@@ -6,21 +6,25 @@ model CaliperHysteresis "Caliper whose friction opposes the motion of the pads"
   parameter Units.Pressure play(min=0.01e5, max=0.5e5) = 0.1e5
     "Change of pressure from the middle to one side";
   parameter Units.Pressure p0(min=0.0) = 25000.0 "Pressure that balances the return spring";
-  parameter Real tau(unit="s", min=1e-3) = 0.01
+  parameter Real tau(unit="s", min=1e-3) = 0.1
     "Time in which the caliper follows at the end of its play";
+  parameter Real smoothing(unit="s", min=1e-3) = 0.02 "Time over which noise of pB is averaged";
+  Units.Pressure felt(start=0.0, fixed=true, nominal=1e5) "Pressure that moves the caliper";
   Units.Pressure centre(start=0.0, fixed=true, nominal=1e5) "Middle of the play";
 protected
   Real side(unit="1") "Place within the play, -1 to 1";
 equation
+  smoothing*der(felt) = pB - felt;
   tau*der(centre) =
-    noEvent(max(0.0, pB - centre - play)) + noEvent(min(0.0, pB - centre + play));
-  side = noEvent(max(-1.0, min(1.0, (pB - centre)/play)));
+    noEvent(max(0.0, felt - centre - play)) + noEvent(min(0.0, felt - centre + play));
+  side = noEvent(max(-1.0, min(1.0, (felt - centre)/play)));
   p = pB - share*side*noEvent(max(0.0, pB - p0));
   rest = restBefore;
   annotation (Documentation(info="<html>
 <p><code>p - p0 = (pB - p0)*(1 - share*side)</code>. <code>side</code> is the place within a play of
-width <code>2*play</code>: 1 after a rise, -1 after a fall, kept while the pressure holds, and kept
-under noise that is small against <code>play</code>. share is 0.02 to 0.08.</p>
+width <code>2*play</code>: 1 after a rise, -1 after a fall, kept while the pressure holds. Noise of
+a measured pressure would push the play along, a little with each peak: it is averaged over
+<code>smoothing</code>. share is 0.02 to 0.08.</p>
 <h4>Limits</h4>
 <p>One play; inner loops need more of them (Preisach). While pressure only rises this is a change of
 the level.</p>
