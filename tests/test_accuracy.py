@@ -1,19 +1,27 @@
 """Accuracy of the estimators as they come: against the truth of the virtual rig, and on recordings
 made by an independent simulator."""
 
-import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 
-from workbench.case import Case, read_cases
-from workbench.cosim import Run, observe
+from workbench.accuracy import (
+    Judged,
+    contact_errors,
+    fall_delay,
+    force_error,
+    friction_error,
+    judge,
+    minimum_error,
+    read_truth,
+    rise_delay,
+    slide_error,
+)
+from workbench.case import read_cases
+from workbench.cosim import observe
 from workbench.fmu import FMU
-from workbench.objective import Weights, braking_window, low_pass, score
+from workbench.objective import Weights, score
 from workbench.observers import ESTIMATORS, Estimator, make_estimators
 from workbench.tuning import default_settings
 
@@ -39,52 +47,13 @@ def estimators(root: Path) -> Iterator[dict[str, Estimator]]:
 # --- against the truth of the virtual rig ---
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A stop whose truth is known, and what all estimators make of it.
-
-    Attributes
-    ----------
-    truth : signals of truth.csv without their units, at the times of the recording.
-    demand : [s] of the brake.
-    contact : [s] when the pads first touch the discs.
-    """
-
-    case: Case
-    runs: dict[str, Run]
-    truth: dict[str, np.ndarray]
-    demand: float
-    contact: float
-
-    def between(self, begin: float, end: float) -> np.ndarray:
-        """Samples between two times [s] after the first contact."""
-        since = self.case.time - self.contact
-        return (since >= begin) & (since < end)
-
-    def force_error(self, name: str) -> np.ndarray:
-        """Estimated minus true force below 5 Hz [N], positive if the estimate is too large."""
-        error = self.runs[name].signal("Fx") - self.truth["Fx"]
-        return self.case.conditions.direction * low_pass(self.case.time, error)
-
-
-def judge(case: Case, estimators: dict[str, Estimator]) -> Judged:
-    folder = case.source.parent
-    table = pd.read_csv(folder / "truth.csv")
-    time = table["time [s]"]
-    truth = {
-        column.partition(" ")[0]: np.interp(case.time, time, table[column])
-        for column in table.columns
-    }
-    # 0.25 bar balance the return springs, data sheet.
-    contact = float(case.time[np.argmax(truth["pads"] > 25e3)])
-    made = json.loads((folder / "truth.json").read_text())
-    runs = {name: observe(case, estimator) for name, estimator in estimators.items()}
-    return Judged(case, runs, truth, made["demand"], contact)
-
-
 @pytest.fixture(scope="module")
 def stops(estimators: dict[str, Estimator]) -> dict[str, Judged]:
-    return {case.name: judge(case, estimators) for case in read_cases([ROOT / "cases"])}
+    made = list(estimators.values())
+    return {
+        case.name: judge(case, read_truth(case, RR), made, RR)
+        for case in read_cases([ROOT / "cases"])
+    }
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
@@ -98,10 +67,7 @@ def test_force_error_is_small(
 ) -> None:
     """Error of the contact force itself, which no sensor reads: rms over mean, below 5 Hz."""
     for name in names:
-        stop = stops[name]
-        window = braking_window(stop.case, RR)
-        rms = np.sqrt(np.mean(stop.force_error(observer)[window] ** 2))
-        assert rms < limit * np.abs(stop.truth["Fx"][window]).mean(), name
+        assert force_error(stops[name], observer) < limit, name
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
@@ -109,24 +75,9 @@ def test_force_error_is_small(
 def test_friction_of_the_pads_is_recovered(
     stops: dict[str, Judged], observer: str, names: tuple[str, ...], limit: float
 ) -> None:
-    """From 1 s after the first contact to 1 m/s, below 5 Hz, at every time.
-
-    The mean of the discs is what an axle can show; they are pressed with the same force.
-    """
+    """From 1 s after the first contact to 1 m/s, below 5 Hz, at every time."""
     for name in names:
-        stop = stops[name]
-        truth = np.mean([stop.truth[f"muDC{disc}"] for disc in (1, 2, 3)], axis=0)
-        error = low_pass(stop.case.time, stop.runs[observer].signal("muDC") - truth)
-        judged = stop.between(1.0, np.inf) & (RR * np.abs(stop.case.omegaR) > 1.0)
-        assert np.abs(error[judged]).max() < limit, name
-
-
-def arrival(stop: Judged, force: np.ndarray, level: float, begin: float) -> float:
-    """Time [s] from `begin` at which the mean of 50 ms up to now crosses a level."""
-    recent = np.convolve(force, np.full(10, 0.1))[: force.size]
-    after = stop.case.time >= begin
-    crossed = (recent > level) != (recent[after][0] > level)
-    return float(stop.case.time[after & crossed][0] - begin)
+        assert friction_error(stops[name], observer) < limit, name
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
@@ -136,23 +87,8 @@ def test_force_is_followed_within_half_a_second(stops: dict[str, Judged], observ
     The answer to a step proper is in `test_observers`.
     """
     for name, stop in stops.items():
-        direction = stop.case.conditions.direction
-        true, estimated = (
-            direction * force for force in (stop.truth["Fx"], stop.runs[observer].signal("Fx"))
-        )
-        level = 0.9 * true[stop.between(1.9, 2.1)].mean()
-        lag = arrival(stop, estimated, level, stop.contact) - arrival(
-            stop, true, level, stop.contact
-        )
-        assert lag < 0.5, name
-    stop = stops[SLIDE]
-    begin = stop.demand + 7.9
-    true, estimated = stop.truth["Fx"], stop.runs[observer].signal("Fx")
-    around = (stop.case.time >= begin) & (stop.case.time < begin + 2.0)
-    low, high = true[around].min(), true[around][0]
-    level = high - 0.9 * (high - low)
-    lag = arrival(stop, estimated, level, begin) - arrival(stop, true, level, begin)
-    assert lag < 0.5
+        assert rise_delay(stop, observer) < 0.5, name
+    assert fall_delay(stops[SLIDE], observer) < 0.5
 
 
 # Stops in which an observer oscillates at the first contact of the pads, all of them with wet
@@ -176,12 +112,9 @@ def test_no_oscillation_at_the_first_contact_of_the_pads(
     3 % is twice what noise of the sensors makes of an estimate below 5 Hz. An error to one side
     is no oscillation: of wet discs an observer learns only as they are pressed.
     """
-    oscillating = set()
-    for name, stop in stops.items():
-        error = stop.force_error(observer)[stop.between(0.0, 2.0)]
-        force = np.abs(stop.truth["Fx"][stop.between(3.0, 6.0)]).mean()
-        if min(error.max(), -error.min()) > 0.03 * force:
-            oscillating.add(name)
+    oscillating = {
+        name for name, stop in stops.items() if min(contact_errors(stop, observer)) > 0.03
+    }
     assert oscillating == OSCILLATING.get(observer, set())
 
 
@@ -190,26 +123,17 @@ def test_dry_pads_are_followed_from_the_first_contact_on(
     stops: dict[str, Judged], observer: str
 ) -> None:
     for name in DRY:
-        stop = stops[name]
-        force = np.abs(stop.truth["Fx"][stop.between(3.0, 6.0)]).mean()
-        error = stop.force_error(observer)[stop.between(0.0, 2.0)]
-        assert np.abs(error).max() < 0.03 * force, name  # 3 % as above
+        assert max(contact_errors(stops[name], observer)) < 0.03, name  # 3 % as above
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_the_slide_is_followed_to_its_minimum(stops: dict[str, Judged], observer: str) -> None:
     """The paper's disturbance observer misses the minimum."""
     stop = stops[SLIDE]
-    slipping = stop.truth["slip"] > 0.02 * RR * stop.truth["omegaR"]
-    patch = stop.demand + 8.0
-    slide = slipping & (stop.case.time > patch) & (stop.case.time < patch + 4.0)
-    true = low_pass(stop.case.time, stop.truth["Fx"])
-    error = stop.force_error(observer)
     # 15 % is what is asked inside a slide.
-    assert np.sqrt(np.mean(error[slide] ** 2)) < 0.15 * true[slide].mean()
+    assert slide_error(stop, observer) < 0.15
     # A tenth of the 15 %: the minimum is a matter of a quarter of a second.
-    around = (stop.case.time > patch - 0.5) & (stop.case.time < patch + 4.0)
-    assert (true + error)[around].min() == pytest.approx(true[around].min(), rel=0.015)
+    assert abs(minimum_error(stop, observer)) < 0.015
 
 
 # --- on recordings of an independent simulator, whose truth is not known here ---

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from workbench.commands import (
+    add_accuracy,
     add_bench,
     add_diagnose,
     add_export,
@@ -44,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_simulate(commands)
+    add_accuracy(commands)
     add_tune(commands)
     add_diagnose(commands)
     add_power(commands)

@@ -1,5 +1,6 @@
 """The commands of the command line, one module each."""
 
+from workbench.commands.accuracy import add_accuracy
 from workbench.commands.bench import add_bench
 from workbench.commands.diagnose import add_diagnose
 from workbench.commands.export import add_export
@@ -11,6 +12,7 @@ from workbench.commands.simulate import add_simulate
 from workbench.commands.tune import add_tune
 
 __all__ = [
+    "add_accuracy",
     "add_bench",
     "add_diagnose",
     "add_export",

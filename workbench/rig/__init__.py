@@ -5,7 +5,7 @@ Nothing here reads an estimator, and no estimator reads the truth that is writte
 
 from workbench.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
 from workbench.rig.files import check_files, write_recording
-from workbench.rig.run import Drawn, Phases, Stop, simulate
+from workbench.rig.run import TRUTH, Drawn, Phases, Stop, simulate
 from workbench.rig.scenarios import SCENARIOS, STANDARD, Scenario, select
 from workbench.rig.sensors import MEASURED, measure, received
 
@@ -15,6 +15,7 @@ __all__ = [
     "ORDINARY_PADS",
     "SCENARIOS",
     "STANDARD",
+    "TRUTH",
     "Drawn",
     "Effects",
     "Phases",

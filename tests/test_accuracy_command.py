@@ -1,0 +1,254 @@
+"""Figures of accuracy: definitions on signals made by hand, and the command that prints them."""
+
+import json
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from workbench.__main__ import main
+from workbench.accuracy import (
+    ROWS,
+    Accuracy,
+    Judged,
+    StopAccuracy,
+    Truth,
+    accuracy,
+    contact_errors,
+    force_error,
+    friction_error,
+    judge,
+    minimum_error,
+    read_truth,
+    rise_delay,
+    slide_error,
+    stop_accuracy,
+    worst,
+)
+from workbench.case import Case, Conditions, read_case
+from workbench.cosim import Outcome, Run
+from workbench.fmu import FMU, Vector
+from workbench.observers import ESTIMATE, FilterNoise
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.report.accuracy import format_accuracy
+
+DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
+RR = 0.70  # [m]
+
+# --- definitions, on a stop in reverse from 30 m/s, with a slide from 10 to 11.5 s ---
+
+TIME = 0.005 * np.arange(4000)
+SPEED = 30.0 - 28.0 * TIME / TIME[-1]
+FORCE = 20e3 * np.clip(TIME - 4.0, 0.0, 1.0)
+SLIDING = (TIME >= 10.0) & (TIME < 11.5)
+FORCE[SLIDING] -= 6e3 * (1.0 - np.cos(2 * np.pi * (TIME[SLIDING] - 10.0) / 1.5))
+CASE = Case(
+    name="hand",
+    title="by hand",
+    conditions=Conditions(30.0, 3e5, "wet", ("dry", "dry", "wet"), -1),
+    time=TIME,
+    pB=np.where(TIME > 4.0, 3e5, 0.0),
+    tauR=np.zeros(TIME.size),
+    omegaW=-SPEED / 0.46,
+    omegaR=-SPEED / RR,
+    Fx=None,
+    source=Path("hand/measured.csv"),
+)
+TRUTH = Truth(
+    Fx=-FORCE,
+    slip=-SPEED * np.where(SLIDING, 0.05, 0.005),
+    omegaR=-SPEED / RR,
+    muDC=np.full(TIME.size, 0.3),
+    contact=4.0,
+)
+
+
+def estimated(force: Vector, muDC: Vector, outcome: Outcome = Outcome.OK) -> Judged:
+    """The stop with one run, whose force brakes if it is positive."""
+    estimate = np.full((TIME.size, len(ESTIMATE)), np.nan)
+    estimate[:, list(ESTIMATE).index("Fx")] = -force
+    estimate[:, list(ESTIMATE).index("muDC")] = muDC
+    blank, never = np.full(TIME.size, np.nan), np.zeros(TIME.size, bool)
+    run = Run("hand", "one", TIME, estimate, estimate, blank, outcome, "", 0.0, never)
+    return Judged(CASE, TRUTH, {"one": run}, RR)
+
+
+def test_a_force_that_is_too_large_by_a_constant() -> None:
+    stop = estimated(FORCE + 100.0, TRUTH.muDC)
+    braking = TIME > 4.0
+    assert force_error(stop, "one") == pytest.approx(100.0 / FORCE[braking].mean())
+    # The low-pass rounds the slide, by little of its mean and of its minimum of 8 kN.
+    assert slide_error(stop, "one") == pytest.approx(100.0 / FORCE[SLIDING].mean(), rel=0.01)
+    assert minimum_error(stop, "one") == pytest.approx(100.0 / 8e3, rel=0.01)
+    # An error to one side is no oscillation.
+    assert contact_errors(stop, "one") == pytest.approx((100.0 / 20e3, -100.0 / 20e3))
+    assert accuracy(stop, "one").oscillation == 0.0
+
+
+def test_a_force_that_is_late() -> None:
+    late = np.interp(TIME - 0.1, TIME, FORCE)
+    found = accuracy(estimated(late, TRUTH.muDC), "one")
+    assert found.rise_delay == pytest.approx(0.1)
+    assert found.fall_delay == pytest.approx(0.1)
+    never = estimated(0.5 * FORCE, TRUTH.muDC)
+    assert rise_delay(never, "one") == math.inf
+
+
+def test_a_force_that_oscillates_at_the_first_contact() -> None:
+    swing = np.where(TIME < 6.0, 500.0 * np.sin(2 * np.pi * TIME), 0.0)
+    found = accuracy(estimated(FORCE + swing, TRUTH.muDC), "one")
+    assert found.oscillation == pytest.approx(500.0 / 20e3, rel=0.01)
+
+
+def test_friction_is_judged_from_a_second_after_the_first_contact() -> None:
+    error = np.where(TIME < 4.5, 0.1, 0.003)
+    stop = estimated(FORCE, TRUTH.muDC + error)
+    assert friction_error(stop, "one") == pytest.approx(0.003, rel=0.01)
+    # The friction of the nominal model does not move: it is no estimate.
+    assert accuracy(estimated(FORCE, TRUTH.muDC), "one").muDC is None
+
+
+def test_only_the_first_slide_counts_and_creep_is_none() -> None:
+    stop = estimated(FORCE, TRUTH.muDC)
+    assert np.array_equal(stop.slide, SLIDING)
+    later = replace(TRUTH, slip=np.where(TIME > 15.0, -0.05 * SPEED, TRUTH.slip))
+    assert np.array_equal(replace(stop, truth=later).slide, SLIDING)
+    rolling = replace(stop, truth=replace(TRUTH, slip=-0.015 * SPEED))
+    found = stop_accuracy(rolling)
+    assert not found.slides
+    assert found.wet  # one disc of three
+    assert found.estimators["one"].force_in_slide is None
+
+
+# --- the worst ---
+
+
+def stop_of(name: str, wet: bool, slides: bool, result: Accuracy) -> StopAccuracy:
+    return StopAccuracy(name, name, wet, slides, {"one": result})
+
+
+def test_the_worst_is_taken_over_the_stops_that_a_row_concerns() -> None:
+    stops = [
+        stop_of("dry", False, False, Accuracy(force=0.01, rise_delay=-0.3, muDC=0.002)),
+        stop_of("wet", True, False, Accuracy(force=0.03, rise_delay=0.1, muDC=0.004)),
+        stop_of("deep", True, True, Accuracy(force=0.02, minimum_in_slide=-0.2, muDC=0.003)),
+        stop_of("high", True, True, Accuracy(force=0.01, minimum_in_slide=0.1)),
+    ]
+    found = [worst(row, stops, "one") for row in ROWS]
+    values = [one and (one.stop, one.value) for one in found]
+    assert values == [
+        ("dry", 0.01),
+        ("wet", 0.03),
+        ("deep", 0.02),
+        None,
+        ("deep", -0.2),
+        ("wet", 0.1),
+        None,
+        ("dry", 0.002),
+        ("wet", 0.004),
+    ]
+
+
+def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst() -> None:
+    never = Accuracy(force=0.01, rise_delay=math.inf)
+    failed = accuracy(estimated(FORCE, TRUTH.muDC, Outcome.NOT_FINITE), "one")
+    stops = [stop_of("a", False, False, never), stop_of("b", True, False, failed)]
+    cells = {line[:30].strip(): line[34:].split() for line in format_accuracy(stops).splitlines()}
+    assert cells["force, dry discs"] == ["1.00", "%"]
+    assert cells["force, wet discs"] == ["failed"]
+    assert "never" in format_accuracy(stops[:1])
+    assert f"b, one: {Outcome.NOT_FINITE.value}" in format_accuracy(stops)
+
+
+# --- the command ---
+
+
+def test_command_writes_every_stop_and_the_worst(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On cases that keep the truth of every fourth sample."""
+    monkeypatch.chdir(root)
+    cases = [f"cases/{name}" for name in (DRY, SLIDE)]
+    options = ["--estimator", "ekf", "--estimator", "open_loop", "--out", str(tmp_path)]
+    assert main(["accuracy", *cases, *options]) == 0
+    printed = capsys.readouterr().out
+    assert all(row.text in printed for row in ROWS)
+
+    with FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as minimal:
+        ekf = ExtendedKalmanFilter(minimal, FilterNoise())
+        read = (read_case(root / case) for case in cases)
+        stops = {case.name: judge(case, read_truth(case, RR), [ekf], RR) for case in read}
+    summary = json.loads((tmp_path / "accuracy.json").read_text())
+    table = pd.read_csv(tmp_path / "accuracy.csv").set_index(["case", "estimator"])
+    for name, stop in stops.items():
+        expected = {
+            "force": force_error(stop, "ekf"),
+            "rise_delay": rise_delay(stop, "ekf"),
+            "muDC": friction_error(stop, "ekf"),
+        }
+        found = summary["stops"][name]["estimators"]["ekf"]
+        assert {quantity: found[quantity] for quantity in expected} == pytest.approx(expected)
+        for quantity, value in expected.items():
+            unit = summary["quantities"][quantity]["unit"]
+            # Six digits are written.
+            cell = table.loc[(name, "ekf"), f"{quantity} [{unit}]"]
+            assert cell == pytest.approx(value, rel=1e-5, abs=1e-9)
+
+    assert set(table.index.get_level_values("estimator")) == {"open_loop", "ekf"}
+    assert summary["stops"][SLIDE]["slides"]
+    assert not summary["stops"][DRY]["slides"]
+    assert "force_in_slide" not in summary["stops"][DRY]["estimators"]["ekf"]
+    last = summary["worst"]["ekf"]
+    assert last["force, dry discs"]["stop"] == DRY
+    inside = slide_error(stops[SLIDE], "ekf")
+    assert last["force, inside the slide"] == {
+        "quantity": "force_in_slide",
+        "value": pytest.approx(inside),
+        "stop": SLIDE,
+    }
+    assert f"{100 * inside:.1f} %" in printed
+    assert "muDC, dry discs" not in summary["worst"]["open_loop"]
+
+
+def test_command_refuses_recordings_without_truth(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    shutil.copytree(root / "cases" / DRY, tmp_path / "measured")
+    (tmp_path / "measured" / "truth.csv").unlink()
+    out = tmp_path / "out"
+    assert main(["accuracy", str(tmp_path / "measured"), "--out", str(out)]) == 2
+    message = capsys.readouterr().err
+    for part in ("measured: found no truth.csv", "expected a case of the virtual rig", "To do: "):
+        assert part in message
+    assert not out.exists()
+
+
+def test_command_refuses_a_truth_in_other_units(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    folder = tmp_path / "case"
+    shutil.copytree(root / "cases" / DRY, folder)
+    truth = folder / "truth.csv"
+    truth.write_text(truth.read_text().replace("pads [Pa]", "pads [bar]", 1))
+    assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
+    assert "column 'pads': found unit [bar]; expected [Pa]" in capsys.readouterr().err
+
+
+def test_command_refuses_a_stop_in_which_no_force_is_built_up(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    folder = tmp_path / "coasting"
+    shutil.copytree(root / "cases" / DRY, folder)
+    for file in ("measured.csv", "truth.csv"):
+        lines = (folder / file).read_text().splitlines()
+        kept = [lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]
+        (folder / file).write_text("\n".join(kept) + "\n")
+    assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
+    assert "ends before its force is built up" in capsys.readouterr().err

@@ -1,0 +1,435 @@
+"""How near estimates come to the truth of the virtual rig: by stop, and the worst.
+
+The truth is what no sensor reads and no estimator sees; the rig writes it beside each recording.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.case import Case
+from workbench.cosim import Outcome, Run, observe
+from workbench.errors import InputError
+from workbench.fmu import Vector
+from workbench.objective import LOWEST_SPEED, braking_window, low_pass
+from workbench.observers import Estimator
+from workbench.recording import read_columns
+from workbench.rig import TRUTH
+
+# Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
+NOISE = 0.03
+
+_DISCS = ("muDC1", "muDC2", "muDC3")
+_READ = ("Fx", "slip", "omegaR", "pads", *_DISCS)
+_PADS_TOUCH = 25e3  # [Pa] 0.25 bar balance the return springs, data sheet
+_BUILDING_UP = 2.0  # [s] after the first contact
+_BUILT_UP = (3.0, 6.0)  # [s] after the first contact
+_SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
+_SLIDE = 4.0  # [s] by then wheel-slide protection has ended it, or the wheel is locked
+_BEFORE_FALL = 0.1  # [s] the force is not falling yet
+_FALL = 2.0  # [s]
+_AVERAGED = 0.05  # [s] longer than a period of the rig's structure, 15..35 Hz
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What no sensor reads, at the times of a recording.
+
+    Attributes
+    ----------
+    Fx : (n,) contact force [N].
+    slip : (n,) velocity [m/s].
+    omegaR : (n,) speed of the roller [rad/s].
+    muDC : (n,) friction of the pads [1]. The mean of the discs is what an axle can show; they are
+        pressed with the same force.
+    contact : [s] when the pads first touch the discs.
+    """
+
+    Fx: Vector
+    slip: Vector
+    omegaR: Vector
+    muDC: Vector
+    contact: float
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A stop whose truth is known, and what estimators make of it.
+
+    Attributes
+    ----------
+    runs : by the name of the estimator.
+    roller_radius : [m], nominal.
+    """
+
+    case: Case
+    truth: Truth
+    runs: Mapping[str, Run]
+    roller_radius: float
+
+    def between(self, begin: float, end: float) -> NDArray[np.bool_]:
+        """Samples between two times [s] after the first contact, (n,)."""
+        since = self.case.time - self.truth.contact
+        return (since >= begin) & (since < end)
+
+    def force(self, name: str) -> Vector:
+        """Estimated force [N], (n,), positive if it brakes."""
+        return self.case.conditions.direction * self.runs[name].signal("Fx")
+
+    @property
+    def true_force(self) -> Vector:
+        """True force [N], (n,), positive if it brakes."""
+        return self.case.conditions.direction * self.truth.Fx
+
+    def force_error(self, name: str) -> Vector:
+        """Estimated minus true force below 5 Hz [N], (n,), positive if it is too large."""
+        return low_pass(self.case.time, self.force(name) - self.true_force)
+
+    @property
+    def slide(self) -> NDArray[np.bool_]:
+        """Samples in which the wheel slides for the first time, (n,); none if it never does."""
+        speed = self.roller_radius * np.abs(self.truth.omegaR)
+        slip = self.case.conditions.direction * self.truth.slip
+        sliding = (slip > _SLIDING * speed) & (speed > LOWEST_SPEED)
+        begin = float(self.case.time[np.argmax(sliding)])
+        return np.logical_and(sliding, self.case.time < begin + _SLIDE)
+
+    def around_slide(self, before: float, after: float) -> NDArray[np.bool_]:
+        """Samples from a time before the slide begins to one after that [s], (n,)."""
+        since = self.case.time - float(self.case.time[np.argmax(self.slide)])
+        return (since >= -before) & (since < after)
+
+
+def _quantity(unit: str, text: str) -> Any:
+    return field(default=None, metadata={"unit": unit, "text": text})
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Errors of one estimator in one stop; None where there is nothing to judge.
+
+    Attributes
+    ----------
+    failure : why the estimator did not run to the end; empty if it did.
+    force .. muDC : see their metadata; infinite if a delay never ends.
+    """
+
+    failure: str = ""
+    force: float | None = _quantity(
+        "1", "error of the force, rms over mean, from first pressure to 1 m/s, below 5 Hz"
+    )
+    force_in_slide: float | None = _quantity(
+        "1", "error of the force, rms over mean, inside the slide, below 5 Hz"
+    )
+    force_in_slide_all_frequencies: float | None = _quantity(
+        "1", "error of the force, rms over mean, inside the slide, ringing included"
+    )
+    minimum_in_slide: float | None = _quantity(
+        "1", "lowest estimated over lowest true force of the slide, minus 1, below 5 Hz"
+    )
+    rise_delay: float | None = _quantity(
+        "s", "delay at nine tenths of the force that is reached 2 s after the first pad contact"
+    )
+    fall_delay: float | None = _quantity(
+        "s", "delay at nine tenths of the fall of the force in the slide"
+    )
+    contact_too_high: float | None = _quantity(
+        "1",
+        "how far the force is too high within 2 s of the first pad contact, over the force "
+        "that is building up, below 5 Hz",
+    )
+    contact_too_low: float | None = _quantity(
+        "1",
+        "how far the force is too low within 2 s of the first pad contact, over the force "
+        "that is building up, below 5 Hz",
+    )
+    oscillation: float | None = _quantity(
+        "1", "the smaller of contact_too_high and contact_too_low, 0 for an error to one side"
+    )
+    muDC: float | None = _quantity(
+        "1",
+        "largest error of the pads' friction, from 1 s after the first pad contact to 1 m/s, "
+        "below 5 Hz",
+    )
+
+
+@dataclass(frozen=True)
+class StopAccuracy:
+    """How near all estimators come in one stop.
+
+    Attributes
+    ----------
+    name, title : of the case.
+    wet : whether a disc was wet.
+    slides : whether the truth has a slide.
+    estimators : by name.
+    """
+
+    name: str
+    title: str
+    wet: bool
+    slides: bool
+    estimators: Mapping[str, Accuracy]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A quantity, and the stops of which the worst counts.
+
+    Attributes
+    ----------
+    quantity : field of Accuracy.
+    wet, slides : what must be so of a stop; None if either will do.
+    badness : of two values the one for which it is larger is worse.
+    """
+
+    text: str
+    quantity: str
+    wet: bool | None = None
+    slides: bool | None = None
+    badness: Callable[[float], float] = float
+
+    def concerns(self, stop: StopAccuracy) -> bool:
+        """Whether a stop counts."""
+        return self.wet in (None, stop.wet) and self.slides in (None, stop.slides)
+
+
+ROWS = (
+    Row("force, dry discs", "force", wet=False, slides=False),
+    Row("force, wet discs", "force", wet=True, slides=False),
+    Row("force, stop with a slide", "force", slides=True),
+    Row("force, inside the slide", "force_in_slide"),
+    Row("its minimum in the slide", "minimum_in_slide", badness=abs),
+    Row("delay at 90 % of the force", "rise_delay"),
+    Row("oscillation at first pad contact", "oscillation"),
+    Row("muDC, dry discs", "muDC", wet=False),
+    Row("muDC, wet discs", "muDC", wet=True),
+)
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst value of a row; NaN if an estimator failed in this stop."""
+
+    stop: str
+    value: float
+
+
+def read_truth(case: Case, roller_radius: float) -> Truth:
+    """Read the truth beside a recording, at the times of the recording.
+
+    Parameters
+    ----------
+    roller_radius : [m], nominal.
+
+    Raises
+    ------
+    InputError
+        If there is none, or the stop ends before the force is built up.
+    """
+    path = case.source.parent / "truth.csv"
+    if not path.exists():
+        raise InputError(
+            where=str(case.source.parent),
+            found="no truth.csv beside the recording",
+            expected="a case of the virtual rig, which writes the truth that estimators are "
+            "judged by",
+            remedy="make cases with 'python -m workbench rig --out DIR' and judge these; what has "
+            "no truth is for 'python -m workbench simulate'",
+        )
+    columns = _read_si(path)
+    # The rig may have kept the truth of every Nth sample only.
+    signals = {name: np.interp(case.time, columns["time"], columns[name]) for name in _READ}
+    contact = _first_contact(case, signals, roller_radius)
+    muDC: Vector = np.mean([signals[name] for name in _DISCS], axis=0)
+    return Truth(signals["Fx"], signals["slip"], signals["omegaR"], muDC, contact)
+
+
+def _read_si(path: Path) -> dict[str, Vector]:
+    """Columns of truth.csv, which the rig writes in SI units, (m,) each."""
+    units = {"time": "s"} | {name: TRUTH[name] for name in _READ}
+    columns = read_columns(path, list(units))
+    for name, unit in units.items():
+        if columns[name].unit != unit:
+            raise InputError(
+                where=f"{path}, line 1, column '{name}'",
+                found=f"unit [{columns[name].unit}]",
+                expected=f"[{unit}], as the rig writes it",
+                remedy="make the case anew with 'python -m workbench rig'",
+            )
+    return {name: column.values for name, column in columns.items()}
+
+
+def _first_contact(case: Case, signals: Mapping[str, Vector], roller_radius: float) -> float:
+    """Time of the first contact [s]."""
+    touching = signals["pads"] > _PADS_TOUCH
+    contact = float(case.time[np.argmax(touching)])
+    fast = roller_radius * np.abs(signals["omegaR"]) > LOWEST_SPEED
+    if not (touching & fast & (case.time >= contact + _BUILT_UP[0])).any():
+        raise InputError(
+            where=str(case.source.parent / "truth.csv"),
+            found="a stop that ends before its force is built up",
+            expected=f"{_BUILT_UP[0]:g} s or more from the first contact of the pads to "
+            f"{LOWEST_SPEED:g} m/s",
+            remedy="leave this case out, or make one that begins faster",
+        )
+    return contact
+
+
+def judge(
+    case: Case, truth: Truth, estimators: Sequence[Estimator], roller_radius: float
+) -> Judged:
+    """Run estimators on a recording whose truth is known.
+
+    Parameters
+    ----------
+    roller_radius : [m], nominal.
+    """
+    runs = {estimator.name: observe(case, estimator) for estimator in estimators}
+    return Judged(case, truth, runs, roller_radius)
+
+
+def stop_accuracy(stop: Judged) -> StopAccuracy:
+    """All quantities of all estimators in one stop."""
+    return StopAccuracy(
+        name=stop.case.name,
+        title=stop.case.title,
+        wet="wet" in stop.case.conditions.discs,
+        slides=bool(stop.slide.any()),
+        estimators={name: accuracy(stop, name) for name in stop.runs},
+    )
+
+
+def accuracy(stop: Judged, name: str) -> Accuracy:
+    """All quantities of one estimator in one stop."""
+    run = stop.runs[name]
+    if run.outcome is not Outcome.OK:
+        return Accuracy(failure=f"{run.outcome.value} {run.message}".strip())
+    slides = bool(stop.slide.any())
+    too_high, too_low = contact_errors(stop, name)
+    # A friction that never moves, as that of the nominal model, is no estimate.
+    estimated = bool(np.ptp(run.signal("muDC")) > 0.0)
+    return Accuracy(
+        force=force_error(stop, name),
+        force_in_slide=slide_error(stop, name) if slides else None,
+        force_in_slide_all_frequencies=slide_error_all_frequencies(stop, name) if slides else None,
+        minimum_in_slide=minimum_error(stop, name) if slides else None,
+        rise_delay=rise_delay(stop, name),
+        fall_delay=fall_delay(stop, name) if slides else None,
+        contact_too_high=too_high,
+        contact_too_low=too_low,
+        oscillation=max(0.0, min(too_high, too_low)),
+        muDC=friction_error(stop, name) if estimated else None,
+    )
+
+
+def force_error(stop: Judged, name: str) -> float:
+    """Error of the force below 5 Hz, rms over mean, from first pressure to 1 m/s [1]."""
+    window = braking_window(stop.case, stop.roller_radius)
+    return _rms(stop.force_error(name)[window]) / float(np.abs(stop.truth.Fx[window]).mean())
+
+
+def slide_error(stop: Judged, name: str) -> float:
+    """Error of the force below 5 Hz, rms over mean, inside the slide [1]."""
+    return _rms(stop.force_error(name)[stop.slide]) / _sliding_force(stop)
+
+
+def slide_error_all_frequencies(stop: Judged, name: str) -> float:
+    """Error of the force inside the slide sample by sample, ringing included [1]."""
+    return _rms((stop.force(name) - stop.true_force)[stop.slide]) / _sliding_force(stop)
+
+
+def _sliding_force(stop: Judged) -> float:
+    """Mean force inside the slide [N]."""
+    return float(low_pass(stop.case.time, stop.true_force)[stop.slide].mean())
+
+
+def _rms(values: Vector) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def minimum_error(stop: Judged, name: str) -> float:
+    """Lowest estimated over lowest true force of the slide below 5 Hz, minus 1 [1]."""
+    around = stop.around_slide(0.5, _SLIDE)
+    true = low_pass(stop.case.time, stop.true_force)
+    estimated = true + stop.force_error(name)
+    return float(estimated[around].min() / true[around].min()) - 1.0
+
+
+def rise_delay(stop: Judged, name: str) -> float:
+    """Delay at nine tenths of the force that is reached 2 s after the first contact [s]."""
+    level = 0.9 * float(stop.true_force[stop.between(1.9, 2.1)].mean())
+    return _delay(stop, name, level, stop.truth.contact)
+
+
+def fall_delay(stop: Judged, name: str) -> float:
+    """Delay at nine tenths of the fall of the force in the slide [s]."""
+    falling = stop.around_slide(_BEFORE_FALL, _FALL - _BEFORE_FALL)
+    high, low = float(stop.true_force[falling][0]), float(stop.true_force[falling].min())
+    return _delay(stop, name, high - 0.9 * (high - low), float(stop.case.time[falling][0]))
+
+
+def _delay(stop: Judged, name: str, level: float, begin: float) -> float:
+    """Time [s] by which an estimate reaches a force [N] later than the truth; inf if never."""
+    late = arrival(stop.case.time, stop.force(name), level, begin)
+    return late - arrival(stop.case.time, stop.true_force, level, begin)
+
+
+def arrival(time: Vector, force: Vector, level: float, begin: float) -> float:
+    """Time [s] from `begin` at which the mean of 50 ms up to now crosses a level; inf if never.
+
+    Parameters
+    ----------
+    time, force : (n,) [s], [N].
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 1.0, 0.005)
+    >>> round(arrival(time, np.where(time < 0.3, 0.0, 100.0), 45.0, 0.1), 3)
+    0.22
+    >>> arrival(time, np.zeros(time.size), 45.0, 0.1)
+    inf
+    """
+    count = max(1, round(_AVERAGED / float(np.median(np.diff(time)))))
+    recent = np.convolve(force, np.full(count, 1.0 / count))[: force.size]
+    after = time >= begin
+    crossed = after & ((recent > level) != (recent[after][0] > level))
+    return float(time[crossed][0] - begin) if crossed.any() else math.inf
+
+
+def contact_errors(stop: Judged, name: str) -> tuple[float, float]:
+    """How far the force is too high and too low within 2 s of the first contact [1].
+
+    As shares of the force that is being built up, below 5 Hz. An error to both sides is an
+    oscillation; to one side it is none: of wet discs an observer learns only as they are pressed.
+    """
+    error = stop.force_error(name)[stop.between(0.0, _BUILDING_UP)]
+    force = np.abs(stop.truth.Fx[stop.between(*_BUILT_UP)]).mean()
+    return float(error.max() / force), float(-error.min() / force)
+
+
+def friction_error(stop: Judged, name: str) -> float:
+    """Largest error of the pads' friction below 5 Hz, from 1 s after the first contact to 1 m/s."""
+    error = low_pass(stop.case.time, stop.runs[name].signal("muDC") - stop.truth.muDC)
+    moving = stop.roller_radius * np.abs(stop.case.omegaR) > LOWEST_SPEED
+    return float(np.abs(error[stop.between(1.0, np.inf) & moving]).max())
+
+
+def worst(row: Row, stops: Sequence[StopAccuracy], estimator: str) -> Worst | None:
+    """The worst value of an estimator over the stops that a row concerns; None if it has none."""
+    found: Worst | None = None
+    for stop in stops:
+        result = stop.estimators[estimator]
+        if not row.concerns(stop):
+            continue
+        if result.failure:
+            return Worst(stop.name, math.nan)
+        value = getattr(result, row.quantity)
+        if value is not None and (found is None or row.badness(value) > row.badness(found.value)):
+            found = Worst(stop.name, value)
+    return found

@@ -1,0 +1,121 @@
+"""Accuracy against the truth of the virtual rig: files and table."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from workbench.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
+from workbench.report.results import write_text
+
+_QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
+_CELL = 8  # characters, that of "+100.0 %"
+_DIGITS = {"force": 2, "oscillation": 0}  # of percentages, else 1
+
+
+def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
+    """Write one CSV: a line for each stop and estimator, `quantity [unit]`.
+
+    A field is empty where there is nothing to judge, and `inf` if a delay never ends.
+    """
+    lines = [
+        {"case": stop.name, "estimator": name}
+        | {f"{q} [{meta['unit']}]": getattr(result, q) for q, meta in _QUANTITIES.items()}
+        | {"failure": result.failure}
+        for stop in stops
+        for name, result in stop.estimators.items()
+    ]
+    write_text(path, pd.DataFrame(lines).to_csv(index=False, float_format="%.6g"))
+
+
+def write_accuracy(
+    stops: Sequence[StopAccuracy], provenance: Mapping[str, Any], path: Path
+) -> None:
+    """Write accuracy.json: each estimator in each stop, and the worst of them by row.
+
+    What is not to be judged is left out; null is a delay that never ends, or of a failed run.
+    """
+    summary = {
+        "provenance": provenance,
+        "quantities": {name: dict(meta) for name, meta in _QUANTITIES.items()},
+        "stops": {
+            stop.name: {
+                "title": stop.title,
+                "wet_discs": stop.wet,
+                "slides": stop.slides,
+                "estimators": {name: _plain(result) for name, result in stop.estimators.items()},
+            }
+            for stop in stops
+        },
+        "worst": {
+            name: {
+                row.text: {"quantity": row.quantity, "value": _finite(one.value), "stop": one.stop}
+                for row in ROWS
+                if (one := worst(row, stops, name)) is not None
+            }
+            for name in stops[0].estimators
+        },
+    }
+    write_text(path, json.dumps(summary, indent=2) + "\n")
+
+
+def _plain(result: Accuracy) -> dict[str, Any]:
+    if result.failure:
+        return {"failure": result.failure}
+    values = {name: getattr(result, name) for name in _QUANTITIES}
+    return {name: _finite(value) for name, value in values.items() if value is not None}
+
+
+def _finite(value: float) -> float | None:
+    """JSON has neither infinity nor NaN."""
+    return value if math.isfinite(value) else None
+
+
+def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
+    """Table for the terminal: the worst stop of each row, by estimator."""
+    names = list(stops[0].estimators)
+    width = max(len(row.text) for row in ROWS)
+    header = " " * width + "".join(f"  {name:>{_CELL}}" for name in names)
+    lines = ["Worst over the stops that a row concerns, below 5 Hz", header, "-" * len(header)]
+    for row in ROWS:
+        cells = (
+            f"  {_cell(row, worst(row, stops, name)):>{max(_CELL, len(name))}}" for name in names
+        )
+        lines.append(f"{row.text:<{width}}{''.join(cells)}")
+    lines.append("-" * len(header))
+    failures = [
+        f"{stop.name}, {name}: {result.failure}"
+        for stop in stops
+        for name, result in stop.estimators.items()
+        if result.failure
+    ]
+    return "\n".join(lines + failures)
+
+
+def _cell(row: Row, found: Worst | None) -> str:
+    """A value as a text; empty if there is nothing to judge.
+
+    >>> _cell(ROWS[0], Worst("01", 0.00271)), _cell(ROWS[4], Worst("09", 0.0729))
+    ('0.27 %', '+7.3 %')
+    >>> _cell(ROWS[5], Worst("01", math.inf)), _cell(ROWS[6], Worst("01", 0.02))
+    ('never', 'none')
+    """
+    if found is None:
+        return ""
+    value = found.value
+    if math.isnan(value):
+        return "failed"
+    if math.isinf(value):
+        return "never"
+    if row.quantity == "muDC":
+        return f"{value:.3f}"
+    if row.quantity == "rise_delay":
+        return f"{value:.3f} s"
+    if row.quantity == "oscillation" and value < NOISE:
+        return "none"
+    sign = "+" if row.quantity == "minimum_in_slide" else ""
+    return f"{100.0 * value:{sign}.{_DIGITS.get(row.quantity, 1)}f} %"
