@@ -1,5 +1,6 @@
 """The parts that a diagnosis is made of, each against a closed form or an independent way."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,24 @@ def test_spikes_are_set_aside_with_their_blocks() -> None:
     for k in spikes:
         assert not any(first <= k < end for first, end in stop.blocks)
         assert stop.gain[k] == 0.0
+
+
+def test_pressure_loses_its_noise_but_no_time() -> None:
+    time = 0.005 * np.arange(4000)
+    # Up within half a second, held, down: as a valve with its lags does.
+    true = 2.7e5 * (1.0 - np.exp(-np.clip(time - 4.0, 0.0, None) / 0.5))
+    true *= np.exp(-np.clip(time - 14.0, 0.0, None) / 0.5)
+    noise = 500.0 * np.random.default_rng(8).standard_normal(time.size)
+    case = replace(noisy(3), time=time, pB=true + noise, tauR=np.zeros(time.size))
+    case = replace(case, omegaW=39.0 / 0.46 + noise * 1e-5, omegaR=39.0 / 0.70 + noise * 1e-6)
+    pB = ready(replace(case, Fx=None)).u[:, 0]
+    held = (time > 9.0) & (time < 12.5)
+    # 400 samples in a mean, 30 in a parabola of three times its variance.
+    assert np.std(pB[held] - true[held]) < 2.0 * 500.0 / np.sqrt(400.0)
+    assert np.std(pB - true) < 2.0 * 500.0 * np.sqrt(9.0 / 4.0 / 30.0)
+    rises = (time > 4.2) & (time < 6.0)
+    late = -np.sum((pB - true)[rises]) / np.sum(np.gradient(true, time)[rises])
+    assert abs(late) < 0.001
 
 
 def test_noise_is_whitened_to_variance_one() -> None:

@@ -91,7 +91,7 @@ CATALOGUE: tuple[Effect, ...] = (
            "discs of uneven thickness", _RUNDOWN),
     Effect("CylinderLag", "Effects", _CYLINDER, "lag", 0.005, 0.003,
            "pads that lag behind the measured pressure", _SINE),
-    Effect("CaliperHysteresis", "Effects", _CYLINDER, "share", 0.01, 0.03,
+    Effect("CaliperHysteresis", "Effects", _CYLINDER, "share", 0.01, 0.02,
            "friction in the caliper", _DRAG),
     Effect("ReturnSpringPressure", "Effects", _CYLINDER, "increase", 500.0, 500.0,
            "a stiffer return spring", "the pressure of first contact, read at standstill"),

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 from scipy.optimize import nnls
-from scipy.signal import lfilter, lfiltic
+from scipy.signal import lfilter, lfiltic, savgol_filter
 
 from workbench.case import Case, Matrix, Vector
 from workbench.errors import InputError
@@ -23,6 +23,9 @@ _SETTLING = 1.0  # [s] at the start, in which the simulation finds its slip
 _SLOWEST = 1.0  # [m/s] below, slip is a small difference of uncertain speeds
 _SLIDE = 0.03  # [1] creepage from which on a wheel slides: friction then depends on the rail only
 _ABREAST = 11  # samples of the running median
+# [s] and order: parabolas over less than the lags of a valve, lines where pressure holds.
+_SMOOTHED = (0.15, 2), (2.0, 1)
+_HELD = 4.0  # standard deviations that a polynomial may take away
 _SPIKE = 8.0  # standard deviations that no noise reaches
 _UNMODELLED = 1.2  # ripple and the like, over the noise of torque and pressure
 _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat itself
@@ -146,7 +149,7 @@ def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
     p, gain = _kalman(torque * h / inertia, deviation["omegaR"])
     gains = np.minimum(1.0, gain * np.append(steps, h) / h)
     gains[wrong["omegaR"]] = 0.0
-    u = np.column_stack([clean["pB"], clean["tauR"], np.zeros((time.size, 2))])
+    u = np.column_stack([_smooth(clean["pB"], h), clean["tauR"], np.zeros((time.size, 2))])
     y = np.column_stack([clean[name] for name in signals if name not in ("pB", "tauR")])
     v = np.array([speed[first:end].mean() for first, end in blocks])
     rest = clean["pB"][:applied]
@@ -193,6 +196,25 @@ def _outliers(values: Vector) -> Mask:
 
 def _bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
     return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
+
+
+def _smooth(pB: Vector, h: float) -> Vector:
+    """Pressure without most of its sensor's noise, and without lag.
+
+    The pads do not feel that noise; fed to a model, any effect that lags or sticks would gain by
+    keeping it from them. Where pressure holds, the mean is taken over longer.
+    """
+    best, noise = pB, _deviation(pB)
+    for seconds, order in _SMOOTHED:
+        window = 2 * (round(seconds / h) // 2) + 1
+        if order < window <= pB.size:
+            smooth = savgol_filter(pB, window, order)
+            moves = maximum_filter1d(np.abs(best - smooth) > _HELD * noise, window)
+            weight = uniform_filter1d(moves.astype(np.float64), window)
+            best = weight * best + (1.0 - weight) * smooth
+            # Of a parabola over n samples, the variance is 9/4 of that of a mean.
+            noise *= 1.5 / np.sqrt(window)
+    return best
 
 
 def _deviation(values: Vector) -> float:

@@ -128,9 +128,10 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     less = _less(fit, best)
     while (idle := _idle(fit, best, less)) is not None:
         report(f"dropping {idle.name}")
-        best = less[idle]
+        # Beside fewer others, one that mattered may do so no longer.
+        alone = examine(fit, less[idle], catalogue, report)
+        best, trial = pruned(fit, catalogue, less[idle], alone, report)
         less = _less(fit, best)
-        trial = examine(fit, best, catalogue, report)
     clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
     if not clean and not (best.active and (interrupted or _share(base, best) > _EXPLAINED)):
