@@ -172,9 +172,7 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(
         ("fade", "wheel_radius"),
         ("speed_friction", "fx_offset"),
         ("cylinder_lag", "roller_losses"),
-        # Either alone leaves some channel worse than without it.
         ("pressure_offset", "cylinder_lag"),
-        ("torque_gain", "apex_offset"),
     ],
 )
 def test_two_effects_are_found_one_after_the_other(
@@ -284,6 +282,20 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
     wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
     found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"])])
     assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+def test_two_wrong_sensors_are_found_though_either_hides_the_other(
+    diagnosed: Callable[[Sequence[Case]], Diagnosis],
+) -> None:
+    cases = read_cases([LABELLED / "clean"])
+    found = diagnosed(
+        [replace(c, tauR=1.015 * c.tauR, Fx=c.Fx - 100.0) for c in cases if c.Fx is not None]
+    )
+    groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
+    assert len(groups) == 2
+    for name in ("DriveTorqueGain", "FxOffset"):
+        assert any(name in group for group in groups)
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")

@@ -34,6 +34,7 @@ _WORSE = 1.0  # of deviance, which no step is worth
 _HALVED = 4  # times: after that a step is given up
 _SECOND = 20  # blocks
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
+_FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
 _FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
 
@@ -299,13 +300,20 @@ class Fit:
         N, g, c = np.zeros((len(shared),) * 2), np.zeros(len(shared)), 0.0
         for j, key in enumerate(shared):
             if key in point.levels and key[0] != "muDC":
-                middle, sigma = 0.0, _FORCE_DELAY
-                if key[0] == "muWR":
-                    middle = _RAIL["wet" if key[1] == "wet" else "dry"]["muWR"]
-                    sigma = _RAIL_SPREAD * middle
+                middle, sigma = self._expected(key)
                 away = (point.levels[key] - middle) / sigma
                 N[j, j], g[j], c = 1.0 / sigma**2, away / sigma, c + away**2
         return Quadratic(N, g, c, 0)
+
+    @staticmethod
+    def _expected(key: Key) -> tuple[float, float]:
+        """What is expected of a level, and its standard deviation; of pads, anything."""
+        if key == _LATE:
+            return 0.0, _FORCE_DELAY
+        if key[0] == "muDC":
+            return 0.0, np.inf
+        middle = _RAIL["wet" if key[1] == "wet" else "dry"]["muWR"]
+        return middle, _RAIL_SPREAD * middle
 
     def refine(
         self, point: Point, active: Sequence[Effect], rounds: int, spread: Vector | None = None
@@ -344,7 +352,9 @@ class Fit:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             if key in levels:
-                levels[key] += float(change)
+                middle, sigma = self._expected(key)
+                reach = _FURTHEST_LEVEL * sigma
+                levels[key] = float(np.clip(levels[key] + change, middle - reach, middle + reach))
             elif key in sizes:
                 sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
         locals_ = [system.local(step) for system in joint.systems]
