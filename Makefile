@@ -58,7 +58,7 @@ test: $(VENV)/dev.stamp
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
 	$(RUN) -m workbench fmu build --all --check
-	$(RUN) -m pytest
+	$(RUN) -m pytest --numprocesses logical --maxprocesses 4 --dist worksteal
 
 clean:
 	rm -rf $(VENV) build results

@@ -2,8 +2,10 @@
 made by an independent simulator."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from workbench.accuracy import (
@@ -18,11 +20,12 @@ from workbench.accuracy import (
     rise_delay,
     slide_error,
 )
-from workbench.case import read_cases
+from workbench.case import Case, read_cases
 from workbench.cosim import observe
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
-from workbench.observers import ESTIMATORS, Estimator, make_estimators
+from workbench.observers import ESTIMATORS, Estimator, PeakForce, make_estimators
+from workbench.rig import Effects, Stop, select, simulate, write_recording
 from workbench.tuning import default_settings
 
 ROOT = Path(__file__).parent.parent
@@ -134,6 +137,42 @@ def test_the_slide_is_followed_to_its_minimum(stops: dict[str, Judged], observer
     assert slide_error(stop, observer) < 0.15
     # A tenth of the 15 %: the minimum is a matter of a quarter of a second.
     assert abs(minimum_error(stop, observer)) < 0.015
+
+
+@pytest.fixture(scope="module")
+def slippery(
+    tmp_path_factory: pytest.TempPathFactory, reference_path: Path
+) -> list[tuple[Case, Stop]]:
+    """Stops near the limit of adhesion of a contact that has the law of a dry one."""
+    folder, made = tmp_path_factory.mktemp("slippery"), {}
+    for name in ("03_dry_120_3.6", "04_dry_160_4.2", "06_dry_160_3.6_rev"):
+        for muWR in (0.19, 0.22, 0.25):
+            (scenario,) = select([name])
+            stop = simulate(replace(scenario, muWR=muWR), 1, Effects(), reference_path)
+            write_recording(stop, Effects(), 200, folder / f"{name}_{muWR}")
+            made[f"{name}_{muWR}"] = stop
+    return [(case, made[case.name]) for case in read_cases([folder])]
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
+    estimators: dict[str, Estimator], slippery: list[tuple[Case, Stop]], observer: str
+) -> None:
+    """Within a tenth from 70 % of the adhesion on, where the law of the contact is right.
+
+    Braking presses the wheels of the multibody model down by 4 to 5 %, in reverse it lifts them;
+    the observers' models hold the wheel load, and take that for 6 to 7 % of muWR.
+    """
+    estimator, near = estimators[observer], []
+    for case, stop in slippery:
+        run = observe(case, estimator)
+        used = PeakForce(estimator.fmu).utilisation(run.estimate)
+        error = run.signal("muWR") / stop.at(case.time, "muWR") - 1.0
+        near.append(error[run.muWR_claimed & (used > 0.7)])
+    errors = np.abs(np.concatenate(near))
+    assert errors.size > 10_000
+    # Gains that are the same at all speeds leave more noise than those of the Kalman filters.
+    assert np.mean(errors < 0.1) > (0.99 if observer in ("ekf", "ukf") else 0.90)
 
 
 # --- on recordings of an independent simulator, whose truth is not known here ---

@@ -194,24 +194,22 @@ def test_wrong_samples_are_set_aside_and_never_fitted(
     assert found.verdict == "nothing"
 
 
+# What the independent simulator planted, by the folder of its recordings.
+SEEN = {
+    "speed_friction": ("SpeedDependentPadFriction", "slope", 0.22),
+    "fade": ("BrakeFade", "fade", 7e-4),
+    "cylinder_lag": ("CylinderLag", "lag", 0.08),
+    "radius": ("WheelRadius", "delta", -1.5e-3),
+    "pole_ring": ("PoleRingEccentricity", "amplitude", 2e-3),
+}
+
+
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize(
-    ("folder", "name", "parameter", "size"),
-    [
-        ("speed_friction", "SpeedDependentPadFriction", "slope", 0.22),
-        ("fade", "BrakeFade", "fade", 7e-4),
-        ("cylinder_lag", "CylinderLag", "lag", 0.08),
-        ("radius", "WheelRadius", "delta", -1.5e-3),
-        ("pole_ring", "PoleRingEccentricity", "amplitude", 2e-3),
-    ],
-)
+@pytest.mark.parametrize("folder", SEEN)
 def test_an_independent_simulator_is_seen_through(
-    folder: str,
-    name: str,
-    parameter: str,
-    size: float,
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
+    folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
+    name, parameter, size = SEEN[folder]
     found = diagnosed(read_cases([LABELLED / folder]))
     assert [cause.effect.name for cause in found.causes] == [name]
     one = found.causes[0].parameters[parameter]
@@ -226,6 +224,19 @@ def test_clean_recordings_of_an_independent_simulator_stay_clean(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
     assert diagnosed(read_cases([LABELLED / "clean"])).verdict == "nothing"
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+@pytest.mark.parametrize("folder", SEEN)
+def test_two_stops_of_an_independent_simulator_are_enough(
+    folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    """One in each direction, of different pressures."""
+    name, parameter, size = SEEN[folder]
+    cases = [case for case in read_cases([LABELLED / folder]) if case.name[:2] in ("04", "05")]
+    (cause,) = diagnosed(cases).causes
+    assert cause.effect.name == name
+    assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
 
 
 def late(values: np.ndarray) -> np.ndarray:
