@@ -36,7 +36,7 @@ _SECOND = 20  # blocks
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 _FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
-_FILM, _SINGLE = "WaterFilm", "SingleDiscWaterFilm"
+_FILM, _SINGLE, _HYSTERESIS = "WaterFilm", "SingleDiscWaterFilm", "CaliperHysteresis"
 
 
 # (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
@@ -129,6 +129,7 @@ class Fit:
         self._court = court
         self._effects = {effect.name: effect for effect in effects}
         self._soaked = any("wet" in case.conditions.discs for case in court.cases)
+        self._released = any(stop.released for stop in court.stops)
         self.count = len(court.cases)
 
     @property
@@ -164,9 +165,13 @@ class Fit:
         discs = self._court.cases[k].conditions.discs
         return discs.count("wet") / len(discs)
 
-    def possible(self, effect: Effect) -> bool:
-        """Whether an effect can be at all: which discs are wet may be known."""
-        return not (self._soaked and effect.name == _SINGLE)
+    def unseen(self, effect: Effect) -> str:
+        """Why these stops cannot show an effect; empty if they can."""
+        if self._soaked and effect.name == _SINGLE:
+            return "the conditions of the stops say which discs are wet"
+        if effect.name == _HYSTERESIS and not self._released:
+            return "brake pressure never falls in these stops"
+        return effect.hidden
 
     def values(self, point: Point) -> list[dict[str, float]]:
         """Values of the FMU's variables in each stop."""

@@ -26,6 +26,7 @@ _ABREAST = 11  # samples of the running median
 # [s] and order: parabolas over less than the lags of a valve, lines where pressure holds.
 _SMOOTHED = (0.15, 2), (2.0, 1)
 _HELD = 4.0  # standard deviations that a polynomial may take away
+_RELEASED = 0.1  # share of the pressure
 _SPIKE = 8.0  # standard deviations that no noise reaches
 _UNMODELLED = 1.2  # ripple and the like, over the noise of torque and pressure
 _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat itself
@@ -70,6 +71,12 @@ class Samples:
     whitening: NDArray[np.float64]
     speed: Vector
     set_aside: dict[str, int]
+
+    @property
+    def released(self) -> bool:
+        """Whether brake pressure falls, by more than its sensor's noise and a valve's overshoot."""
+        pB = np.concatenate([self.u[first:end, 0] for first, end in self.blocks])
+        return bool(np.max(np.maximum.accumulate(pB) - pB) > _RELEASED * pB.max())
 
     def behind_structure(self, force: Vector) -> Vector:
         """What load cells read of a creep force [N], (n,): a mode of second order in between."""
@@ -146,9 +153,9 @@ def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
     lever = 3.0 * nominal["muDC"] * nominal["actuation.kappa"] * nominal["rB"] * rR / rW
     torque = _UNMODELLED * np.hypot(deviation["tauR"], lever * deviation["pB"])
     inertia = nominal["JR"] + nominal["JW"] * (rR / rW) ** 2
-    p, gain = _kalman(torque * h / inertia, deviation["omegaR"])
-    gains = np.minimum(1.0, gain * np.append(steps, h) / h)
-    gains[wrong["omegaR"]] = 0.0
+    # Noise of a torque sample acts until half way to its neighbours.
+    acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
+    p, gains = _kalman(torque * acting / inertia, deviation["omegaR"], wrong["omegaR"])
     u = np.column_stack([_smooth(clean["pB"], h), clean["tauR"], np.zeros((time.size, 2))])
     y = np.column_stack([clean[name] for name in signals if name not in ("pB", "tauR")])
     v = np.array([speed[first:end].mean() for first, end in blocks])
@@ -222,11 +229,25 @@ def _deviation(values: Vector) -> float:
     return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
 
 
-def _kalman(process: float, measurement: float) -> tuple[float, float]:
-    """Variance of the predicted roller speed, and the stationary gain of a random walk."""
-    q, r = process**2, max(measurement, 1e-9) ** 2
+def _kalman(process: Vector, measurement: float, missing: Mask) -> tuple[Vector, Vector]:
+    """Variance of the predicted roller speed, and gain, of a random walk, (n,).
+
+    Parameters
+    ----------
+    process : (n,) [rad/s] standard deviation of what is added up to the next sample.
+    measurement : [rad/s] standard deviation of a sample.
+    missing : (n,) where there is none.
+    """
+    r = max(measurement, 1e-9) ** 2
+    q = float(np.median(process)) ** 2
+    predicted, gains = np.empty_like(process), np.zeros_like(process)
     p = 0.5 * (q + np.sqrt(q * q + 4.0 * q * r))
-    return float(p), float(p / (p + r))
+    for k in range(process.size):
+        predicted[k] = p
+        if not missing[k]:
+            gains[k] = p / (p + r)
+        p = (1.0 - gains[k]) * p + process[k] ** 2
+    return predicted, gains
 
 
 def _first_contact(pB: Vector, time: Vector) -> int:
@@ -281,7 +302,7 @@ def _whitening(
     speed: Vector,
     blocks: NDArray[np.int64],
     v: Vector,
-    roller: float,
+    roller: Vector,
     rR: float,
 ) -> NDArray[np.float64]:
     """Inverse Cholesky factors of the covariance of block means, (b, m, m).
@@ -301,7 +322,7 @@ def _whitening(
     covariance = np.zeros((len(v), m, m))
     covariance[:, 0, 0] = variance / size
     covariance[:, 0, 1] = covariance[:, 1, 0] = rR * noise / size
-    covariance[:, 1, 1] = roller / size
+    covariance[:, 1, 1] = [roller[first:end].mean() / size for first, end in blocks]
     if m == 3:
         means = np.array([clean["Fx"][first:end].mean() for first, end in blocks])
         covariance[:, 2, 2] = _deviation(means) ** 2

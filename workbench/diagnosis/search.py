@@ -323,7 +323,7 @@ def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporte
     candidates: list[Candidate] = [
         (effect, shape)
         for effect in catalogue
-        if effect not in best.active and not effect.hidden and fit.possible(effect)
+        if effect not in best.active and not fit.unseen(effect)
         for shape in shapes(effect)
     ]
     report(f"signatures of {len(candidates)} candidates")

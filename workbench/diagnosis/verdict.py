@@ -104,6 +104,7 @@ class Diagnosis:
     steps : how the causes were found.
     scores : of the candidates about the nominal model, best first.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
+    not_visible : why these stops cannot show an effect, by its name.
     """
 
     verdict: Verdict
@@ -117,6 +118,7 @@ class Diagnosis:
     scores: tuple[Score, ...]
     names: tuple[str, ...]
     cosines: Matrix
+    not_visible: Mapping[str, str]
 
 
 def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
@@ -157,6 +159,7 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         scores=steps[0].scores if steps else tuple(trial.scores()),
         names=names,
         cosines=cosines,
+        not_visible={one.name: reason for one in catalogue if (reason := fit.unseen(one))},
     )
 
 

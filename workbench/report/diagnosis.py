@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
-from workbench.diagnosis import CATALOGUE, Cause, Outcome, Residuals
+from workbench.diagnosis import Cause, Outcome, Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import CHANNELS
 from workbench.report.diagnosis_figures import (
@@ -111,7 +111,7 @@ def summarise_diagnosis(
             }
             for step in found.steps
         ],
-        "not_visible": {effect.name: effect.hidden for effect in CATALOGUE if effect.hidden},
+        "not_visible": dict(found.not_visible),
         "levels": {
             f"{name} {surface}": {"value": value, "unit": unit}
             for (name, surface), (value, unit) in outcome.levels.items()
