@@ -125,6 +125,8 @@ def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     sizes = {"caliper_hysteresis": 0.03, "adhesion_recovery": 0.3, "wheel_inertia": 0.2}
     found = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
     assert found.verdict == "nothing"
+    # Of adhesion that recovers they could show more.
+    assert set(found.not_visible) == {"CaliperHysteresis", "WheelInertia"}
 
 
 def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
@@ -135,6 +137,7 @@ def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
     assert [cause.effect.name for cause in found.causes] == ["CaliperHysteresis"]
     share = found.causes[0].parameters["share"]
     assert share.low <= 0.05 <= share.high
+    assert set(found.not_visible) == {"WheelInertia"}
 
 
 def test_nothing_is_found_where_nothing_is_missing(
@@ -219,11 +222,38 @@ def test_an_independent_simulator_is_seen_through(
     assert found.gain.after < 0.25 * found.gain.before
 
 
+def kept(case: Case, samples: np.ndarray) -> Case:
+    signals = {name: getattr(case, name)[samples] for name in ("time", "pB", "tauR")}
+    speeds = {name: getattr(case, name)[samples] for name in ("omegaW", "omegaR")}
+    return replace(case, **signals, **speeds, Fx=None if case.Fx is None else case.Fx[samples])
+
+
+def slow(case: Case) -> Case:
+    """At 50 Hz."""
+    return kept(case, np.arange(0, case.time.size, 4))
+
+
+def uneven(case: Case) -> Case:
+    """Three samples in ten are missing."""
+    return kept(case, np.random.default_rng(1).random(case.time.size) > 0.3)
+
+
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+@pytest.mark.parametrize("sampled", [lambda case: case, slow, uneven], ids=["", "slow", "uneven"])
 def test_clean_recordings_of_an_independent_simulator_stay_clean(
+    sampled: Callable[[Case], Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    cases = [sampled(case) for case in read_cases([LABELLED / "clean"])]
+    assert diagnosed(cases).verdict == "nothing"
+
+
+@pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
+def test_a_pole_ring_is_named_from_uneven_samples(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
-    assert diagnosed(read_cases([LABELLED / "clean"])).verdict == "nothing"
+    (cause,) = diagnosed([uneven(case) for case in read_cases([LABELLED / "pole_ring"])]).causes
+    assert cause.effect.name == "PoleRingEccentricity"
+    assert cause.parameters["amplitude"].low <= 2e-3 <= cause.parameters["amplitude"].high
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
