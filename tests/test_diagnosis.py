@@ -20,7 +20,7 @@ from workbench.diagnosis.evidence import Court
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import judge
-from workbench.rig import Effects, select, simulate, write_recording
+from workbench.rig import SCENARIOS, Effects, select, simulate, write_recording
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
@@ -187,6 +187,20 @@ def test_two_effects_are_found_one_after_the_other(
     assert len(groups) == 2
     for planted in (one, other):
         assert any(PLANTED[planted][0] in group for group in groups)
+
+
+def test_two_effects_that_hide_each_other_are_found_in_six_stops(
+    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    """Either alone leaves some channel worse than without it; three stops say "unexplained"."""
+    six = ("01_", "02_", "03_", "04_", "05_", "06_")
+    names = [name for name in SCENARIOS if name.startswith(six)]
+    effects = Effects(torque_gain=1.5 * 0.015, apex_offset=1.5e-3)
+    found = diagnosed(recorded(tmp_path, effects, 91, names))
+    groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
+    assert len(groups) == 2
+    for planted in ("DriveTorqueGain", "ApexOffset"):
+        assert any(planted in group for group in groups)
 
 
 def test_wrong_samples_are_set_aside_and_never_fitted(

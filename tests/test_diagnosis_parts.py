@@ -161,6 +161,32 @@ def test_noise_is_whitened_to_variance_one() -> None:
     assert 0.3 < white[:, 1].var() < 1.2
 
 
+def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
+    """The right gain leaves innovations white: a mean over a second has the variance of a mean."""
+    rng, draws = np.random.default_rng(6), 40
+    kept = rng.random(6000) > 0.3
+    case, names = noisy(6), ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
+    case = replace(case, **{name: getattr(case, name)[kept] for name in names})
+    stop, n = ready(case), case.time.size
+    # As `noisy` makes it, and 1.2 for ripple; pressure counts by the lever of three discs.
+    lever = 3 * 0.30 * 0.1086 * 0.30 * 0.70 / 0.46
+    torque = 1.2 * np.hypot(40.0, lever * 500.0) * rng.standard_normal((n, draws))
+    between = 0.5 * np.diff(case.time)[:, None] * (torque[1:] + torque[:-1])
+    pushed = between / (1500.0 + 110.0 * (0.70 / 0.46) ** 2)
+    errors, away = np.zeros((n, draws)), np.zeros(draws)
+    for k in range(n):
+        errors[k] = away + 0.003 * rng.standard_normal(draws)
+        if k + 1 < n:
+            away = away - stop.gain[k] * errors[k] + pushed[k]
+    expected = np.linalg.inv(stop.whitening)[:, 1]
+    scale = np.sqrt((expected**2).sum(axis=1))
+    means = np.array([errors[first:end].mean(axis=0) for first, end in stop.blocks])
+    white = means / scale[:, None]
+    lasting = white[: len(white) // 20 * 20].reshape(-1, 20, draws).mean(axis=1)
+    # 20 seconds of 40 draws: a variance is known to 5 %.
+    assert 20.0 * np.square(lasting).mean() == pytest.approx(1.0, abs=0.15)
+
+
 def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
     stop = ready(noisy(3))
     for frequency in (2.0, 8.0, 15.0):

@@ -284,6 +284,18 @@ def test_minimal_model_stops_as_the_reference_does(
     assert abs(full.Fx).max() > 24e3
 
 
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_braking_shifts_the_wheel_load(reference: StateSpace, direction: float) -> None:
+    """Pads push the frame down on primary springs and vertical cylinders; these give it back."""
+    run = simulate_stop(reference, direction * 40.0, 4.2e5, {}, 8.0, truth=False)
+    shift = run.outputs["FzL"][-1] - 80e3
+    on_the_pads = run.Fx[-1] * RADIUS_WHEEL / 0.30
+    of_the_cylinders = 0.3 / (0.3 + 1.22)
+    # 2 % of Fx for bearings and rotation, and the elasticity of arms and axle boxes.
+    assert shift == pytest.approx(0.5 * of_the_cylinders * on_the_pads, rel=0.08)
+    assert 0.04 < abs(shift) / 80e3 < 0.055
+
+
 def test_one_wet_unit_takes_its_share_of_the_force(reference: StateSpace) -> None:
     dry = simulate_stop(reference, 30.0, 2.7e5, {}, 8.0, truth=False)
     wet = simulate_stop(reference, 30.0, 2.7e5, {"muDCunit[2]": 0.4}, 8.0, truth=False)
