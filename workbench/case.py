@@ -1,110 +1,91 @@
 """Stage 1: a recording, its conditions and its units become a `Case` in SI units."""
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.errors import InputError, closest
-from workbench.recording import read_columns, read_text
+from workbench.errors import InputError
+from workbench.recording import Matrix, Vector, read_columns
+from workbench.system import Condition, System
+from workbench.tables import Table, read_table
 from workbench.units import quantity, si_factor
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Surface = Literal["dry", "wet"]
-_T = TypeVar("_T")
-
-_DISCS = 3  # data sheet of the rig
-_MIN_DURATION = 2.0  # s; a stop with coasting before it takes longer
 _MIN_SAMPLES = 20  # fewer say nothing about noise
 
-_SIGNALS = {"time": "s", "pB": "Pa", "tauR": "N.m", "omegaW": "rad/s", "omegaR": "rad/s", "Fx": "N"}
-
-# What estimators ask of a model, with units; a model with other names is mapped onto these.
-MODEL_VARIABLES = {
-    "omegaW": "rad/s",
-    "omegaR": "rad/s",
-    "pB": "Pa",
-    "tauR": "N.m",
-    "dmuWR": "1",
-    "dmuDC": "1",
-    "Fx": "N",
-    "slip": "m/s",
-    "muWR": "1",
-    "muDC": "1",
-    "rW": "m",
-    "rR": "m",
-    "JR": "kg.m2",
-}
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What was set before the stop.
-
-    Attributes
-    ----------
-    initial_speed : m/s, circumferential, positive in both directions.
-    brake_pressure : Pa, demanded.
-    wheel_rail : state of the contact.
-    discs : state of each brake disc.
-    direction : +1 forward, -1 backward.
-    """
-
-    initial_speed: float
-    brake_pressure: float
-    wheel_rail: Surface
-    discs: tuple[Surface, ...]
-    direction: Literal[1, -1]
+Value = float | int | str | tuple[Any, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One recorded stop in SI units; its arrays are read-only.
+    """One recording in SI units; its arrays are read-only.
 
     Attributes
     ----------
     name : of the folder.
     title : one line for reports.
-    conditions : what was set before the stop.
+    conditions : what was set before, by name: quantities in SI, words, whole numbers, tuples.
     time : (n,) s, strictly increasing, not necessarily in even steps.
-    pB : (n,) Pa, brake pressure.
-    tauR : (n,) N.m, torque of the roller's drive.
-    omegaW, omegaR : (n,) rad/s, speeds of wheelset and roller.
-    Fx : (n,) N, measured longitudinal force, or None.
+    signals : (n,) each, by name; one that is only there to judge by may be missing.
+    inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
-    names : the model's own name of each of MODEL_VARIABLES that it names otherwise.
+    names : the model's own name of each variable that it names otherwise.
     """
 
     name: str
     title: str
-    conditions: Conditions
+    conditions: Mapping[str, Value]
     time: Vector
-    pB: Vector
-    tauR: Vector
-    omegaW: Vector
-    omegaR: Vector
-    Fx: Vector | None
+    signals: Mapping[str, Vector]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
 
+    def __getitem__(self, signal: str) -> Vector:
+        """One signal, (n,) SI."""
+        return self.signals[signal]
+
+    def __contains__(self, signal: str) -> bool:
+        return signal in self.signals
+
     @property
     def u(self) -> Matrix:
-        """(n, 2) inputs [pB, tauR] in Pa and N.m."""
-        return _read_only(np.column_stack([self.pB, self.tauR]))
+        """(n, m) measured inputs, SI."""
+        return read_only(np.column_stack([self.signals[name] for name in self.inputs]))
 
     @property
     def y(self) -> Matrix:
-        """(n, 2) outputs [omegaW, omegaR] in rad/s."""
-        return _read_only(np.column_stack([self.omegaW, self.omegaR]))
+        """(n, l) measured outputs, SI."""
+        return read_only(np.column_stack([self.signals[name] for name in self.outputs]))
+
+    def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
+        """The same case with some signals replaced."""
+        return replace(self, signals={**self.signals, **signals})
+
+    def without(self, names: Sequence[str]) -> "Case":
+        """The same case without some signals."""
+        kept = {name: values for name, values in self.signals.items() if name not in names}
+        return replace(self, signals=kept)
+
+    def part(self, samples: slice) -> "Case":
+        """A piece of the recording."""
+        cut = {name: values[samples] for name, values in self.signals.items()}
+        return replace(self, time=self.time[samples], signals=cut)
 
 
-def read_cases(paths: Sequence[Path]) -> list[Case]:
+def sign(case: Case, system: System) -> float:
+    """Sign of the recording's signals, by the condition that says so; 1 without one."""
+    for condition in system.conditions:
+        if condition.sign:
+            return float(case.conditions[condition.name])  # type: ignore[arg-type]
+    return 1.0
+
+
+def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
     """Read case folders and folders of case folders.
 
     A folder that holds `case.toml` is a case. Of any other folder the sub-folders are read,
@@ -126,10 +107,10 @@ def read_cases(paths: Sequence[Path]) -> list[Case]:
                 remedy="rename one of the folders, or give it once",
             )
         folders[name] = folder
-    return [read_case(folder) for folder in folders.values()]
+    return [read_case(folder, system) for folder in folders.values()]
 
 
-def read_case(folder: Path) -> Case:
+def read_case(folder: Path, system: System) -> Case:
     """Read `case.toml` of a folder and the recording it names.
 
     Raises
@@ -138,36 +119,40 @@ def read_case(folder: Path) -> Case:
         At the first problem, with the file and the line, column or key.
     """
     toml = folder / "case.toml"
-    document = _read_toml(toml)
-    where = str(toml)
-    _refuse_unknown(document, ("title", "conditions", "measurement", "model"), where)
-    title = _entry(document, "title", str, where)
-    conditions = _conditions(_entry(document, "conditions", dict, where), f"{where}, [conditions]")
-    measurement = _entry(document, "measurement", dict, where)
-    _refuse_unknown(measurement, ("file", "columns"), f"{where}, [measurement]")
-    source = folder / _entry(measurement, "file", str, f"{where}, [measurement]")
-    columns = _column_names(measurement, f"{where}, [measurement]")
-    signals = _read_signals(source, columns)
-    model = _entry(document, "model", dict, where) if "model" in document else {}
-    _refuse_unknown(model, ("names",), f"{where}, [model]")
-    names = _entry(model, "names", dict, f"{where}, [model]") if "names" in model else {}
+    document = read_table(
+        toml,
+        "give a folder that holds case.toml and the recording",
+        'title = "..."',
+    )
+    document.refuse_unknown(("title", "conditions", "measurement", "model"))
+    title = document.take("title", str)
+    if system.conditions:
+        document.take("conditions", dict)
+    conditions = read_conditions(document.table("conditions"), system)
+    document.take("measurement", dict)
+    measurement = document.table("measurement")
+    measurement.refuse_unknown(("file", "columns"))
+    source = folder / measurement.take("file", str)
+    columns = _column_names(measurement, system)
+    time, signals = _read_signals(source, columns, system)
+    model = document.table("model")
+    model.refuse_unknown(("names",))
+    names = model.table("names")
     return Case(
         name=folder.resolve().name,
         title=title,
         conditions=conditions,
-        time=signals["time"],
-        pB=signals["pB"],
-        tauR=signals["tauR"],
-        omegaW=signals["omegaW"],
-        omegaR=signals["omegaR"],
-        Fx=signals.get("Fx"),
+        time=time,
+        signals=signals,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=tuple(one.name for one in system.outputs),
         source=source,
-        names=check_names(names, f"{where}, [model.names]"),
+        names=check_names(names.content, f"{toml}, [model.names]", system),
     )
 
 
-def check_names(names: Mapping[str, Any], where: str) -> dict[str, str]:
-    """Check a mapping of MODEL_VARIABLES to a model's own names, as a user wrote it.
+def check_names(names: Mapping[str, Any], where: str, system: System) -> dict[str, str]:
+    """Check a mapping of a system's variables to a model's own names, as a user wrote it.
 
     Parameters
     ----------
@@ -176,12 +161,101 @@ def check_names(names: Mapping[str, Any], where: str) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a variable is none of MODEL_VARIABLES, or two have one name.
+        If a variable is none that estimators ask for, or two have one name.
     """
-    _refuse_unknown(names, tuple(MODEL_VARIABLES), where)
-    checked = {ours: _entry(names, ours, str, where) for ours in names}
+    table = Table(names, where)
+    table.refuse_unknown(system.variables)
+    checked = {ours: table.take(ours, str) for ours in names}
     _refuse_shared(checked, where, "variable")
     return checked
+
+
+def check_recording(time: Vector, system: System, where: str, first_line: int | None = 2) -> None:
+    """Refuse time that does not increase, or too little of it.
+
+    Parameters
+    ----------
+    where : place for the message of an error.
+    first_line : line of the first sample in a file, None without one.
+
+    Raises
+    ------
+    InputError
+        If samples are out of order, or too few or too short to tell signal from noise.
+    """
+    steps = np.diff(time)
+    if not (steps > 0).all():
+        late = int(np.argmin(steps > 0)) + 1
+        path, _, column = where.partition(", ")
+        line = f", line {late + first_line}" if first_line is not None else ""
+        raise InputError(
+            where=f"{path}{line}, {column}",
+            found=f"{time[late]:.9g} s after {time[late - 1]:.9g} s",
+            expected="strictly increasing time",
+            remedy="export with more digits, or remove the repeated or misplaced samples",
+        )
+    if time.size < _MIN_SAMPLES or time[-1] - time[0] < system.shortest:
+        raise InputError(
+            where=where,
+            found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
+            expected=f"at least {_MIN_SAMPLES} samples, which tell signal from noise"
+            + (f", over {system.shortest:g} s" if system.shortest else ""),
+            remedy="export the whole recording, from before it begins to its end",
+        )
+
+
+def read_conditions(table: Table, system: System) -> dict[str, Value]:
+    """Conditions of a recording, as the system declares them.
+
+    Raises
+    ------
+    InputError
+        If one is missing, unknown, or none of its choices.
+    """
+    table.refuse_unknown(one.name for one in system.conditions)
+    return {one.name: _condition(table, one) for one in system.conditions}
+
+
+def _condition(table: Table, one: Condition) -> Value:
+    if one.count:
+        items = table.take(one.name, list)
+        if len(items) != one.count:
+            raise InputError(
+                where=f"{table.where} {one.name}",
+                found=f"{len(items)} entries",
+                expected=str(one.count),
+                remedy=f"write one of {_either(one)} for each",
+            )
+        return tuple(
+            _choice(one, item, f"{table.where} {one.name}[{i}]") for i, item in enumerate(items)
+        )
+    if one.choices:
+        value: object = table.take(one.name, type(one.choices[0]))
+        return _choice(one, value, f"{table.where} {one.name}")
+    where = f"{table.where} {one.name}"
+    text = table.take(one.name, str)
+    number = quantity(text, one.unit, where)
+    if number < one.least or (one.exclusive and number == one.least):
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"{'above' if one.exclusive else 'no less than'} {one.least:g} {one.unit}",
+            remedy="give the magnitude; other conditions hold signs",
+        )
+    return number
+
+
+def _choice(one: Condition, value: object, where: str) -> str | int:
+    for choice in one.choices:
+        if type(value) is type(choice) and value == choice:
+            return choice
+    raise InputError(
+        where=where, found=repr(value), expected=_either(one), remedy="write one of them"
+    )
+
+
+def _either(one: Condition) -> str:
+    return " or ".join(map(repr, one.choices))
 
 
 def _case_folders(path: Path) -> list[Path]:
@@ -212,87 +286,12 @@ def _case_folders(path: Path) -> list[Path]:
     return folders
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
-    text = read_text(path, "give a folder that holds case.toml and the recording")
-    try:
-        return tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or a number too long to convert
-        place = re.search(r"line (\d+)", str(error))
-        line = int(place[1]) if place else text.count("\n") + 1
-        raise InputError(
-            where=f"{path}, line {line}",
-            found=f"text that is no TOML ({error})",
-            expected='lines such as wheel_rail = "dry" under [conditions]',
-            remedy="correct the line",
-        ) from None
-
-
-def _conditions(table: dict[str, Any], where: str) -> Conditions:
-    keys = ("initial_speed", "brake_pressure", "wheel_rail", "discs", "direction")
-    _refuse_unknown(table, keys, where)
-    speed = quantity(_entry(table, "initial_speed", str, where), "m/s", f"{where} initial_speed")
-    pressure = quantity(
-        _entry(table, "brake_pressure", str, where), "Pa", f"{where} brake_pressure"
-    )
-    if speed <= 0:
-        raise InputError(
-            where=f"{where} initial_speed",
-            found=f"{table['initial_speed']!r}",
-            expected="a speed above zero in both directions",
-            remedy="give the magnitude; 'direction' holds the sign",
-        )
-    if pressure < 0:
-        raise InputError(
-            where=f"{where} brake_pressure",
-            found=f"{table['brake_pressure']!r}",
-            expected="a gauge pressure of zero or more",
-            remedy="correct the pressure",
-        )
-    discs = _entry(table, "discs", list, where)
-    if len(discs) != _DISCS:
-        raise InputError(
-            where=f"{where} discs",
-            found=f"{len(discs)} entries",
-            expected=f"{_DISCS}, one for each disc",
-            remedy='write "dry" or "wet" for each disc',
-        )
-    direction = _entry(table, "direction", int, where)
-    if direction not in (1, -1):
-        raise InputError(
-            where=f"{where} direction",
-            found=str(direction),
-            expected="1 (forward) or -1 (backward)",
-            remedy="write one of the two",
-        )
-    return Conditions(
-        initial_speed=speed,
-        brake_pressure=pressure,
-        wheel_rail=_surface(_entry(table, "wheel_rail", str, where), f"{where} wheel_rail"),
-        discs=tuple(_surface(disc, f"{where} discs[{i}]") for i, disc in enumerate(discs)),
-        direction=1 if direction == 1 else -1,
-    )
-
-
-def _surface(value: object, where: str) -> Surface:
-    if value not in ("dry", "wet"):
-        raise InputError(
-            where=where,
-            found=repr(value),
-            expected="'dry' or 'wet'",
-            remedy="write one of the two",
-        )
-    return value
-
-
-def _column_names(measurement: dict[str, Any], where: str) -> dict[str, str]:
-    """Return the column of each signal; `Fx` only if it is named or has its own name."""
-    named = _entry(measurement, "columns", dict, where) if "columns" in measurement else {}
-    where = f"{where} columns"
-    _refuse_unknown(named, tuple(_SIGNALS), where)
-    columns = {signal: signal for signal in _SIGNALS}
-    for signal in named:
-        columns[signal] = _entry(named, signal, str, where)
-    _refuse_shared(columns, where, "column")
+def _column_names(measurement: Table, system: System) -> dict[str, str]:
+    """Return the column of each signal."""
+    named = measurement.table("columns")
+    named.refuse_unknown(("time", *system.signals))
+    columns = {signal: named.text(signal, signal) for signal in ("time", *system.signals)}
+    _refuse_shared(columns, named.where, "column")
     return columns
 
 
@@ -309,72 +308,26 @@ def _refuse_shared(names: Mapping[str, str], where: str, kind: str) -> None:
         taken[name] = ours
 
 
-def _entry(table: Mapping[str, Any], key: str, kind: type[_T], where: str) -> _T:
-    """Return `table[key]`, which must be of this very type and no empty string."""
-    names = {str: "a text", int: "a whole number", dict: "a table", list: "a list"}
-    if key not in table:
-        raise InputError(
-            where=where,
-            found=f"no '{key}'",
-            expected=f"{names[kind]} '{key}'",
-            remedy=f"add '{key}'",
-        )
-    value = table[key]
-    if type(value) is not kind or value == "":  # `type`, because true is an int
-        raise InputError(
-            where=f"{where} {key}",
-            found=repr(value),
-            expected=names[kind],
-            remedy="correct the value",
-        )
-    return value
-
-
-def _refuse_unknown(table: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
-    for key in table:
-        if key not in keys:
-            raise InputError(
-                where=where,
-                found=f"unknown key '{key}'{closest(key, keys)}",
-                expected=f"only {', '.join(keys)}",
-                remedy="correct or remove the key",
-            )
-
-
-def _read_signals(source: Path, columns: dict[str, str]) -> dict[str, Vector]:
-    """Read the signals in SI units, without `Fx` if the file has no such column."""
-    required = [column for signal, column in columns.items() if signal != "Fx" or column != "Fx"]
-    recorded = read_columns(source, required, [c for c in columns.values() if c not in required])
+def _read_signals(
+    source: Path, columns: dict[str, str], system: System
+) -> tuple[Vector, dict[str, Vector]]:
+    """Time and signals in SI units; what only judges may be missing under its own name."""
+    optional = [one.name for one in system.judged if columns[one.name] == one.name]
+    required = [column for signal, column in columns.items() if signal not in optional]
+    recorded = read_columns(source, required, optional)
+    units = {"time": "s", **{name: one.unit for name, one in system.signals.items()}}
     signals = {}
     for signal, column in columns.items():
         if column in recorded:
             where = f"{source}, line 1, column '{column}'"
-            factor = si_factor(recorded[column].unit, _SIGNALS[signal], where)
-            signals[signal] = _read_only(recorded[column].values * factor)
-    _check_time(signals["time"], source, columns["time"])
-    return signals
+            factor = si_factor(recorded[column].unit, units[signal], where)
+            signals[signal] = read_only(recorded[column].values * factor)
+    time = signals.pop("time")
+    check_recording(time, system, f"{source}, column '{columns['time']}'")
+    return time, signals
 
 
-def _check_time(time: Vector, source: Path, column: str) -> None:
-    steps = np.diff(time)
-    if not (steps > 0).all():
-        late = int(np.argmin(steps > 0)) + 1
-        raise InputError(
-            where=f"{source}, line {late + 2}, column '{column}'",
-            found=f"{time[late]:.9g} s after {time[late - 1]:.9g} s",
-            expected="strictly increasing time",
-            remedy="export with more digits, or remove the repeated or misplaced samples",
-        )
-    if time.size < _MIN_SAMPLES or time[-1] - time[0] < _MIN_DURATION:
-        raise InputError(
-            where=f"{source}, column '{column}'",
-            found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
-            expected=f"at least {_MIN_SAMPLES} samples, which tell signal from noise, over "
-            f"{_MIN_DURATION:g} s, in which a brake stop has begun",
-            remedy="export the whole stop, from coasting to standstill",
-        )
-
-
-def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def read_only(array: Matrix) -> Matrix:
+    """The array, which nobody may change from here on."""
     array.flags.writeable = False
     return array

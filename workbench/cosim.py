@@ -2,17 +2,19 @@
 
 import enum
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.case import Case
 from workbench.fmu import FMUError, Matrix, Vector
-from workbench.observers import ESTIMATE, MODELLED_CONTACT, Estimate, Estimator, PeakForce
+from workbench.observers import Estimate, Estimator
 
 
-class Outcome(enum.Enum):
+class Ending(enum.Enum):
     """How a run ended; the value is the sentence for people."""
 
     OK = "ran to the end"
@@ -27,61 +29,95 @@ class Run:
     Attributes
     ----------
     case, estimator : names.
+    columns : of the estimate, with units.
     time : (n,) [s].
-    estimate : (n, 8) columns as in ESTIMATE, NaN where not estimated, and after a failure.
-    sigma : (n, 8) standard deviations, NaN where the method has none.
+    estimate : (n, w) NaN where not estimated, and after a failure.
+    sigma : (n, w) standard deviations, NaN where the method has none.
     nis : (n,) normalised innovation squared, NaN where the method has none.
-    outcome : how it ended.
+    ending : how it ended.
     message : what the FMU said, empty if nothing.
     seconds : wall time of the estimator.
-    muWR_claimed : (n,) whether muWR is an estimate; elsewhere it is a guess that fits as well as
-        any other, see PeakForce.claims, or stands in for a contact that the model has not.
+    claimed : (n,) by estimated quantity that is not always shown, whether it is an estimate;
+        elsewhere it is a guess that fits as well as any other, or stands in for something that the
+        model has not.
     """
 
     case: str
     estimator: str
+    columns: Mapping[str, str]
     time: Vector
     estimate: Matrix
     sigma: Matrix
     nis: Vector
-    outcome: Outcome
+    ending: Ending
     message: str
     seconds: float
-    muWR_claimed: NDArray[np.bool_]
+    claimed: Mapping[str, NDArray[np.bool_]]
 
     def signal(self, name: str) -> Vector:
         """One column of the estimate, (n,)."""
-        return self.estimate[:, list(ESTIMATE).index(name)]
+        return self.estimate[:, list(self.columns).index(name)]
+
+    def deviation(self, name: str) -> Vector:
+        """Standard deviation of one column of the estimate, (n,)."""
+        return self.sigma[:, list(self.columns).index(name)]
 
 
-def observe(case: Case, estimator: Estimator) -> Run:
+def replay(case: Case, estimator: Estimator) -> Run:
     """Feed a recording to an estimator, sample by sample; a failure is a value of the run."""
     begin = time.perf_counter()
-    blank = np.full((case.time.size, len(ESTIMATE)), np.nan)
+    system = estimator.system
+    blank = np.full((case.time.size, len(system.columns)), np.nan)
     estimate = Estimate(blank, blank, blank[:, 0])
-    claimed = np.zeros(case.time.size, bool)
-    outcome, message = Outcome.OK, ""
+    claimed: dict[str, NDArray[np.bool_]] = {}
+    ending, message = Ending.OK, ""
     try:
         estimate = estimator.run(case.time, case.u, case.y)
-        force = estimate.values[:, list(ESTIMATE).index("Fx")]
-        if (lost := np.flatnonzero(~np.isfinite(force))).size:
-            outcome = Outcome.NOT_FINITE
-            message = f"at t = {case.time[lost[0]]:.3f} s"
         seconds = time.perf_counter() - begin
-        if case.conditions.wheel_rail == MODELLED_CONTACT:
-            claimed = PeakForce(estimator.fmu).claims(estimate.values)
+        values = np.asarray(estimate.values)
+        given = np.isfinite(values[0])  # what the method estimates at all
+        if (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
+            ending = Ending.NOT_FINITE
+            message = f"at t = {case.time[lost[0]]:.3f} s"
+        claimed = _claims(case, estimator, values)
     except FMUError as error:
         seconds = time.perf_counter() - begin
-        outcome, message = Outcome.FMU_FAILED, str(error)
+        ending, message = Ending.FMU_FAILED, str(error)
     return Run(
         case=case.name,
         estimator=estimator.name,
+        columns=system.columns,
         time=case.time,
-        estimate=estimate.values,
-        sigma=estimate.sigma,
+        estimate=np.asarray(estimate.values),
+        sigma=np.asarray(estimate.sigma),
         nis=np.asarray(estimate.nis),
-        outcome=outcome,
+        ending=ending,
         message=message,
         seconds=seconds,
-        muWR_claimed=claimed,
+        claimed=claimed or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
     )
+
+
+def _rules(estimator: Estimator) -> Mapping[str, object]:
+    """Rules of the system's companion on when a quantity is shown, by its name."""
+    companion = estimator.system.companion
+    return import_module(f"{companion}.claims").CLAIMS if companion else {}
+
+
+def _doubted(estimator: Estimator) -> list[str]:
+    """Estimated quantities that are not always shown."""
+    rules = _rules(estimator)
+    return [one.name for one in estimator.system.estimated if one.claimed or one.name in rules]
+
+
+def _claims(case: Case, estimator: Estimator, values: Matrix) -> dict[str, NDArray[np.bool_]]:
+    rules, system = _rules(estimator), estimator.system
+    claimed = {}
+    for name in _doubted(estimator):
+        one = next(one for one in system.estimated if one.name == name)
+        met = all(case.conditions[key] == value for key, value in one.claimed.items())
+        if met and name in rules:
+            claimed[name] = rules[name](estimator.fmu, system, values)  # type: ignore[operator]
+        else:
+            claimed[name] = np.full(case.time.size, met)
+    return claimed

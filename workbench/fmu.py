@@ -95,13 +95,14 @@ class FMU:
     ----------
     path : the FMU file.
     names : names to use for variables that the FMU names otherwise, {"pB": "brakePressure"}.
+    parameters : values that differ from those of the model description, in the FMU's units.
 
     Attributes
     ----------
     names : as given.
     states, inputs, outputs, parameters : names, in the order of the model description.
     units : unit of each variable that has one.
-    defaults : start values of the model description, in the FMU's units.
+    defaults : start values, those given or of the model description, in the FMU's units.
     sha256 : hash of the file, its identity in results.
 
     Raises
@@ -114,9 +115,15 @@ class FMU:
 
     interface = MODEL_EXCHANGE
 
-    def __init__(self, path: Path, names: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        names: Mapping[str, str] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:
         self.path = path
         self.names = dict(names or {})
+        self._given = dict(parameters or {})
         self.description = read_description(path).renamed(self.names)
         offered = self.description.require(self.interface)
         self.sha256 = self.description.sha256
@@ -131,7 +138,7 @@ class FMU:
             v.name: float(v.start)
             for v in self.description.variables
             if v.real and v.start is not None
-        }
+        } | self._given
         self._references = {v.name: v.reference for v in self.description.variables}
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.has_directional_derivatives = offered.directional_derivatives
@@ -285,7 +292,7 @@ class FMU:
         states : start values of states, in the FMU's units; others keep their defaults.
         parameters : values of parameters; others keep their defaults.
         """
-        given = {**(parameters or {}), **states}
+        given = {**self._given, **(parameters or {}), **states}
         variables = self.variables(list(given))
         try:
             if self._used:

@@ -1,6 +1,6 @@
 """The hot loop's view of an FMU: its own C functions, called from compiled Python.
 
-numba compiles the laws of the observers once; which FMU they run on is an argument, a `Plant` with
+numba compiles the laws of the observers once; which FMU they run on is an argument, an `Instance` with
 the addresses of the FMU's functions, so that another FMU needs no compilation. Everything here may
 also be called from ordinary Python.
 """
@@ -62,25 +62,25 @@ class _Function(WrapperAddressProtocol):  # type: ignore[misc]
         return self._signature
 
 
-class Plant(NamedTuple):
+class Instance(NamedTuple):
     """One FMU instance, its functions and the buffers they read and write.
 
     Attributes
     ----------
-    instance : address of the FMU instance.
+    address : of the FMU instance.
     set_states, derivatives, set_real, get_real : functions of the FMU. FMI 2.0 takes no length of
         values in set_real and get_real; the register it would be in is not read.
     directional_2, directional_3 : directional derivatives; only that of `fmi` is called.
     fmi : 2 or 3 with directional derivatives, 0 for differences.
     x, dx : (n,) states and their derivatives.
     u, y : (m,) inputs, (l,) outputs.
-    jacobian : (n + 2, n + l) derivatives of [dx; y] (columns) by [x; last two inputs] (rows).
+    jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
     seed : (1,) one.
     *_at : addresses of the buffers and of the value references.
     keep : what must live as long as the addresses.
     """
 
-    instance: int
+    address: int
     set_states: Any
     derivatives: Any
     set_real: Any
@@ -107,27 +107,30 @@ class Plant(NamedTuple):
     keep: tuple[NDArray[np.uint32], ...]
 
 
-def plant(fmu: FMU, inputs: Sequence[str], outputs: Sequence[str]) -> Plant:
+def instance(
+    fmu: FMU, inputs: Sequence[str], corrections: Sequence[str], outputs: Sequence[str]
+) -> Instance:
     """Prepare an FMU for compiled loops; the FMU must outlive the result.
 
     Parameters
     ----------
-    inputs : measured inputs, then the two friction corrections.
-    outputs : what estimates are made of.
+    inputs : measured.
+    corrections : inputs that an observer sets, (q,).
+    outputs : what estimates are made of, (l,).
     """
-    n, m, k = len(fmu.states), len(inputs), len(outputs)
+    n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
     references = {
-        "inputs": fmu.variables(inputs).references,
+        "inputs": fmu.variables([*inputs, *corrections]).references,
         "outputs": fmu.variables(outputs).references,
         "unknowns": np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
-        "knowns": fmu.variables([*fmu.states, *inputs[-2:]]).references,
+        "knowns": fmu.variables([*fmu.states, *corrections]).references,
     }
-    x, dx, u, y = np.zeros(n), np.zeros(n), np.zeros(m), np.zeros(k)
-    jacobian, seed = np.zeros((n + 2, n + k)), np.ones(1)
+    x, dx, u, y = np.zeros(n), np.zeros(n), np.zeros(m + q), np.zeros(k)
+    jacobian, seed = np.zeros((n + q, n + k)), np.ones(1)
     version = int(fmu.version[0]) if fmu.has_directional_derivatives else 0
     directional = fmu.function_address("directional")
-    return Plant(
-        instance=fmu.instance_address,
+    return Instance(
+        address=fmu.instance_address,
         set_states=_Function(fmu.function_address("set_states"), _ARRAY_CALL),
         derivatives=_Function(fmu.function_address("derivatives"), _ARRAY_CALL),
         set_real=_Function(fmu.function_address("set"), _REAL_CALL),
@@ -156,60 +159,60 @@ def plant(fmu: FMU, inputs: Sequence[str], outputs: Sequence[str]) -> Plant:
 
 
 @inlined
-def set_inputs(plant, first, count):  # type: ignore[no-untyped-def]
-    """Set `count` inputs from number `first` on to plant.u; returns a status."""
-    references, values = plant.inputs_at + 4 * first, plant.u_at + 8 * first
-    status = plant.set_real(plant.instance, references, count, values, count)
+def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
+    """Set `count` inputs from number `first` on to model.u; returns a status."""
+    references, values = model.inputs_at + 4 * first, model.u_at + 8 * first
+    status = model.set_real(model.address, references, count, values, count)
     return REFUSED if status > 1 else OK
 
 
 @inlined
-def set_states(plant):  # type: ignore[no-untyped-def]
-    """Set the states to plant.x; returns a status."""
-    n = plant.x.size
-    return REFUSED if n and plant.set_states(plant.instance, plant.x_at, n) > 1 else OK
+def set_states(model):  # type: ignore[no-untyped-def]
+    """Set the states to model.x; returns a status."""
+    n = model.x.size
+    return REFUSED if n and model.set_states(model.address, model.x_at, n) > 1 else OK
 
 
 @inlined
-def place(plant):  # type: ignore[no-untyped-def]
-    """Put the FMU at the states plant.x and the inputs plant.u; returns a status."""
-    return set_inputs(plant, 0, plant.u.size) or set_states(plant)
+def place(model):  # type: ignore[no-untyped-def]
+    """Put the FMU at the states model.x and the inputs model.u; returns a status."""
+    return set_inputs(model, 0, model.u.size) or set_states(model)
 
 
 @inlined
-def evaluate(plant):  # type: ignore[no-untyped-def]
-    """Derivatives of the states into plant.dx; returns a status."""
-    n = plant.dx.size
-    return REFUSED if plant.derivatives(plant.instance, plant.dx_at, n) > 1 else OK
+def evaluate(model):  # type: ignore[no-untyped-def]
+    """Derivatives of the states into model.dx; returns a status."""
+    n = model.dx.size
+    return REFUSED if model.derivatives(model.address, model.dx_at, n) > 1 else OK
 
 
 @inlined
-def read(plant):  # type: ignore[no-untyped-def]
-    """Outputs into plant.y; returns a status."""
-    n = plant.y.size
-    status = plant.get_real(plant.instance, plant.outputs_at, n, plant.y_at, n)
+def read(model):  # type: ignore[no-untyped-def]
+    """Outputs into model.y; returns a status."""
+    n = model.y.size
+    status = model.get_real(model.address, model.outputs_at, n, model.y_at, n)
     return REFUSED if status > 1 else OK
 
 
 @inlined
-def linearise(plant, count):  # type: ignore[no-untyped-def]
-    """Jacobian at the present point into plant.jacobian; returns a status.
+def linearise(model, count):  # type: ignore[no-untyped-def]
+    """Jacobian at the present point into model.jacobian; returns a status.
 
     The first `count` columns are written: n for the derivatives, n + l for the outputs too.
-    Afterwards the FMU is where it was; plant.dx and plant.y are undefined.
+    Afterwards the FMU is where it was; model.dx and model.y are undefined.
     """
-    rows, columns = plant.jacobian.shape
-    if plant.fmi == 0:
-        return _differences(plant)
+    rows, columns = model.jacobian.shape
+    if model.fmi == 0:
+        return _differences(model)
     for j in range(rows):
-        known, out = plant.knowns_at + 4 * j, plant.jacobian_at + 8 * columns * j
-        if plant.fmi == 2:
-            status = plant.directional_2(
-                plant.instance, plant.unknowns_at, count, known, 1, plant.seed_at, out
+        known, out = model.knowns_at + 4 * j, model.jacobian_at + 8 * columns * j
+        if model.fmi == 2:
+            status = model.directional_2(
+                model.address, model.unknowns_at, count, known, 1, model.seed_at, out
             )
         else:
-            status = plant.directional_3(
-                plant.instance, plant.unknowns_at, count, known, 1, plant.seed_at, 1, out, count
+            status = model.directional_3(
+                model.address, model.unknowns_at, count, known, 1, model.seed_at, 1, out, count
             )
         if status > 1:
             return REFUSED
@@ -217,30 +220,31 @@ def linearise(plant, count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _differences(plant):  # type: ignore[no-untyped-def]
+def _differences(model):  # type: ignore[no-untyped-def]
     """Central differences; the step balances truncation and rounding (cube root of eps)."""
-    rows, columns = plant.jacobian.shape
-    n, m = plant.x.size, plant.u.size
+    rows, columns = model.jacobian.shape
+    n, m = model.x.size, model.u.size
+    first = m - (rows - n)  # of the corrections
     for j in range(rows):
-        centre = plant.x[j] if j < n else plant.u[m - 2 + j - n]
+        centre = model.x[j] if j < n else model.u[first + j - n]
         step = 6e-6 * max(abs(centre), 1e-3)
         for side in (1.0, -1.0, 0.0):
             if j < n:
-                plant.x[j] = centre + side * step
+                model.x[j] = centre + side * step
             else:
-                plant.u[m - 2 + j - n] = centre + side * step
-            if place(plant):
+                model.u[first + j - n] = centre + side * step
+            if place(model):
                 return REFUSED
             if side == 0.0:
                 continue
-            if evaluate(plant) or read(plant):
+            if evaluate(model) or read(model):
                 return REFUSED
             for i in range(columns):
-                value = plant.dx[i] if i < n else plant.y[i - n]
+                value = model.dx[i] if i < n else model.y[i - n]
                 if side > 0.0:
-                    plant.jacobian[j, i] = value
+                    model.jacobian[j, i] = value
                 else:
-                    plant.jacobian[j, i] = (plant.jacobian[j, i] - value) / (2.0 * step)
+                    model.jacobian[j, i] = (model.jacobian[j, i] - value) / (2.0 * step)
     return OK
 
 

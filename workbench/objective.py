@@ -1,4 +1,4 @@
-"""How well a run fits its recording, stage 5: errors of the creep force, and z of the paper."""
+"""How well a run fits its recording, stage 5: errors of what is judged, and z of the paper."""
 
 from dataclasses import dataclass
 
@@ -7,32 +7,12 @@ from numba import njit
 from scipy.signal import butter, sosfiltfilt
 
 from workbench.case import Case
-from workbench.cosim import Outcome, Run
+from workbench.cosim import Ending, Run
 from workbench.fmu import Vector
+from workbench.system import Objective, System
 
-BANDWIDTH = 5.0  # [Hz] below the 15..35 Hz modes of a rig's structure, above what friction does
-FIRST_PRESSURE = 0.1e5  # [Pa] twenty times the noise of a pressure sensor (5 mbar)
-# [rad/s] two equal poles there are down by 3 dB at the bandwidth
-_CORNER = 2 * np.pi * BANDWIDTH / np.sqrt(np.sqrt(2) - 1)
-LOWEST_SPEED = 1.0  # [m/s] below, slip and creepage lose their meaning
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Weights of equation (12) of Schwarz et al. (2018).
-
-    They bring the terms to one scale: an error of 1 rad/s in a speed counts as one of 1 kN in the
-    force, so the force decides once the speeds follow their measurement.
-    """
-
-    cW: float = 1.0  # [s/rad]
-    cR: float = 1.0  # [s/rad]
-    cF: float = 1.0e-3  # [1/N]
-
-    @property
-    def vector(self) -> Vector:
-        """cW, cR, cF, (3,)."""
-        return np.array([self.cW, self.cR, self.cF])
+# Two equal poles at a corner are down by 3 dB at this share of it.
+_CORNER = 2 * np.pi / np.sqrt(np.sqrt(2) - 1)
 
 
 @dataclass(frozen=True)
@@ -41,35 +21,43 @@ class Score:
 
     Attributes
     ----------
-    Fx_rms : rms error of the creep force between first pressure and 1 m/s, below 5 Hz [N].
-    Fx_nrmse : the same over the mean of |Fx| [1].
-    z : objective z_k of equation (12), over the whole recording, of deviations below 5 Hz [1].
+    rms : rms error of the judged signal in the window, below the bandwidth [its unit].
+    nrmse : the same over the mean of its size [1].
+    z : objective z_k of equation (12), over the whole recording, of deviations below the
+        bandwidth [1].
     reason : why a value is missing; empty if none is.
     """
 
-    Fx_rms: float | None
-    Fx_nrmse: float | None
+    rms: float | None
+    nrmse: float | None
     z: float | None
     reason: str
 
 
-def braking_window(case: Case, roller_radius: float) -> slice:
-    """Samples from first pressure to the last one above 1 m/s; empty without braking."""
-    applied = np.flatnonzero(case.pB > FIRST_PRESSURE)
-    moving = np.flatnonzero(np.abs(case.omegaR) * roller_radius > LOWEST_SPEED)
-    if not applied.size or not moving.size:
-        return slice(0, 0)
-    return slice(int(applied[0]), max(int(moving[-1]) + 1, int(applied[0])))
+def judged_window(case: Case, system: System) -> slice:
+    """Samples in which the judged signal counts; empty where the recording has none."""
+    first, last = 0, case.time.size - 1
+    if (begins := system.objective.begins) is not None:
+        above = np.flatnonzero(system.signal(begins.signal, case.signals) > begins.level)
+        if not above.size:
+            return slice(0, 0)
+        first = int(above[0])
+    if (ends := system.objective.ends) is not None:
+        above = np.flatnonzero(np.abs(system.signal(ends.signal, case.signals)) > ends.level)
+        if not above.size:
+            return slice(0, 0)
+        last = int(above[-1])
+    return slice(first, max(last + 1, first))
 
 
-def low_pass(time: Vector, signal: Vector, bandwidth: float = BANDWIDTH) -> Vector:
+def low_pass(time: Vector, signal: Vector, bandwidth: float) -> Vector:
     """Low-pass a sampled signal without phase shift (Butterworth, order 2, forward and backward).
 
     Uneven samples are brought to an even grid of their mean step and back. A signal sampled too
-    slowly to hold more than the bandwidth is returned as it is.
+    slowly to hold more than the bandwidth [Hz] is returned as it is.
 
     >>> t = np.arange(0, 2, 0.005)
-    >>> ringing = low_pass(t, np.sin(2 * np.pi * 21.6 * t))
+    >>> ringing = low_pass(t, np.sin(2 * np.pi * 21.6 * t), 5.0)
     >>> float(np.abs(ringing[100:-100]).max().round(3))
     0.002
     """
@@ -88,52 +76,62 @@ def samples(time: Vector) -> tuple[Vector, Vector]:
     return steps, 0.5 * (steps + np.append(steps[1:], 0.0)) / (time[-1] - time[0])
 
 
+def corner(objective: Objective) -> float:
+    """Poles of the low-pass through which deviations count [rad/s]."""
+    return float(_CORNER * objective.bandwidth)
+
+
 @njit(cache=True)
-def integrate(z, memory, deviations, weights, steps, shares):  # type: ignore[no-untyped-def]
+def integrate(z, memory, deviations, weights, steps, shares, corner):  # type: ignore[no-untyped-def]
     """Add a piece of recording to z_k, equation (12) of Schwarz et al. (2018).
 
-    Deviations count below 5 Hz, where an estimate can follow friction; above, a recording holds the
-    noise of its sensors and the modes of its rig, which would reward slow gains. The low-pass has
-    two equal real poles. z only grows, sample by sample, so that pieces do not change the sum.
+    Deviations count below the bandwidth, where an estimate can follow; above, a recording holds the
+    noise of its sensors and the modes of its machine, which would reward slow gains. The low-pass
+    has two equal real poles. z only grows, sample by sample, so that pieces do not change the sum.
 
     Parameters
     ----------
-    memory : (2, 3) of the low-pass, written; zeros at the beginning.
-    deviations : (n, 3) of omegaW, omegaR [rad/s] and Fx [N] from their measurement.
-    weights : (3,) cW, cR, cF.
+    memory : (2, w) of the low-pass, written; zeros at the beginning.
+    deviations : (n, w) of estimated from measured signals.
+    weights : (w,) of these signals.
     steps, shares : (n,) as of `samples`.
+    corner : as of `corner` [rad/s].
     """
     for i in range(steps.size):
         # The first sample has no step before it and stands for all the past.
-        gain = 1.0 - np.exp(-_CORNER * steps[i]) if steps[i] > 0.0 else 1.0
-        for j in range(3):
+        gain = 1.0 - np.exp(-corner * steps[i]) if steps[i] > 0.0 else 1.0
+        for j in range(weights.size):
             memory[0, j] += gain * (deviations[i, j] - memory[0, j])
             memory[1, j] += gain * (memory[0, j] - memory[1, j])
             z += shares[i] * weights[j] * abs(memory[1, j])
     return z
 
 
-def score(case: Case, run: Run, roller_radius: float, weights: Weights) -> Score:
-    """Judge a run against its recording.
+def weights(objective: Objective) -> Vector:
+    """Weights of the weighed signals, (w,)."""
+    return np.array(list(objective.weights.values()))
 
-    Parameters
-    ----------
-    roller_radius : [m], turns omegaR into the speed that ends the window.
-    """
-    if run.outcome is not Outcome.OK:
-        return Score(None, None, None, f"{run.outcome.value} {run.message}".strip())
-    if case.Fx is None:
-        return Score(None, None, None, "the recording has no Fx to judge by")
-    error = run.signal("Fx") - case.Fx
-    # A method that takes the speeds as measured makes no error in them.
-    omegaW = np.nan_to_num(run.signal("omegaW") - case.omegaW)
-    omegaR = np.nan_to_num(run.signal("omegaR") - case.omegaR)
-    deviations = np.column_stack([omegaW, omegaR, error])
+
+def score(case: Case, run: Run, system: System) -> Score:
+    """Judge a run against its recording."""
+    objective = system.objective
+    if run.ending is not Ending.OK:
+        return Score(None, None, None, f"{run.ending.value} {run.message}".strip())
+    if missing := [name for name in (objective.judged, *objective.weights) if name not in case]:
+        return Score(None, None, None, f"the recording has no {missing[0]} to judge by")
+    # A method that takes a signal as measured makes no error in it.
+    deviations = np.column_stack(
+        [np.nan_to_num(run.signal(name) - case[name]) for name in objective.weights]
+    )
     steps, shares = samples(case.time)
-    z = float(integrate(0.0, np.zeros((2, 3)), deviations, weights.vector, steps, shares))
-    window = braking_window(case, roller_radius)
+    memory = np.zeros((2, len(objective.weights)))
+    z = float(
+        integrate(0.0, memory, deviations, weights(objective), steps, shares, corner(objective))
+    )
+    window = judged_window(case, system)
     if window.stop - window.start < 2:
-        return Score(None, None, z, "the recording has no braking above 1 m/s")
-    rms = float(np.sqrt(np.mean(low_pass(case.time, error)[window] ** 2)))
-    mean = float(np.mean(np.abs(low_pass(case.time, case.Fx)[window])))
-    return Score(rms, rms / mean, z, "")
+        return Score(None, None, z, "the recording holds nothing that is judged")
+    error = run.signal(objective.judged) - case[objective.judged]
+    measured = low_pass(case.time, case[objective.judged], objective.bandwidth)
+    rms = float(np.sqrt(np.mean(low_pass(case.time, error, objective.bandwidth)[window] ** 2)))
+    return Score(rms, rms / float(np.mean(np.abs(measured[window]))), z, "")

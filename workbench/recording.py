@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from workbench.errors import InputError, closest
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 _HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?")
 _NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")

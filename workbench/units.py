@@ -3,6 +3,7 @@
 import math
 import re
 from functools import cache
+from tokenize import TokenError
 
 import pint
 
@@ -16,6 +17,7 @@ _EXAMPLES = {
     "N": "N or kN",
     "m/s": "m/s or km/h",
     "m": "m or mm",
+    "K": "K",
 }
 
 # Angles have a dimension of their own here, so that Hz and 1/s are not taken for rad/s.
@@ -39,8 +41,24 @@ degree = {math.pi!r} / 180 * radian = deg = °
 revolution = {2 * math.pi!r} * radian = rev
 rpm = revolution / minute
 hertz = 1 / second = Hz
+liter = 1e-3 * meter ** 3 = l = L
+tonne = 1000 * kilogram = t
+joule = newton * meter = J
+watt = joule / second = W
+ampere = [current] = A
+volt = watt / ampere = V
+ohm = volt / ampere = Ohm
+farad = ampere * second / volt = F
+henry = volt * second / ampere = H
+kelvin = [temperature] = K
+mole = [substance] = mol
+percent = 0.01
 """
-_UNIT = re.compile(r"(1/)?[A-Za-z\u00b5\u03bc°]+([.·*/][A-Za-z\u00b5\u03bc°]+)*")
+# As Modelica and people write them: N.m, kg.m2, m3/s, J/(kg.K), W/m^2.
+_UNIT = re.compile(
+    r"(1/|\()*[A-Za-z\u00b5\u03bc°%]+(\^?-?\d)?"
+    r"([.·*/]\(?[A-Za-z\u00b5\u03bc°]+(\^?-?\d)?\)*)*"
+)
 _REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
 _QUANTITY = re.compile(
     r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?) *(?P<unit>[^0-9., ].*)"
@@ -55,7 +73,7 @@ def si_factor(unit: str, si: str, where: str) -> float:
     Parameters
     ----------
     unit : as a file spells it; case matters.
-    si : one of s, Pa, N.m, rad/s, N, m/s, m.
+    si : such as s, Pa, N.m, rad/s, kg.m2; 1 for a number without a unit.
     where : place for the message of an error.
 
     Raises
@@ -68,24 +86,34 @@ def si_factor(unit: str, si: str, where: str) -> float:
     >>> si_factor("kPa", "Pa", "measured.csv")
     1000.0
     """
-    spelling = "rpm" if unit in _REVOLUTIONS_PER_MINUTE else unit
+    if unit == si:
+        return 1.0
     registry = _units()
     remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
     try:
-        parsed = registry.parse_units(spelling) if _UNIT.fullmatch(spelling) else None
-    except (pint.UndefinedUnitError, ValueError):  # ValueError: "nan", a number to pint
+        parsed = registry.parse_units(_spelled(unit)) if _UNIT.fullmatch(unit) else None
+        expected = registry.parse_units(_spelled(si))
+    except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
         parsed = None
     if parsed is None:
         found = f"unknown unit [{unit}]"
-    elif parsed.is_compatible_with(si):
-        return float(registry.Quantity(1.0, parsed).to(si).magnitude)
+    elif parsed.is_compatible_with(expected):
+        return float(registry.Quantity(1.0, parsed).to(expected).magnitude)
     elif si == "rad/s" and parsed.is_compatible_with("Hz"):
         found = f"[{unit}], which leaves open whether it counts revolutions or radians"
     else:
         found = f"[{unit}], a unit of another dimension"
     raise InputError(
-        where=where, found=found, expected=f"a unit such as {_EXAMPLES[si]}", remedy=remedy
+        where=where, found=found, expected=f"a unit such as {_EXAMPLES.get(si, si)}", remedy=remedy
     )
+
+
+def _spelled(unit: str) -> str:
+    """A unit as pint reads it."""
+    if unit in _REVOLUTIONS_PER_MINUTE:
+        return "rpm"
+    powers = re.sub(r"([A-Za-z\u00b5\u03bc°])\^?(-?\d)", r"\1**\2", unit)
+    return powers.replace(".", "*").replace("·", "*").replace("%", "percent")
 
 
 @cache
@@ -108,7 +136,7 @@ def quantity(text: str, si: str, where: str) -> float:
         raise InputError(
             where=where,
             found=repr(text),
-            expected=f"a number with a decimal point and a unit, {_EXAMPLES[si]}",
+            expected=f"a number with a decimal point and a unit, {_EXAMPLES.get(si, si)}",
             remedy="write for instance '4.2 bar' or '160 km/h'",
         )
     return float(match["number"]) * si_factor(match["unit"], si, where)

@@ -1,51 +1,67 @@
-"""Estimators, stage 3: each turns measured inputs and outputs into an estimate, step by step."""
+"""Estimators, stage 3: each turns measured inputs and outputs into an estimate, step by step.
 
-from workbench.observers.baselines import DirectInversion, OpenLoop
-from workbench.observers.contract import ESTIMATE, Estimate, Estimator
-from workbench.observers.disturbance import (
-    DiscModel,
-    DisturbanceGains,
-    DisturbanceObserver,
-    NoiseLevels,
-    OperatingPoint,
-    stationary_gains,
-)
-from workbench.observers.kalman import ExtendedKalmanFilter, FilterNoise, UnscentedKalmanFilter
-from workbench.observers.parameter import ParameterEstimator, ParameterGains, pole_placed_gains
-from workbench.observers.suite import (
-    ESTIMATORS,
-    STANDARD,
-    Settings,
-    all_estimators,
-    make_estimators,
-    reasoned_settings,
-)
-from workbench.observers.utilisation import MODELLED_CONTACT, PeakForce
+One file each; a new one is found by itself. A system's companion package may have more.
+"""
 
-__all__ = [
-    "ESTIMATE",
-    "ESTIMATORS",
-    "MODELLED_CONTACT",
-    "STANDARD",
-    "DirectInversion",
-    "DiscModel",
-    "DisturbanceGains",
-    "DisturbanceObserver",
-    "Estimate",
-    "Estimator",
-    "ExtendedKalmanFilter",
-    "FilterNoise",
-    "NoiseLevels",
-    "OpenLoop",
-    "OperatingPoint",
-    "ParameterEstimator",
-    "ParameterGains",
-    "PeakForce",
-    "Settings",
-    "UnscentedKalmanFilter",
-    "all_estimators",
-    "make_estimators",
-    "pole_placed_gains",
-    "reasoned_settings",
-    "stationary_gains",
-]
+import pkgutil
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+
+from workbench.errors import InputError, closest
+from workbench.observers.contract import Estimate, Estimator
+from workbench.observers.gains import Gains, SearchSpace
+from workbench.system import System
+
+__all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators"]
+
+
+def estimators(system: System) -> dict[str, type[Estimator]]:
+    """All estimators that run on a system, by name, in the order of tables."""
+    packages = [__name__] + ([f"{system.companion}.estimators"] if system.companion else [])
+    found = [kind for package in packages for kind in _estimators(package)]
+    return {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
+
+
+def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
+    """Estimators by name, in the order of tables; the standard ones if none is named.
+
+    Raises
+    ------
+    InputError
+        If there is none of a name.
+    """
+    known = estimators(system)
+    for name in names:
+        if name not in known:
+            raise InputError(
+                where=f"estimator '{name}'",
+                found=f"no estimator of this name{closest(name, known)}",
+                expected=f"one of {', '.join(known)}",
+                remedy="correct the name",
+            )
+    return {
+        name: kind
+        for name, kind in known.items()
+        if (name in names if names else kind.standard)
+    }
+
+
+@cache
+def _estimators(package: str) -> tuple[type[Estimator], ...]:
+    """Estimators that the modules of a package define."""
+    parent = import_module(package)
+    modules = [import_module(f"{package}.{one.name}") for one in pkgutil.iter_modules(parent.__path__)]
+    return tuple(kind for module in modules for kind in _defined(module))
+
+
+def _defined(module: ModuleType) -> list[type[Estimator]]:
+    return [
+        one
+        for one in vars(module).values()
+        if isinstance(one, type)
+        and issubclass(one, Estimator)
+        and one.__module__ == module.__name__
+        and hasattr(one, "name")
+    ]

@@ -2,48 +2,26 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from workbench.case import MODEL_VARIABLES
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, inlined, plant, read, set_inputs, set_states
-from workbench.units import si_factor
-
-# Columns of an estimate, with units; NaN where a method does not estimate the quantity.
-ESTIMATE = {
-    "omegaW": "rad/s",
-    "omegaR": "rad/s",
-    "dmuWR": "1",
-    "dmuDC": "1",
-    "muWR": "1",
-    "muDC": "1",
-    "Fx": "N",
-    "slip": "m/s",
-}
-WIDTH = len(ESTIMATE)
-
-INPUTS = ("pB", "tauR", "dmuWR", "dmuDC")
-OUTPUTS = ("Fx", "slip")
-FRICTIONS = ("muWR", "muDC")
-
-# Wheel-rail from very low to dry adhesion (Polach 2005), disc-pad as in Schwarz et al. (2018).
-FRICTION_RANGE = np.array([[0.03, 0.55], [0.10, 0.45]])
-
-# Rolling velocity [m/s] at which feedback is down to half: noise of 0.003 rad/s in omegaR is then
-# a creepage of 0.4 %, as much as a braked wheel has.
-FADING_SPEED = 0.5
+from workbench.kernel import checked, inlined, instance, read, set_inputs, set_states
+from workbench.observers.gains import Gains, SearchSpace
+from workbench.system import OBSERVER, System
+from workbench.system_file import check_model
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimates at one time, (8,), or at all times, (n, 8).
+    """Estimates at one time, (w,), or at all times, (n, w).
 
     Attributes
     ----------
-    values : columns as in ESTIMATE.
+    values : columns as in `System.columns`.
     sigma : standard deviations, NaN where the method has none.
     nis : normalised innovation squared, () or (n,), NaN where the method has none.
     """
@@ -53,35 +31,122 @@ class Estimate:
     nis: Vector | float
 
 
+class Layout(NamedTuple):
+    """Where a law finds things in the model; the same for all laws.
+
+    Attributes
+    ----------
+    seen : (l,) index of the state that is an output, or -1 - index among the model's outputs.
+    nominal, low, high : (q,) nominal estimated quantities, and limits of their corrections.
+    acts_on : (q,) state whose rate shows a correction's effect, -1 for none.
+    pace : (l,) coefficients of the outputs in the signal with which feedback fades; half of it is
+        left at `half`, 0: it never fades.
+    follower, leader : states of which one rolls along with the other, -1 for none.
+    ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
+    reported : number of the model's outputs that estimates hold.
+    """
+
+    seen: NDArray[np.intp]
+    nominal: Vector
+    low: Vector
+    high: Vector
+    acts_on: NDArray[np.intp]
+    pace: Vector
+    half: float
+    follower: int
+    leader: int
+    ratio: float
+    lead: float
+    reported: int
+
+
 class Estimator(ABC):
-    """Feeds on u = [pB, tauR] (Pa, N.m) and y = [omegaW, omegaR] (rad/s), sample by sample.
+    """Feeds on measured inputs u and outputs y of a system, sample by sample.
 
     A method provides `_begin`, which fills its memory, and two compiled functions: `_law` advances
-    by one sample, `_loop` runs the law over a recording.
+    by one sample, `_loop` runs the law over a recording. What is tuned are its gains: `reasoned`
+    says what they are before tuning, `space` where they are sought.
 
     Parameters
     ----------
-    fmu : model with states omegaW, omegaR, inputs as in INPUTS and outputs as in OUTPUTS.
+    fmu : model with the variables of the system.
+    system : whose signals are fed.
+
+    Attributes
+    ----------
+    name : in results and commands.
+    label : for people.
+    role : of the model that it runs on.
+    rank : place in tables.
+    standard : whether it runs unless others are asked for.
+    tunable : whether it has gains.
+    meaning : of the gains, with units, for whoever reads their file.
+    tuned_as : estimator whose gains it takes; empty: its own.
 
     Raises
     ------
     InputError
-        If the model lacks one of MODEL_VARIABLES or has it in another unit.
+        If the model lacks a variable, or has it in another unit.
     """
 
     name: str
+    label: ClassVar[str]
+    role: ClassVar[str] = OBSERVER
+    rank: ClassVar[int] = 50
+    standard: ClassVar[bool] = True
+    tunable: ClassVar[bool] = True
+    meaning: ClassVar[str] = ""
+    tuned_as: ClassVar[str] = ""
     _law: ClassVar[Any]
     _loop: ClassVar[Any]
 
-    def __init__(self, fmu: FMU) -> None:
-        check_model(fmu)
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        check_model(system, fmu.description)
         self.fmu = fmu
-        self._plant = plant(fmu, INPUTS, OUTPUTS)
-        self._order = np.array([fmu.states.index("omegaW"), fmu.states.index("omegaR")])
-        self._nominal = np.array([fmu.defaults[name] for name in FRICTIONS])
-        self._radius = fmu.defaults["rR"]
+        self.system = system
+        self.gains = gains
+        inputs = [one.name for one in system.inputs]
+        unseen = [one.name for one in system.outputs if one.name not in fmu.states]
+        outputs = [*system.reported, *unseen]
+        self._model = instance(fmu, inputs, system.corrections, outputs)
+        self._layout = layout(fmu, system)
         self._t = 0.0
-        self._row = np.empty(2 * WIDTH + 1)
+        self._row = np.empty(2 * len(system.columns) + 1)
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """Gains before tuning; the FMU is left at an operating point."""
+        return Gains(cls.name, (), np.zeros(0), {}, "")
+
+    @classmethod
+    def space(
+        cls, fmu: FMU, system: System, gains: Gains, slowest: float, fastest: float
+    ) -> SearchSpace:
+        """Where gains are sought; the FMU is left at an operating point.
+
+        Parameters
+        ----------
+        slowest, fastest : angular frequencies that recordings show [rad/s].
+        """
+        raise NotImplementedError(f"{cls.name} has no gains")
+
+    @classmethod
+    def error_dynamics(
+        cls, A: Matrix, B: Matrix, C: Matrix, gains: Gains
+    ) -> tuple[Matrix, Matrix] | None:
+        """Linear dynamics of the estimate's error, after a step of the true quantities.
+
+        Parameters
+        ----------
+        A, B, C : of the model by states (n), corrections (q) and outputs (l).
+
+        Returns
+        -------
+        dynamics : (m, m) d/dt of errors and memory; the last q unknowns are the true quantities.
+        error : (q, m) error of the estimated quantities. None for a method that makes its gain as
+            it goes.
+        """
+        return None
 
     @abstractmethod
     def _begin(self, u: Vector, y: Vector) -> None:
@@ -93,26 +158,29 @@ class Estimator(ABC):
 
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
-        self.fmu.start({"omegaW": y[0], "omegaR": y[1]})
-        self._plant.u[:] = 0.0
+        measured = zip(self.system.outputs, y, strict=True)
+        self.fmu.start(
+            {one.name: float(value) for one, value in measured if one.name in self.fmu.states}
+        )
+        self._model.u[:] = 0.0
         self._begin(u, y)
 
     def init(self, t: float, u: Vector, y: Vector) -> Estimate:
-        """Start at time t [s] with the first sample: measured speeds, nominal friction."""
+        """Start at time t [s] with the first sample: measured states, nominal quantities."""
         self._t = t
         self.start(u, y)
         settings, memory = self._arguments()
         self._row[:] = np.nan
-        checked(self._law(self._plant, settings, memory, 0.0, u, y, self._row), self.fmu)
-        return _split(self._row.copy())
+        checked(self._law(self._model, settings, memory, 0.0, u, y, self._row), self.fmu)
+        return self._split(self._row.copy())
 
     def step(self, t: float, u: Vector, y: Vector) -> Estimate:
         """Advance to time t [s] with the sample taken there."""
         settings, memory = self._arguments()
         h, self._t = t - self._t, t
         self._row[:] = np.nan
-        checked(self._law(self._plant, settings, memory, h, u, y, self._row), self.fmu)
-        return _split(self._row.copy())
+        checked(self._law(self._model, settings, memory, h, u, y, self._row), self.fmu)
+        return self._split(self._row.copy())
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
         """The same as `init` and `step` over a whole recording, in one compiled loop.
@@ -120,7 +188,7 @@ class Estimator(ABC):
         Parameters
         ----------
         time : (n,) [s].
-        u, y : (n, 2) measured inputs and outputs.
+        u, y : (n, m) and (n, l) measured inputs and outputs.
 
         Raises
         ------
@@ -136,84 +204,137 @@ class Estimator(ABC):
         Parameters
         ----------
         steps : (n,) from the sample before [s].
-        u, y : (n, 2) measured inputs and outputs.
+        u, y : (n, m) and (n, l) measured inputs and outputs.
 
         Raises
         ------
         FMUError
             If the FMU refuses a call.
         """
-        rows = np.full((steps.size, 2 * WIDTH + 1), np.nan)
+        rows = np.full((steps.size, self._row.size), np.nan)
         settings, memory = self._arguments()
         inputs, outputs = np.ascontiguousarray(u), np.ascontiguousarray(y)
-        checked(self._loop(self._plant, settings, memory, steps, inputs, outputs, rows), self.fmu)
-        return _split(rows)
+        checked(self._loop(self._model, settings, memory, steps, inputs, outputs, rows), self.fmu)
+        return self._split(rows)
+
+    def _split(self, rows: Any) -> Estimate:
+        width = self._row.size // 2
+        return Estimate(rows[..., :width], rows[..., width:-1], rows[..., -1])
 
 
-def check_model(fmu: FMU) -> None:
-    """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
+def layout(fmu: FMU, system: System) -> Layout:
+    """Find the signals of a system in its model; the FMU is started anew."""
+    states, unseen = fmu.states, 0
+    seen = []
+    for one in system.outputs:
+        if one.name in states:
+            seen.append(states.index(one.name))
+        else:
+            seen.append(-1 - len(system.reported) - unseen)
+            unseen += 1
+    nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
+    fading, rolling = system.fading, system.rolling
+    pace = np.array(system.slopes(fading.signal)) if fading else np.zeros(len(seen))
+    follower = leader = -1
+    if rolling:
+        follower, leader = (_state(fmu, name) for name in (rolling.follower, rolling.leader))
+    return Layout(
+        seen=np.array(seen, np.intp),
+        nominal=nominal,
+        low=np.array([one.low for one in system.estimated]) - nominal,
+        high=np.array([one.high for one in system.estimated]) - nominal,
+        acts_on=np.array(
+            [_state(fmu, one.acts_on) if one.acts_on else -1 for one in system.estimated], np.intp
+        ),
+        pace=pace,
+        half=fading.half if fading else 0.0,
+        follower=follower,
+        leader=leader,
+        ratio=rolling_ratio(fmu, system) if rolling else 0.0,
+        lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
+        reported=len(system.reported),
+    )
 
-    Raises
-    ------
-    InputError
-        If the model lacks one of MODEL_VARIABLES, has a speed that is no state, a parameter
-        without a value, or a variable in another unit.
+
+def _state(fmu: FMU, name: str) -> int:
+    if name not in fmu.states:
+        raise InputError(
+            where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
+            found="a variable that is no state",
+            expected=f"a continuous state for {name}, because estimators set it",
+            remedy=f"choose it as state in the model, or map another: --map {name}=NAME",
+        )
+    return fmu.states.index(name)
+
+
+def rolling_ratio(fmu: FMU, system: System) -> float:
+    """Follower over leader while the follower rolls along, by the model's own output [1].
+
+    The FMU is started anew.
     """
-    fmu.variables(tuple(MODEL_VARIABLES))
-    for ours, unit in MODEL_VARIABLES.items():
-        theirs = fmu.names.get(ours, ours)
-        where = f"{fmu.path}, variable '{theirs}'"
-        if ours in ("omegaW", "omegaR") and ours not in fmu.states:
-            raise InputError(
-                where=where,
-                found="a variable that is no state",
-                expected=f"a continuous state for {ours}, because estimators set it",
-                remedy=f"choose the speed as state in the model, or map another: --map {ours}=NAME",
-            )
-        if ours in (*FRICTIONS, "rW", "rR", "JR") and ours not in fmu.defaults:
-            raise InputError(
-                where=where,
-                found="no start value",
-                expected=f"a parameter with a value for {ours}",
-                remedy=f"make it a parameter of the model, or map another: --map {ours}=NAME",
-            )
-        declared = fmu.units.get(ours)
-        # Coefficients and inertias are hardly ever in any other unit; spellings of kg.m2 abound.
-        if declared and unit not in ("1", "kg.m2") and si_factor(declared, unit, where) != 1.0:
-            raise InputError(
-                where=where,
-                found=f"unit [{declared}]",
-                expected=f"[{unit}] for {ours}; nothing is converted silently",
-                remedy=f"export the model with this variable in {unit}",
-            )
-
-
-def rolling_ratio(fmu: FMU) -> float:
-    """Speed of a wheelset that rolls over that of the roller [1], by the model's own slip.
-
-    It is rR/rW, unless the radius that acts in the model is another. The FMU is started anew.
-    """
-    slip = fmu.variables(["slip"])
-    fmu.start({"omegaW": 0.0, "omegaR": 0.0})
+    rolling = system.rolling
+    assert rolling is not None
+    zero = fmu.variables([rolling.zero])
+    fmu.start({rolling.follower: 0.0, rolling.leader: 0.0})
     rest = fmu.get_states()
-    slips = []
-    for name in ("omegaR", "omegaW"):
-        turning = rest.copy()
-        turning[fmu.states.index(name)] = 1.0
-        fmu.set_states(turning)
-        slips.append(float(fmu.get(slip)[0]))
+    readings = []
+    for name in (rolling.leader, rolling.follower):
+        moving = rest.copy()
+        moving[_state(fmu, name)] = 1.0
+        fmu.set_states(moving)
+        readings.append(float(fmu.get(zero)[0]))
     fmu.set_states(rest)
-    return -slips[0] / slips[1]
-
-
-def _split(rows: Any) -> Estimate:
-    return Estimate(rows[..., :WIDTH], rows[..., WIDTH : 2 * WIDTH], rows[..., -1])
+    return -readings[0] / readings[1]
 
 
 @inlined
-def fading(speed):  # type: ignore[no-untyped-def]
-    """Share of the feedback at a rolling velocity [m/s]: none at rest, all of it at speed."""
-    return speed * speed / (speed * speed + FADING_SPEED**2)
+def output(model, layout, j):  # type: ignore[no-untyped-def]
+    """Predicted output j at model.x; an output that is no state must have been read."""
+    at = layout.seen[j]
+    return model.x[at] if at >= 0 else model.y[-1 - at]
+
+
+@inlined
+def slope(model, layout, j, row):  # type: ignore[no-untyped-def]
+    """Derivative of output j by state or correction `row`, after `linearise` of all columns."""
+    at = layout.seen[j]
+    if at >= 0:
+        return 1.0 if at == row else 0.0
+    return model.jacobian[row, model.x.size - 1 - at]
+
+
+@inlined
+def all_states(layout):  # type: ignore[no-untyped-def]
+    """Whether every output is a state, so that none need be read from the model."""
+    for at in layout.seen:
+        if at < 0:
+            return False
+    return True
+
+
+@inlined
+def width(model, layout):  # type: ignore[no-untyped-def]
+    """Columns of the Jacobian that a law needs: rates, and outputs that are no states."""
+    return model.x.size if all_states(layout) else model.x.size + model.y.size
+
+
+@inlined
+def fading(layout, y):  # type: ignore[no-untyped-def]
+    """Share of the feedback at measured outputs: none at rest, all of it at speed."""
+    if layout.half == 0.0:
+        return 1.0
+    speed = 0.0
+    for j in range(y.size):
+        speed += layout.pace[j] * y[j]
+    return speed * speed / (speed * speed + layout.half**2)
+
+
+@inlined
+def authority(model, layout, effect, i):  # type: ignore[no-untyped-def]
+    """Share of a correction's feedback: its effect over that at the design point, -1 to 1."""
+    if layout.acts_on[i] < 0:
+        return 1.0
+    return clip(model.jacobian[model.x.size + i, layout.acts_on[i]] / effect[i], -1.0, 1.0)
 
 
 @inlined
@@ -223,48 +344,57 @@ def clip(value, low, high):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slipping(x, wheelset, roller, ratio):  # type: ignore[no-untyped-def]
-    """Speed of a wheelset that rolls minus that of this one [rad/s]; ratio: `rolling_ratio`."""
-    return ratio * x[roller] - x[wheelset]
+def slipping(layout, x):  # type: ignore[no-untyped-def]
+    """Follower that rolls along minus the follower; 0 where nothing rolls."""
+    if layout.follower < 0:
+        return 0.0
+    return layout.ratio * x[layout.leader] - x[layout.follower]
 
 
 @inlined
-def stick(x, wheelset, roller, ratio, radius, before):  # type: ignore[no-untyped-def]
-    """Let the wheelset roll where a step would reverse its slip close to standstill.
+def stick(layout, x, before):  # type: ignore[no-untyped-def]
+    """Let the follower roll where a step would reverse its slip close to standstill.
 
-    Creep is saturated there from 1 mm/s on, and a tangent to the saturated force leads to the other
-    side, and back in the next step.
+    What drives it is saturated there at the least slip, and a tangent to the saturation leads to
+    the other side, and back in the next step.
 
     Parameters
     ----------
     before : `slipping` before the step.
     """
-    if abs(radius * x[roller]) < FADING_SPEED and (
-        before * slipping(x, wheelset, roller, ratio) < 0.0
-    ):
-        x[wheelset] = ratio * x[roller]
+    if layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half:
+        if before * slipping(layout, x) < 0.0:
+            x[layout.follower] = layout.ratio * x[layout.leader]
 
 
 @inlined
-def measure(plant, u):  # type: ignore[no-untyped-def]
-    """Set the measured inputs, u = [pB, tauR]; returns a status."""
-    plant.u[0], plant.u[1] = u[0], u[1]
-    return set_inputs(plant, 0, 2)
+def measure(model, u):  # type: ignore[no-untyped-def]
+    """Set the measured inputs; returns a status."""
+    for j in range(u.size):
+        model.u[j] = u[j]
+    return set_inputs(model, 0, u.size)
 
 
 @inlined
-def correct(plant, dmuWR, dmuDC):  # type: ignore[no-untyped-def]
-    """Set the states plant.x and the friction deviations; returns a status."""
-    plant.u[2], plant.u[3] = dmuWR, dmuDC
-    return set_inputs(plant, 2, 2) or set_states(plant)
+def correct(model, corrections):  # type: ignore[no-untyped-def]
+    """Set the states model.x and the corrections, (q,); returns a status."""
+    first = model.u.size - corrections.size
+    for i in range(corrections.size):
+        model.u[first + i] = corrections[i]
+    return set_inputs(model, first, corrections.size) or set_states(model)
 
 
 @inlined
-def report(plant, order, nominal, row):  # type: ignore[no-untyped-def]
+def report(model, layout, row):  # type: ignore[no-untyped-def]
     """Write the estimate that the FMU is at into a row; returns a status."""
-    status = read(plant)
-    row[0], row[1] = plant.x[order[0]], plant.x[order[1]]
-    row[2], row[3] = plant.u[2], plant.u[3]
-    row[4], row[5] = nominal[0] + plant.u[2], nominal[1] + plant.u[3]
-    row[6], row[7] = plant.y[0], plant.y[1]
+    status = read(model)
+    outputs, q = layout.seen.size, layout.nominal.size
+    first = model.u.size - q
+    for j in range(outputs):
+        row[j] = output(model, layout, j)
+    for i in range(q):
+        row[outputs + i] = model.u[first + i]
+        row[outputs + q + i] = layout.nominal[i] + model.u[first + i]
+    for i in range(layout.reported):
+        row[outputs + 2 * q + i] = model.y[i]
     return status

@@ -1,382 +1,318 @@
 """The disturbance observer of Schwarz, Brembeck, Heckmann (2018), equations (8) to (10).
 
-The states of the minimal model are joined by the friction deviations dmuWR and dmuDC, which decay
-with rates T_WR, T_DC; all four are corrected by L [dy; integral of dy], dy = y - y_hat.
+The states of the model are joined by the deviations of the estimated quantities, which decay with
+rates T; all are corrected by L [dy; integral of dy], dy = y - y_hat.
 
-Two factors of the rows of L are ours, because measured stops coast, reverse and end at standstill:
-authority (a friction is corrected in proportion to the effect it has) and fading (below walking
-pace, measured slip is noise).
+Two factors of the rows of L are ours, because recordings also rest: authority (a quantity is
+corrected in proportion to the effect it has) and fading (where measured outputs are noise).
 
-The paper leaves a physical model of g_D open; `DiscModel` is one for muDC, with textbook values.
+The paper leaves a physical model of g_D open: `target` is where deviations decay to, and a method
+that has such a model moves it.
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_continuous_are
-from scipy.optimize import brentq
+from scipy.linalg import LinAlgError, solve_continuous_are
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import (
-    FRICTION_RANGE,
     Estimator,
-    check_model,
+    Layout,
+    authority,
     clip,
     correct,
     fading,
     measure,
+    output,
     report,
-    rolling_ratio,
     slipping,
+    slope,
     stick,
+    width,
 )
+from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.operating import (
+    Linearised,
+    corrected_states,
+    linearised,
+    loops,
+    walks,
+)
+from workbench.system import System
 
 
-@dataclass(frozen=True)
-class DisturbanceGains:
-    """Gains of the disturbance observer.
-
-    Attributes
-    ----------
-    L : (4, 4) rows omegaW, omegaR, dmuWR, dmuDC; columns dy (2), integral of dy (2).
-        Units: 1/s and 1/s2 for the speeds, 1/rad and 1/(rad.s) for the frictions.
-    T_WR, T_DC : rates at which a friction deviation decays [1/s], negative.
-    effect : (2,) d(der(omegaW))/d(muWR, muDC) [rad/s2] from which on a friction has full authority.
-    """
-
-    L: Matrix
-    T_WR: float
-    T_DC: float
-    effect: Vector
-
-
-class DiscModel(NamedTuple):
-    """Trend of disc-pad friction with speed and disc temperature, T.
-
-    Nominal muDC is multiplied by (1 + slope (1 - v/speed)) (1 - fade (T - temperature)); the discs
-    of an axle are one lump, capacity dT/dt = share * power - cooling (T - ambient). Water on the
-    discs is no part of it. Defaults are the middle of ranges usual for disc brakes with organic
-    pads, identified from no recording: 60 to 110 kg and 460 to 540 J/(kg.K) a disc, a share of
-    0.90 to 0.98, 15 to 30 + (5 to 10) v^0.8 W/(m2.K) on 0.8 to 1.5 m2, slope 0.1 to 0.4, fade up
-    to 1e-3 /K.
+class Settings(NamedTuple):
+    """What the law is given.
 
     Attributes
     ----------
-    slope : change of friction over one reference speed, relative to that at the reference [1].
-    fade : loss per warming [1/K].
-    speed, temperature : of nominal friction: rolling velocity [m/s], disc [degC].
-    capacity : heat capacity of all discs on the axle [J/K].
-    share : of friction power that heats the discs; the pads take the rest [1].
-    cooling : of all discs, at medium speed [W/K].
-    ambient : of the air, and of the discs at the start [degC].
+    layout : see Layout.
+    states : (s,) indices of the corrected states.
+    L : (s + q, 2 l) gains.
+    decay : (q,) rates at which deviations decay [1/s], negative.
+    effect : (q,) d(rate)/d(quantity) from which on a quantity has full authority.
     """
 
-    slope: float = 0.25
-    fade: float = 5e-4
-    speed: float = 22.0
-    temperature: float = 100.0
-    capacity: float = 3 * 85.0 * 500.0
-    share: float = 0.94
-    cooling: float = 3 * 120.0
-    ambient: float = 20.0
-
-
-@dataclass(frozen=True)
-class OperatingPoint:
-    """Where the model is linearised: lightly braked, so that full authority comes early in a stop.
-
-    Attributes
-    ----------
-    speed : rolling velocity [m/s], half of 160 km/h.
-    pressure : brake cylinder pressure [Pa], that of a light service braking.
-    """
-
-    speed: float = 22.0
-    pressure: float = 1.5e5
-
-
-@dataclass(frozen=True)
-class NoiseLevels:
-    """What the stationary Kalman gain trades off.
-
-    Attributes
-    ----------
-    omegaW, omegaR : standard deviation of one sample [rad/s]; that of a pole wheel is 0.03 % +
-        0.002 rad/s, taken at 160 km/h.
-    sample_time : of the recording [s].
-    model : unmodelled acceleration of wheelset and roller, random walk [rad/s / sqrt(s)].
-    muWR, muDC : random walk of the frictions [1/sqrt(s)]: a drying disc or a patch of rail changes
-        them by 0.05 within a second.
-    decay : rate at which a friction deviation is forgotten [1/s]; 50 s outlast a stop.
-    """
-
-    omegaW: float = 0.03
-    omegaR: float = 0.003
-    sample_time: float = 0.005
-    model: float = 0.01
-    muWR: float = 0.05
-    muDC: float = 0.05
-    decay: float = -0.02
-
-
-def stationary_gains(
-    fmu: FMU, point: OperatingPoint | None = None, noise: NoiseLevels | None = None
-) -> DisturbanceGains:
-    """Gains from the linearised model: the stationary Kalman filter of the extended system.
-
-    The model is linearised through the FMU's directional derivatives where the creep force carries
-    the brake torque, extended by the two friction states, and the filter's Riccati equation is
-    solved. The gain on the integral of dy is zero: the friction states are integrators already.
-    Source: D. Simon, Optimal State Estimation, Wiley 2006, section 8.4.
-
-    Parameters
-    ----------
-    fmu : minimal observer model; its state is left at the operating point.
-    """
-    point = point or OperatingPoint()
-    noise = noise or NoiseLevels()
-    corrections = fmu.variables(["dmuWR", "dmuDC"])
-    hold_in_equilibrium(fmu, point)
-    extended = np.zeros((4, 4))
-    order = [fmu.states.index(name) for name in ("omegaW", "omegaR")]
-    extended[:2, :2] = fmu.state_jacobian()[np.ix_(order, order)]
-    extended[:2, 2:] = fmu.input_jacobian(corrections)[order]
-    extended[2, 2] = extended[3, 3] = noise.decay
-    measured = np.eye(2, 4)
-    process = np.array([noise.model, noise.model, noise.muWR, noise.muDC])
-    # White noise of a continuous signal that, sampled, has the given variance.
-    measurement = np.array([noise.omegaW, noise.omegaR]) * np.sqrt(noise.sample_time)
-    # In units of the noise, both noise matrices are the identity and the equation is well scaled.
-    A = extended * process / process[:, None]
-    C = measured * process / measurement[:, None]
-    covariance = solve_continuous_are(A.T, C.T, np.eye(4), np.eye(2))
-    gain = process[:, None] * (covariance @ C.T) / measurement
-    return DisturbanceGains(
-        L=np.hstack([gain, np.zeros((4, 2))]),
-        T_WR=noise.decay,
-        T_DC=noise.decay,
-        effect=extended[0, 2:].copy(),
-    )
-
-
-def hold_in_equilibrium(fmu: FMU, point: OperatingPoint) -> None:
-    """Put the FMU where the creep force carries the brake torque at the given speed.
-
-    Raises
-    ------
-    InputError
-        If estimators cannot work on the FMU.
-    """
-    check_model(fmu)
-    radii = fmu.variables(["rW", "rR"])
-    inputs = fmu.variables(["pB", "tauR", "dmuWR", "dmuDC"])
-    wheelset, roller = fmu.states.index("omegaW"), fmu.states.index("omegaR")
-    # The radius that acts may be another than rW.
-    ratio = rolling_ratio(fmu)
-    rW, rR = fmu.get(radii)
-    fmu.set(inputs, np.array([point.pressure, 0.0, 0.0, 0.0]))
-    x = fmu.get_states()
-    x[roller] = point.speed / rR
-    x[wheelset] = ratio * x[roller]
-    fmu.set_states(x)
-    # States that follow inputs alone, as in a cylinder that fills, are where they settle.
-    A = fmu.state_jacobian()
-    rates = A.diagonal()
-    alone = (rates < 0.0) & (np.count_nonzero(A, axis=1) == 1)
-    x[alone] -= fmu.derivatives()[alone] / rates[alone]
-
-    def acceleration(slip: float) -> float:
-        x[wheelset] = ratio * x[roller] - slip / rW
-        fmu.set_states(x)
-        return float(fmu.derivatives()[wheelset])
-
-    # At this speed the creep force rises up to a slip beyond 0.2 m/s for all contacts.
-    acceleration(float(brentq(acceleration, 0.0, 0.2, xtol=1e-9)))
-
-
-class _Settings(NamedTuple):
-    order: NDArray[np.intp]
-    nominal: Vector
-    low: Vector
-    high: Vector
+    layout: Layout
+    states: NDArray[np.intp]
     L: Matrix
     decay: Vector
     effect: Vector
-    radius: float
-    ratio: float
-    disc: DiscModel
-    inertia: float  # of the wheelset, turns an effect on der(omegaW) into a torque
 
 
-class _Memory(NamedTuple):
-    z: Vector  # omegaW, omegaR, dmuWR, dmuDC
-    integral: Vector  # of dy
-    disc: Vector  # temperature [degC], physical dmuDC [1]
+class Memory(NamedTuple):
+    """What the law remembers.
+
+    Attributes
+    ----------
+    z : (q,) deviations of the estimated quantities; integral : (l,) of dy.
+    target, drift : (q,) what deviations decay to, and by how much it moved in this step.
+    system, change, others, innovation, gain : work space.
+    """
+
+    z: Vector
+    integral: Vector
+    target: Vector
+    drift: Vector
     system: Matrix
     change: Matrix
-    others: Vector  # explicit change of every state of the model; those besides the speeds use it
-
-
-@compiled
-def _trend(disc, nominal, speed, temperature):  # type: ignore[no-untyped-def]
-    """Physical muDC minus nominal."""
-    of_speed = 1.0 + disc.slope * (1.0 - abs(speed) / disc.speed)
-    return nominal * (of_speed * (1.0 - disc.fade * (temperature - disc.temperature)) - 1.0)
+    others: Vector
+    innovation: Vector
 
 
 @inlined
-def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of equation (9); other states each by themselves."""
-    z, integral, order = memory.z, memory.integral, settings.order
-    system, change, disc = memory.system, memory.change, settings.disc
-    n = plant.x.size
-    status = measure(plant, u)
+    layout, states, z = settings.layout, settings.states, memory.z
+    system, change, innovation = memory.system, memory.change, memory.innovation
+    n, s, q, outputs = model.x.size, states.size, z.size, y.size
+    status = measure(model, u)
     if h > 0.0:
-        status = status or evaluate(plant)
-        for i in range(2):
-            change[i, 0] = h * plant.dx[order[i]]
-            change[2 + i, 0] = h * settings.decay[i] * z[2 + i]
+        status = status or evaluate(model)
         for i in range(n):
-            memory.others[i] = h * plant.dx[i]
-        status = status or linearise(plant, n)
-        # The effect of muDC on der(omegaW) is the brake torque per muDC, over the inertia.
-        torque = settings.inertia * plant.jacobian[n + 1, order[0]] * (settings.nominal[1] + z[3])
-        power = disc.share * abs(torque * z[0])
-        memory.disc[0] += (
-            h * (power - disc.cooling * (memory.disc[0] - disc.ambient)) / disc.capacity
-        )
-        trend = memory.disc[1]
-        memory.disc[1] = _trend(disc, settings.nominal[1], settings.radius * z[1], memory.disc[0])
-        # The deviation decays towards the physical friction, which moves on.
-        change[3, 0] += memory.disc[1] - trend - h * settings.decay[1] * memory.disc[1]
-        fade = fading(settings.radius * y[1])
-        for i in range(4):
-            share = fade
-            if i >= 2:
-                # Authority has the sign of the rotation and vanishes without pressure or slip.
-                effect = plant.jacobian[n + i - 2, order[0]] / settings.effect[i - 2]
-                share *= clip(effect, -1.0, 1.0)
-            for j in range(2):
+            memory.others[i] = h * model.dx[i]
+        for i in range(s):
+            change[i, 0] = h * model.dx[states[i]]
+        for i in range(q):
+            decay = settings.decay[i] * (z[i] - memory.target[i])
+            change[s + i, 0] = h * decay + memory.drift[i]
+        for j in range(outputs):
+            innovation[j] = y[j] - output(model, layout, j)
+        status = status or linearise(model, width(model, layout))
+        fade = fading(layout, y)
+        for i in range(s + q):
+            share = fade if i < s else fade * authority(model, layout, settings.effect, i - s)
+            for k in range(s + q):
+                system[i, k] = 0.0
+            for j in range(outputs):
                 # The integral at the end of the step is part of the implicit equation.
-                direct, integrated = share * settings.L[i, j], share * settings.L[i, 2 + j]
+                direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
                 gain = direct + h * integrated
-                change[i, 0] += h * (gain * (y[j] - z[j]) + integrated * integral[j])
-                system[i, j] = h * gain
-                system[i, 2 + j] = 0.0
-                if i < 2:
-                    system[i, j] -= h * plant.jacobian[order[j], order[i]]
-                    system[i, 2 + j] -= h * plant.jacobian[n + j, order[i]]
-            system[i, i] += 1.0 if i < 2 else 1.0 - h * settings.decay[i - 2]
+                change[i, 0] += h * (gain * innovation[j] + integrated * memory.integral[j])
+                for k in range(s):
+                    system[i, k] += h * gain * slope(model, layout, j, states[k])
+                for k in range(q):
+                    system[i, s + k] += h * gain * slope(model, layout, j, n + k)
+            if i < s:
+                for k in range(s):
+                    system[i, k] -= h * model.jacobian[states[k], states[i]]
+                for k in range(q):
+                    system[i, s + k] -= h * model.jacobian[n + k, states[i]]
+            system[i, i] += 1.0 if i < s else 1.0 - h * settings.decay[i - s]
         status = status or solve(system, change)
         if status:
             return status
-        before = slipping(z, 0, 1, settings.ratio)
-        for i in range(2):
-            z[i] += change[i, 0]
-            integral[i] += h * (y[i] - z[i])
-            z[2 + i] = clip(z[2 + i] + change[2 + i, 0], settings.low[i], settings.high[i])
-        stick(z, 0, 1, settings.ratio, settings.radius, before)
+        for j in range(outputs):
+            left = innovation[j]
+            for k in range(s):
+                left -= slope(model, layout, j, states[k]) * change[k, 0]
+            for k in range(q):
+                left -= slope(model, layout, j, n + k) * change[s + k, 0]
+            memory.integral[j] += h * left
+        before = slipping(layout, model.x)
         for i in range(n):
-            if i != order[0] and i != order[1]:
-                plant.x[i] += memory.others[i] / (1.0 - h * plant.jacobian[i, i])
-    plant.x[order[0]], plant.x[order[1]] = z[0], z[1]
-    return status or correct(plant, z[2], z[3]) or report(plant, order, settings.nominal, row)
+            corrected = False
+            for k in range(s):
+                corrected = corrected or states[k] == i
+            if not corrected:
+                model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
+        for i in range(s):
+            model.x[states[i]] += change[i, 0]
+        for i in range(q):
+            z[i] = clip(z[i] + change[s + i, 0], layout.low[i], layout.high[i])
+        stick(layout, model.x, before)
+    return status or correct(model, z) or report(model, layout, row)
 
 
 @compiled
-def _loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = law(model, settings, memory, steps[k], u[k], y[k], rows[k])
         if status:
             return status
     return 0
 
 
 class DisturbanceObserver(Estimator):
-    """Minimal model with friction deviations as states, corrected by measured speeds.
+    """A model with deviations of quantities as states, corrected by measured outputs.
 
-    A row of L that acts on a friction is multiplied by that friction's authority: its effect on
-    der(omegaW) over the effect at the design point, limited to -1..1. It vanishes without brake
-    pressure (muDC) and without slip (muWR), where the paper finds them not observable, and has the
-    sign of the rotation, as a friction force has and a friction coefficient has not.
+    A row of L that acts on a quantity is multiplied by its authority: its effect on the rate of a
+    state over the effect at the design point, limited to -1..1. It vanishes where the quantity has
+    no effect, and has the sign of that effect.
 
-    The step is linearly implicit in speeds and frictions, feedback included, so that any gain keeps
-    a stable step. Other states of the model, such as the temperature of a disc, are not corrected
-    and step each by themselves, implicit in their own value. The deviations are kept within the
-    physical range of the coefficients.
+    The step is linearly implicit in states and quantities, feedback included, so that any gain
+    keeps a stable step. States that an extension adds, such as the temperature of a disc, are not
+    corrected and step each by themselves, implicit in their own value. Quantities are kept within
+    their physical range.
 
     Parameters
     ----------
-    fmu : minimal model, also extended by effects with states of their own.
-    gains : see DisturbanceGains.
-    disc : physical trend of muDC; None for a constant. Needs the parameter JW of the model, the
-        wheelset's inertia [kg.m2].
-
-    Raises
-    ------
-    InputError
-        If the model lacks a variable of an estimator, or JW with a disc.
-
-    Notes
-    -----
-    What the trend is worth, measured with the defaults of DiscModel on the fourteen stops of
-    `cases`, whose pads follow laws of the same form with other numbers: with the gains of
-    `stationary_gains` the mean error of Fx stays 0.21 % dry and falls from 0.58 to 0.51 % with
-    water; in the slowest wet stop it rises from 1.18 to 1.24 %. The error of muDC stays 0.6e-3.
-    With a tenth of the gain on muDC, errors of dry stops are nearly halved: Fx 0.34 to 0.20 %,
-    muDC 0.6e-3 to 0.3e-3.
+    fmu : observer model, also extended by effects with states of their own.
+    gains : L, (s + q, 2 l), rows states and quantities, columns dy and its integral; T, (q,);
+        design: effect, (q,).
     """
 
     name = "disturbance_observer"
-    _law = staticmethod(_law)
+    label = "disturbance observer"
+    rank = 20
+    meaning = (
+        "L: rows states, then corrections of quantities; columns dy, integral of dy. T [1/s]: "
+        "rate at which a deviation decays"
+    )
+    _law = staticmethod(law)
     _loop = staticmethod(_loop)
 
-    def __init__(self, fmu: FMU, gains: DisturbanceGains, disc: DiscModel | None = None) -> None:
-        super().__init__(fmu)
-        if disc is not None:
-            self.name = "disturbance_observer_disc"
-            if "JW" not in fmu.defaults:
-                raise InputError(
-                    where=f"{fmu.path}, {self.name}",
-                    found="no parameter 'JW' with a value",
-                    expected="the inertia of the wheelset, which tells the heat of the discs",
-                    remedy="add JW to the model, or leave this estimator out",
-                )
-        low, high = (FRICTION_RANGE - self._nominal[:, None]).T
-        decay = np.array([gains.T_WR, gains.T_DC])
-        self._settings = _Settings(
-            order=self._order,
-            nominal=self._nominal,
-            low=np.ascontiguousarray(low),
-            high=np.ascontiguousarray(high),
-            L=np.ascontiguousarray(gains.L),
-            decay=decay,
-            effect=np.ascontiguousarray(gains.effect),
-            radius=self._radius,
-            ratio=rolling_ratio(fmu),
-            disc=disc or DiscModel(slope=0.0, fade=0.0),
-            inertia=fmu.defaults["JW"] if disc else 0.0,
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        names = corrected_states(fmu, system)
+        s, q, outputs = len(names), len(system.estimated), len(system.outputs)
+        L = gains.values[:-q].reshape(s + q, 2 * outputs)
+        self._settings = Settings(
+            layout=self._layout,
+            states=np.array([fmu.states.index(name) for name in names], np.intp),
+            L=np.ascontiguousarray(L),
+            decay=np.ascontiguousarray(gains.values[-q:]),
+            effect=np.ascontiguousarray(gains.design["effect"]),
         )
-        self._memory = _Memory(
-            z=np.zeros(4),
-            integral=np.zeros(2),
-            disc=np.zeros(2),
-            system=np.zeros((4, 4)),
-            change=np.zeros((4, 1)),
+        self._memory = Memory(
+            z=np.zeros(q),
+            integral=np.zeros(outputs),
+            target=np.zeros(q),
+            drift=np.zeros(q),
+            system=np.zeros((s + q, s + q)),
+            change=np.zeros((s + q, 1)),
             others=np.zeros(len(fmu.states)),
+            innovation=np.zeros(outputs),
         )
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._memory
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        disc = self._settings.disc
-        trend = _trend(disc, self._nominal[1], self._radius * y[1], disc.ambient)
-        self._memory.disc[:] = [disc.ambient, trend]
-        self._memory.z[:] = [y[0], y[1], 0.0, trend]
-        self._memory.integral[:] = 0.0
-        self._plant.x[:] = self.fmu.get_states()
+        memory = self._memory
+        for values in (memory.z, memory.integral, memory.target, memory.drift):
+            values[:] = 0.0
+        self._model.x[:] = self.fmu.get_states()
+
+    @classmethod
+    def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:
+        """Gains of given matrices; see `DisturbanceObserver`."""
+        names = (*matrix_names("L", *L.shape), *(f"T_{one.name}" for one in system.estimated))
+        return Gains(cls.name, names, np.append(L, T), {"effect": np.asarray(effect)}, source)
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """Gains from the linearised model: the stationary Kalman filter of the extended system.
+
+        The model is extended by the quantities as states, and the filter's Riccati equation is
+        solved for the sensors' noise. The gain on the integral of dy is zero: the quantities are
+        integrators already.
+        Source: D. Simon, Optimal State Estimation, Wiley 2006, section 8.4.
+
+        Raises
+        ------
+        InputError
+            If the outputs do not show a state of the model.
+        """
+        names = corrected_states(fmu, system)
+        model = linearised(fmu, system).of(names)
+        s, q = model.B.shape
+        decay = np.array([-1.0 / one.memory for one in system.estimated])
+        extended = np.block([[model.A, model.B], [np.zeros((q, s)), np.diag(decay)]])
+        of_states = dict(zip(fmu.states, walks(fmu, system), strict=True))
+        process = np.array(
+            [*(of_states[name] for name in names), *(one.walk for one in system.estimated)]
+        )
+        # White noise of a continuous signal that, sampled, has the given variance.
+        noise = np.array([one.noise_at_scale for one in system.outputs])
+        measurement = noise * np.sqrt(system.sample_time)
+        # In units of the noise, both noise matrices are the identity and the equation well scaled.
+        A = extended * process / process[:, None]
+        C = np.hstack([model.C, model.D]) * process / measurement[:, None]
+        try:
+            covariance = solve_continuous_are(A.T, C.T, np.eye(s + q), np.eye(len(C)))
+        except LinAlgError:
+            raise InputError(
+                where=f"{fmu.path}, {cls.name}",
+                found="a state or quantity that the outputs do not show at the design point",
+                expected="a model whose outputs show all that is estimated",
+                remedy="choose another [points.design], or run 'workbench observability'",
+            ) from None
+        gain = process[:, None] * (covariance @ C.T) / measurement
+        L = np.hstack([gain, np.zeros_like(gain)])
+        source = "stationary Kalman gain of the linearised model"
+        return cls.of(L, decay, effects(fmu, system, model), system, source)
+
+    @classmethod
+    def space(
+        cls, fmu: FMU, system: System, gains: Gains, slowest: float, fastest: float
+    ) -> SearchSpace:
+        """Bounds by the loops that gains close; a deviation does not grow by itself."""
+        model = linearised(fmu, system).of(corrected_states(fmu, system))
+        s, q = model.B.shape
+        # A gain of an output on a state: the state's own share in it, or their sizes.
+        sizes = np.abs(model.C) @ model.nominal
+        own = np.abs(model.C).T
+        on_states = np.where(own > 0.0, own, sizes[None, :] / model.nominal[:, None])
+        orders, on_quantities = loops(model)
+        order = np.vstack([np.ones_like(on_states), orders])
+        effect = np.vstack([on_states, on_quantities])
+        orders = np.append(np.hstack([order, order + 1.0]), np.ones(q))
+        found = np.append(np.hstack([effect, effect]), np.ones(q))
+        space = feedback_space(orders, found, slowest, fastest, gains.values)
+        space.upper[-q:] = 0.0  # a deviation that grows by itself is no disturbance model
+        return space.starting_at(gains.values)
+
+    @classmethod
+    def error_dynamics(
+        cls, A: Matrix, B: Matrix, C: Matrix, gains: Gains
+    ) -> tuple[Matrix, Matrix] | None:
+        """Errors of states, estimated quantities, integrals of dy, true quantities."""
+        (s, q), outputs = B.shape, len(C)
+        L = gains.values[:-q].reshape(s + q, 2 * outputs)
+        direct, integrated = L[:, :outputs] @ C, L[:, outputs:]
+        square, tall = np.zeros((q, q)), np.zeros((outputs, q))
+        dynamics = np.block(
+            [
+                [A - direct[:s], -B, -integrated[:s], B],
+                [direct[s:], np.diag(gains.values[-q:]), integrated[s:], square],
+                [C, tall, np.zeros((outputs, outputs)), tall],
+                [np.zeros((q, s)), square, tall.T, square],
+            ]
+        )
+        error = np.hstack([np.zeros((q, s)), -np.eye(q), tall.T, np.eye(q)])
+        return dynamics, error
+
+
+def effects(fmu: FMU, system: System, model: Linearised) -> Vector:
+    """Effect of each quantity on the rate that shows it, at the design point, (q,)."""
+    return np.array(
+        [
+            model.B[model.states.index(one.acts_on), i] if one.acts_on else 1.0
+            for i, one in enumerate(system.estimated)
+        ]
+    )

@@ -1,198 +1,219 @@
 """The parameter estimator of Schwarz, Brembeck, Heckmann (2018), equation (7).
 
-The frictions of the model follow the measured speeds directly, (dmuWR, dmuDC) = L [dy; integral of
+The estimated quantities of the model follow the measured outputs directly, dmu = L [dy; integral of
 dy]: a PI controller that drives the model onto the measurement. The states are left alone.
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, linearise, solve
 from workbench.observers.contract import (
-    FRICTION_RANGE,
     Estimator,
+    Layout,
+    authority,
     clip,
     correct,
     fading,
     measure,
+    output,
     report,
+    slope,
+    width,
 )
-from workbench.observers.disturbance import OperatingPoint, hold_in_equilibrium
+from workbench.observers.disturbance import effects
+from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.operating import linearised, loops
+from workbench.system import System
 
-
-@dataclass(frozen=True)
-class ParameterGains:
-    """Gains of the parameter estimator.
-
-    Attributes
-    ----------
-    L : (2, 4) rows dmuWR, dmuDC; columns dy (2) [1/rad s], integral of dy (2) [1/rad].
-    effect : (2,) d(der(omegaW))/d(muWR, muDC) [rad/s2] from which on a friction has full authority.
-    """
-
-    L: Matrix
-    effect: Vector
-
-
-def pole_placed_gains(
-    fmu: FMU,
-    point: OperatingPoint | None = None,
-    bandwidth: float = 15.0,
-    damping: float = 0.7,
-    slip_bandwidth: float = 2.0,
-) -> ParameterGains:
-    """Gains from the linearised model, by its two time scales.
-
-    The eigenvalues of the model are far apart: slip settles within milliseconds, the common speed
-    of wheelset and roller only integrates. Along the slow eigenvector dmuDC acts as a torque on
-    that speed, so a PI controller from its deviation places two poles. dmuWR shifts the slip that
-    belongs to a force; an integral controller from the deviation of slip follows it.
-
-    Parameters
-    ----------
-    fmu : full or minimal observer model; its state is left at the operating point.
-    bandwidth, damping : of the pair of poles of dmuDC [rad/s], [1].
-    slip_bandwidth : of the pole of dmuWR [rad/s].
-    """
-    hold_in_equilibrium(fmu, point or OperatingPoint())
-    order = [fmu.states.index(name) for name in ("omegaW", "omegaR")]
-    A = fmu.state_jacobian()[np.ix_(order, order)]
-    B = fmu.input_jacobian(fmu.variables(["dmuWR", "dmuDC"]))[order]
-    rates, left = np.linalg.eig(A.T)
-    slow, fast = left[:, np.argmax(rates.real)].real, left[:, np.argmin(rates.real)].real
-    rolling = np.array([fmu.defaults["rR"] / fmu.defaults["rW"], 1.0])
-    effect_on_speed = float(slow @ B[:, 1] / (slow @ rolling))
-    shift_of_slip = -float(fast @ B[:, 0] / rates.real.min())
-    L = np.zeros((2, 4))
-    L[0, 2:] = slip_bandwidth / shift_of_slip * fast
-    L[1, 1] = 2 * damping * bandwidth / effect_on_speed
-    L[1, 3] = bandwidth**2 / effect_on_speed
-    return ParameterGains(L, B[0].copy())
+_SLOWEST = 2.0**-40  # of the fastest integral action, at which a design is given up
 
 
 class _Settings(NamedTuple):
-    order: NDArray[np.intp]
-    nominal: Vector
-    low: Vector
-    high: Vector
+    layout: Layout
     L: Matrix
     effect: Vector
-    radius: float
 
 
 class _Memory(NamedTuple):
-    integral: Vector  # of the gains times dy: the slow part of dmuWR, dmuDC
-    gains: Matrix  # (2, 4) with authority
-    friction: Vector
+    integral: Vector  # of the gains times dy: the slow part of the corrections
+    gains: Matrix  # (q, 2 l) with authority
+    z: Vector  # corrections
     system: Matrix
     change: Matrix
+    innovation: Vector
 
 
 @compiled
-def _law(plant, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of model and PI controller together."""
-    order, integral, gains = settings.order, memory.integral, memory.gains
-    friction, system, change = memory.friction, memory.system, memory.change
-    n = plant.x.size
-    status = measure(plant, u)
+    layout, integral, gains = settings.layout, memory.integral, memory.gains
+    z, system, change, innovation = memory.z, memory.system, memory.change, memory.innovation
+    n, q, outputs = model.x.size, z.size, y.size
+    status = measure(model, u)
     if h > 0.0:
-        status = status or evaluate(plant)
+        status = status or evaluate(model)
         for i in range(n):
-            change[i, 0] = h * plant.dx[i]
-        status = status or linearise(plant, n)
-        fade = fading(settings.radius * y[1])
-        for i in range(2):
-            # Authority has the sign of the rotation and vanishes without pressure or slip.
-            effect = plant.jacobian[n + i, order[0]] / settings.effect[i]
-            share = fade * clip(effect, -1.0, 1.0)
-            for j in range(4):
+            change[i, 0] = h * model.dx[i]
+        for j in range(outputs):
+            innovation[j] = y[j] - output(model, layout, j)
+        status = status or linearise(model, width(model, layout))
+        fade = fading(layout, y)
+        for i in range(q):
+            share = fade * authority(model, layout, settings.effect, i)
+            for j in range(2 * outputs):
                 gains[i, j] = share * settings.L[i, j]
         for i in range(n):
             for j in range(n):
-                system[i, j] = -h * plant.jacobian[j, i]
+                system[i, j] = -h * model.jacobian[j, i]
             system[i, i] += 1.0
         # The controller at the end of the step is part of the implicit equation.
-        for k in range(2):
-            wanted = integral[k] - friction[k]
-            for j in range(2):
-                gain = gains[k, j] + h * gains[k, 2 + j]
-                wanted += gain * (y[j] - plant.x[order[j]])
+        for k in range(q):
+            wanted = integral[k] - z[k]
+            for j in range(outputs):
+                gain = gains[k, j] + h * gains[k, outputs + j]
+                wanted += gain * innovation[j]
                 for i in range(n):
-                    system[i, order[j]] += h * plant.jacobian[n + k, i] * gain
+                    effect = h * model.jacobian[n + k, i] * gain
+                    for a in range(n):
+                        system[i, a] += effect * slope(model, layout, j, a)
             for i in range(n):
-                change[i, 0] += h * plant.jacobian[n + k, i] * wanted
+                change[i, 0] += h * model.jacobian[n + k, i] * wanted
         status = status or solve(system, change)
         if status:
             return status
         for i in range(n):
-            plant.x[i] += change[i, 0]
-        for k in range(2):
+            model.x[i] += change[i, 0]
+        for j in range(outputs):
+            for a in range(n):
+                innovation[j] -= slope(model, layout, j, a) * change[a, 0]
+        for k in range(q):
             direct = 0.0
-            for j in range(2):
-                innovation = y[j] - plant.x[order[j]]
-                integral[k] += h * gains[k, 2 + j] * innovation
-                direct += gains[k, j] * innovation
-            integral[k] = clip(integral[k], settings.low[k], settings.high[k])
-            friction[k] = clip(integral[k] + direct, settings.low[k], settings.high[k])
-        status = correct(plant, friction[0], friction[1])
-    return status or report(plant, order, settings.nominal, row)
+            for j in range(outputs):
+                integral[k] += h * gains[k, outputs + j] * innovation[j]
+                direct += gains[k, j] * innovation[j]
+            integral[k] = clip(integral[k], layout.low[k], layout.high[k])
+            z[k] = clip(integral[k] + direct, layout.low[k], layout.high[k])
+        status = correct(model, z)
+    return status or report(model, layout, row)
 
 
 @compiled
-def _loop(plant, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(plant, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
         if status:
             return status
     return 0
 
 
 class ParameterEstimator(Estimator):
-    """Full or minimal model whose frictions are set by a PI controller from measured speeds.
+    """A model whose estimated quantities are set by a PI controller from measured outputs.
 
-    As in the disturbance observer, a friction is corrected in proportion to its authority, feedback
-    fades out towards standstill, and frictions stay within their physical range; the integral stops
-    at the same limits, so that it does not wind up.
+    As in the disturbance observer, a quantity is corrected in proportion to its authority, feedback
+    fades, and quantities stay within their physical range; the integral stops at the same limits,
+    so that it does not wind up.
 
     Parameters
     ----------
-    fmu : any model with the inputs and outputs of an estimator.
-    gains : see ParameterGains.
+    fmu : any model with the inputs and outputs of the system.
+    gains : L, (q, 2 l), rows corrections of quantities, columns dy and its integral; design:
+        effect, (q,).
     """
 
     name = "parameter_estimator"
+    label = "parameter estimator"
+    role = "full"
+    rank = 30
+    meaning = "L: rows corrections of quantities; columns dy, integral of dy"
     _law = staticmethod(_law)
     _loop = staticmethod(_loop)
 
-    def __init__(self, fmu: FMU, gains: ParameterGains) -> None:
-        super().__init__(fmu)
-        n = len(fmu.states)
-        low, high = (FRICTION_RANGE - self._nominal[:, None]).T
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        n, q, outputs = len(fmu.states), len(system.estimated), len(system.outputs)
         self._settings = _Settings(
-            order=self._order,
-            nominal=self._nominal,
-            low=np.ascontiguousarray(low),
-            high=np.ascontiguousarray(high),
-            L=np.ascontiguousarray(gains.L),
-            effect=np.ascontiguousarray(gains.effect),
-            radius=self._radius,
+            layout=self._layout,
+            L=np.ascontiguousarray(gains.values.reshape(q, 2 * outputs)),
+            effect=np.ascontiguousarray(gains.design["effect"]),
         )
         self._memory = _Memory(
-            integral=np.zeros(2),
-            gains=np.zeros((2, 4)),
-            friction=np.zeros(2),
+            integral=np.zeros(q),
+            gains=np.zeros((q, 2 * outputs)),
+            z=np.zeros(q),
             system=np.zeros((n, n)),
             change=np.zeros((n, 1)),
+            innovation=np.zeros(outputs),
         )
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._memory
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        self._plant.x[:] = self.fmu.get_states()
+        self._model.x[:] = self.fmu.get_states()
         self._memory.integral[:] = 0.0
-        self._memory.friction[:] = 0.0
+        self._memory.z[:] = 0.0
+
+    @classmethod
+    def of(cls, L: Matrix, effect: Vector, source: str = "") -> Gains:
+        """Gains of given matrices; see `ParameterEstimator`."""
+        names = matrix_names("L", *L.shape)
+        return Gains(cls.name, names, L.ravel(), {"effect": np.asarray(effect)}, source)
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """Integral action as fast as the linearised model bears.
+
+        It is decoupled at its own frequency w by the inverse of the model's response there,
+        L = w G(iw)^+, and slowed down from the rate of the samples until the loop is stable: slow
+        enough it always is where a model is. Source: E. J. Davison (1976), IEEE Trans. Autom.
+        Control 21, 35-47.
+        """
+        model = linearised(fmu, system)
+        (n, q), outputs = model.B.shape, len(model.C)
+        noise = np.array([one.noise_at_scale for one in system.outputs])
+        effect = effects(fmu, system, model)
+        fastest = 0.1 * np.pi / system.sample_time
+        speed, L = fastest, np.zeros((q, 2 * outputs))
+        slack = 1e-9 * np.abs(model.A).max()
+        bearable = max(0.0, float(np.linalg.eigvals(model.A).real.max())) + slack
+        while speed > _SLOWEST * fastest:
+            response = model.C @ np.linalg.solve(1j * speed * np.eye(n) - model.A, model.B)
+            scaled = (response + model.D) / noise[:, None]
+            # The part in phase serves a model that settles, the other one that integrates.
+            inverse = np.linalg.pinv(scaled, rcond=0.01) / noise
+            L = np.hstack([-speed * inverse.imag, speed * inverse.real])
+            dynamics = cls.error_dynamics(model.A, model.B, model.C, cls.of(L, effect))
+            assert dynamics is not None
+            kept = dynamics[0][: n + outputs, : n + outputs]
+            if np.linalg.eigvals(kept).real.max() <= bearable:
+                break
+            speed *= 0.5
+        return cls.of(0.5 * L, effect, "integral action that the linearised model bears")
+
+    @classmethod
+    def space(
+        cls, fmu: FMU, system: System, gains: Gains, slowest: float, fastest: float
+    ) -> SearchSpace:
+        """Bounds by the loops that gains close."""
+        orders, effect = loops(linearised(fmu, system))
+        orders = np.hstack([orders - 1.0, orders])
+        found = np.hstack([effect, effect])
+        return feedback_space(orders, found, slowest, fastest, gains.values)
+
+    @classmethod
+    def error_dynamics(
+        cls, A: Matrix, B: Matrix, C: Matrix, gains: Gains
+    ) -> tuple[Matrix, Matrix] | None:
+        """Errors of states, integrals of dy, true quantities; the estimate is L [dy, integral]."""
+        (n, q), outputs = B.shape, len(C)
+        L = gains.values.reshape(q, 2 * outputs)
+        estimate = np.hstack([L[:, :outputs] @ C, L[:, outputs:], np.zeros((q, q))])
+        truth = np.hstack([np.zeros((q, n + outputs)), np.eye(q)])
+        dynamics = np.zeros((n + outputs + q,) * 2)
+        dynamics[:n, :n] = A
+        dynamics[:n] += B @ (truth - estimate)
+        dynamics[n : n + outputs, :n] = C
+        return dynamics, truth - estimate

@@ -1,0 +1,136 @@
+"""Arithmetic in a system file: signals made of measured ones and of a model's parameters."""
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from workbench.errors import InputError
+
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": np.abs,
+    "max": np.maximum,
+    "min": np.minimum,
+    "sqrt": np.sqrt,
+    "sign": np.sign,
+}
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula over names, which may have dots; its values are floats or arrays of one shape.
+
+    Parameters
+    ----------
+    text : numbers, names, + - * / **, brackets, abs, max, min, sqrt, sign.
+    where : place for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If the text is anything else.
+
+    Examples
+    --------
+    >>> slip = Expression("rR*omegaR - rW*omegaW", "system.toml")
+    >>> slip({"rR": 0.7, "omegaR": 10.0, "rW": 0.5, "omegaW": 13.0})
+    0.5
+    >>> sorted(slip.names)
+    ['omegaR', 'omegaW', 'rR', 'rW']
+    """
+
+    text: str
+    where: str
+
+    def __post_init__(self) -> None:
+        self.names  # noqa: B018  read once, so that a mistake shows where it stands
+
+    @property
+    def _tree(self) -> ast.expr:
+        try:
+            return ast.parse(self.text, mode="eval").body
+        except (SyntaxError, ValueError):
+            raise self._wrong(self.text) from None
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names of what the formula is made of."""
+        found: set[str] = set()
+        self._walk(self._tree, lambda name: found.add(name) or 1.0)
+        return frozenset(found)
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        """Value where names have `values`, a float or an array."""
+        return self._walk(self._tree, values.__getitem__)
+
+    def slopes(self, names: tuple[str, ...], values: Mapping[str, float]) -> tuple[float, ...]:
+        """Coefficients of some of the names, in which the formula must be linear and homogeneous.
+
+        Parameters
+        ----------
+        values : of the other names.
+
+        Raises
+        ------
+        InputError
+            If it is not.
+        """
+        count = len(names)
+        points = np.vstack([np.eye(count), np.arange(2.0, 2.0 + count), np.zeros(count)])
+        others = {name: values[name] for name in self.names if name not in names}
+        found = np.array(
+            [float(self({**others, **dict(zip(names, p, strict=True))})) for p in points]
+        )
+        slopes = found[:count]
+        if not np.allclose(found, points @ slopes):
+            raise InputError(
+                where=self.where,
+                found=f"'{self.text}'",
+                expected=f"a sum of {', '.join(names)}, each times a constant",
+                remedy="correct the formula",
+            )
+        return tuple(float(value) for value in slopes)
+
+    def _walk(self, node: ast.AST, value_of: Callable[[str], Any]) -> Any:
+        match node:
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                return number
+            case ast.Name() | ast.Attribute():
+                return value_of(self._name(node))
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](self._walk(operand, value_of))
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                sides = (self._walk(left, value_of), self._walk(right, value_of))
+                return _OPERATORS[type(op)](*sides)
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
+                return _FUNCTIONS[name](*(self._walk(arg, value_of) for arg in args))
+        raise self._wrong(ast.unparse(node))
+
+    def _name(self, node: ast.AST) -> str:
+        match node:
+            case ast.Name(id=name):
+                return name
+            case ast.Attribute(value=value, attr=name):
+                return f"{self._name(value)}.{name}"
+        raise self._wrong(ast.unparse(node))
+
+    def _wrong(self, part: str) -> InputError:
+        return InputError(
+            where=self.where,
+            found=f"'{part}'",
+            expected=f"numbers, names, + - * / **, brackets, {', '.join(_FUNCTIONS)}",
+            remedy="correct the formula",
+        )

@@ -1,0 +1,71 @@
+"""What an observer must beat: the nominal model alone."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.kernel import compiled, evaluate, inlined, linearise, set_states, solve
+from workbench.observers.contract import Estimator, Layout, measure, report
+from workbench.observers.gains import Gains
+from workbench.system import System
+
+
+class _Memory(NamedTuple):
+    system: Matrix
+    change: Matrix
+
+
+@inlined
+def _law(model, layout, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """One linearly implicit Euler step of the model; y is not used."""
+    system, change = memory.system, memory.change
+    n = model.x.size
+    status = measure(model, u)
+    if h > 0.0:
+        status = status or evaluate(model)
+        for i in range(n):
+            change[i, 0] = h * model.dx[i]
+        status = status or linearise(model, n)
+        for i in range(n):
+            for j in range(n):
+                system[i, j] = -h * model.jacobian[j, i]
+            system[i, i] += 1.0
+        status = status or solve(system, change)
+        if status:
+            return status
+        for i in range(n):
+            model.x[i] += change[i, 0]
+        status = set_states(model)
+    return status or report(model, layout, row)
+
+
+@compiled
+def _loop(model, layout, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = _law(model, layout, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class OpenLoop(Estimator):
+    """The nominal model, driven by measured inputs, without feedback."""
+
+    name = "open_loop"
+    label = "open loop"
+    rank = 0
+    tunable = False
+    _law = staticmethod(_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        n = len(fmu.states)
+        self._memory = _Memory(np.zeros((n, n)), np.zeros((n, 1)))
+
+    def _arguments(self) -> tuple[Layout, Any]:
+        return self._layout, self._memory
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        self._model.x[:] = self.fmu.get_states()

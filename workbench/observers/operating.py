@@ -1,0 +1,139 @@
+"""Where models are linearised, and what gains follow from there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.observers.contract import layout
+from workbench.system import OperatingPoint, System
+
+_STEPS = 400  # of implicit Euler, which takes any model to rest
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A model about an operating point.
+
+    Attributes
+    ----------
+    states : names, (n,).
+    A, B, C, D : by states (n), corrections (q) and outputs (l): dx/dt = A x + B c, y = C x + D c.
+    nominal : (n,) typical size of the states.
+    """
+
+    states: tuple[str, ...]
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    nominal: Vector
+
+    def of(self, states: tuple[str, ...]) -> "Linearised":
+        """The same for some of the states, the others held."""
+        at = [self.states.index(name) for name in states]
+        A, B, C = self.A[np.ix_(at, at)], self.B[at], self.C[:, at]
+        return Linearised(states, A, B, C, self.D, self.nominal[at])
+
+
+def settle(fmu: FMU, system: System, point: OperatingPoint) -> tuple[Vector, Vector]:
+    """Hold some states and inputs until the others rest; the FMU is left there.
+
+    Linearly implicit Euler over `system.settles`, in which what is slower hardly moves.
+
+    Returns
+    -------
+    x : (n,) states.
+    u : (m + q,) measured inputs and corrections.
+    """
+    rolling, names = system.rolling, [one.name for one in system.inputs]
+    places = layout(fmu, system)
+    held = {name: float(formula(fmu.defaults)) for name, formula in point.held.items()}
+    fmu.start(held)
+    if rolling is not None and rolling.leader in held and rolling.follower not in held:
+        fmu.start({**held, rolling.follower: places.ratio * held[rolling.leader]})
+    offsets = [
+        point.quantities.get(one.name, fmu.defaults[one.name]) - fmu.defaults[one.name]
+        for one in system.estimated
+    ]
+    u = np.array([*(point.inputs.get(name, 0.0) for name in names), *offsets])
+    fmu.set(fmu.variables([*names, *system.corrections]), u)
+    x = fmu.get_states()
+    free = [i for i, name in enumerate(fmu.states) if name not in held]
+    h = system.settles / _STEPS
+    for _ in range(_STEPS if free else 0):
+        A = fmu.state_jacobian()[np.ix_(free, free)]
+        x[free] += np.linalg.solve(np.eye(len(free)) / h - A, fmu.derivatives()[free])
+        fmu.set_states(x)
+    return x, u
+
+
+def linearised(fmu: FMU, system: System) -> Linearised:
+    """A model linearised at the design point; the FMU is left there."""
+    settle(fmu, system, system.design)
+    names = [one.name for one in system.outputs]
+    # A state is an output by itself; not every FMU differentiates it.
+    unseen = [name for name in names if name not in fmu.states]
+    found = fmu.linearise(fmu.variables(system.corrections), fmu.variables(unseen))
+    C, D = np.zeros((len(names), len(fmu.states))), np.zeros((len(names), found.B.shape[1]))
+    for j, name in enumerate(names):
+        if name in fmu.states:
+            C[j, fmu.states.index(name)] = 1.0
+        else:
+            C[j], D[j] = found.C[unseen.index(name)], found.D[unseen.index(name)]
+    nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
+    return Linearised(
+        fmu.states,
+        found.A,
+        found.B,
+        C,
+        D,
+        np.array([nominal[name] for name in fmu.states]),
+    )
+
+
+def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
+    """States that observers correct: those of the system's own observer model.
+
+    States that an extension adds, such as the temperature of a disc, follow from the model alone.
+    """
+    return tuple(name for name in fmu.states if name in system.states) or fmu.states
+
+
+def walks(fmu: FMU, system: System) -> Vector:
+    """Random walk of the states, (n,) [unit/sqrt(s)]: declared, or a small share of their size.
+
+    2e-4 of a nominal value in a second is what a good model of a machine leaves out.
+    """
+    nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
+    return np.array([system.walks.get(name, 2e-4 * nominal[name]) for name in fmu.states])
+
+
+def loops(model: Linearised) -> tuple[Matrix, Matrix]:
+    """Order of the loop that each gain closes from an output to a quantity's rate, and its effect.
+
+    Directly, or through the slowest mode of the model, whichever is larger.
+
+    Returns
+    -------
+    orders, effects : (q, l); w^order = effect * gain.
+    """
+    values, right = np.linalg.eig(model.A)
+    rates, left = np.linalg.eig(model.A.T)
+    v = right[:, np.argmax(values.real)].real
+    w = left[:, np.argmax(rates.real)].real
+    common = np.outer(v, w @ model.B) / (w @ v) if abs(w @ v) > 0.0 else np.zeros_like(model.B)
+    q, outputs = model.B.shape[1], len(model.C)
+    orders, effects = np.full((q, outputs), np.nan), np.full((q, outputs), np.nan)
+    chain = np.maximum(np.abs(model.B), np.abs(common))
+    for order in range(2, 2 + len(model.A)):
+        reach = np.abs(model.C) @ np.abs(chain)
+        found = (reach.T > 0.0) & np.isnan(orders)
+        orders[found], effects[found] = order, reach.T[found]
+        chain = model.A @ chain
+    direct = np.abs(model.D.T) > 0.0
+    orders[direct], effects[direct] = 1.0, np.abs(model.D.T)[direct]
+    known = np.isfinite(effects)
+    # An output that a quantity never reaches: any gain on it is as good as none.
+    fallback = effects[known].max() if known.any() else 1.0
+    return np.where(known, orders, 2.0), np.where(known, effects, fallback)

@@ -1,0 +1,64 @@
+"""Systems by name or file, and their models."""
+
+from functools import cache
+from pathlib import Path
+
+from workbench.errors import InputError, closest
+from workbench.fmu import FMU
+from workbench.system import OBSERVER, System
+from workbench.system_file import read_system
+from workbench.tables import read_table
+
+_LIBRARIES = Path(__file__).resolve().parents[1] / "modelica"
+FILE = "system.toml"
+
+
+@cache
+def installed() -> dict[str, Path]:
+    """System files that come with the workbench, by name."""
+    found = {}
+    for path in sorted(_LIBRARIES.glob(f"*/{FILE}")):
+        table = read_table(path, "install the workbench again", 'title = "..."')
+        found[table.text("name", path.parent.name)] = path
+    return found
+
+
+def load_system(which: str | Path) -> System:
+    """Read a system by its name, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is none of this name, or its file has a mistake.
+    """
+    known, path = installed(), Path(which)
+    if str(which) in known:
+        return read_system(known[str(which)])
+    if path.is_dir():
+        path /= FILE
+    if not path.is_file():
+        raise InputError(
+            where=f"system '{which}'",
+            found=f"no such file, and no system of this name{closest(str(which), known)}",
+            expected=f"a system file, or one of {', '.join(known)}",
+            remedy="correct the name or path; 'workbench systems' lists what is installed",
+        )
+    return read_system(path)
+
+
+def open_model(system: System, role: str = OBSERVER) -> FMU:
+    """Open the model of a role, with the parameters of this machine that it has.
+
+    Raises
+    ------
+    InputError
+        If its file is no FMU.
+    """
+    path = system.model(role).path
+    assert path is not None
+    fmu = FMU(path, system.names)
+    given = {name: value for name, value in system.given.items() if name in fmu.parameters}
+    if given:
+        fmu.close()
+        fmu = FMU(path, system.names, given)
+    return fmu

@@ -1,0 +1,161 @@
+"""Tables of TOML files as users write them: each entry is of its kind, and nothing is unknown."""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from workbench.errors import InputError, closest
+from workbench.recording import read_text
+from workbench.units import quantity
+
+_T = TypeVar("_T")
+_KINDS = {str: "a text", int: "a whole number", dict: "a table", list: "a list", bool: "true or false"}
+
+
+class Table:
+    """One table of a file; what is taken from it is checked, and what is left is refused.
+
+    Parameters
+    ----------
+    content : as TOML has it.
+    where : file and name of the table, for the message of an error.
+    """
+
+    def __init__(self, content: Mapping[str, Any], where: str) -> None:
+        self.content = content
+        self.where = where
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.content
+
+    def take(self, key: str, kind: type[_T]) -> _T:
+        """An entry that must be there, of this very type and no empty text.
+
+        Raises
+        ------
+        InputError
+            If it is missing, or another type.
+        """
+        if key not in self.content:
+            raise InputError(
+                where=self.where,
+                found=f"no '{key}'{closest(key, self.content)}",
+                expected=f"{_KINDS[kind]} '{key}'",
+                remedy=f"add '{key}'",
+            )
+        value = self.content[key]
+        if type(value) is not kind or value == "":  # `type`, because true is an int
+            raise self.wrong(key, _KINDS[kind])
+        return value
+
+    def text(self, key: str, default: str) -> str:
+        """A text, or the default where there is none."""
+        return self.take(key, str) if key in self.content else default
+
+    def table(self, key: str) -> "Table":
+        """A table within; empty where there is none."""
+        content = self.take(key, dict) if key in self.content else {}
+        return Table(content, f"{self.where} {key}" if "[" in self.where else f"{self.where}, [{key}]")
+
+    def tables(self, key: str) -> list["Table"]:
+        """A list of tables within."""
+        items = self.take(key, list) if key in self.content else []
+        if not all(isinstance(item, dict) for item in items):
+            raise self.wrong(key, "a list of tables")
+        return [Table(item, f"{self.where}, [[{key}]] {i + 1}") for i, item in enumerate(items)]
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """A list of texts; empty where there is none."""
+        items = self.take(key, list) if key in self.content else []
+        if not all(isinstance(item, str) and item for item in items):
+            raise self.wrong(key, "a list of texts")
+        return tuple(items)
+
+    def number(self, key: str, unit: str, default: float | None = None) -> float:
+        """A quantity such as "4.2 bar" in SI `unit`; a plain number where the unit is 1.
+
+        Raises
+        ------
+        InputError
+            If it is missing without a default, no number, or of another dimension.
+        """
+        if key not in self.content and default is not None:
+            return default
+        return self._quantity(key, self.content.get(key), unit)
+
+    def numbers(self, key: str, unit: str, count: int) -> tuple[float, ...]:
+        """A list of quantities; see `number`."""
+        items = self.take(key, list)
+        if len(items) != count:
+            raise self.wrong(key, f"{count} numbers")
+        return tuple(self._quantity(key, item, unit) for item in items)
+
+    def _quantity(self, key: str, value: object, unit: str) -> float:
+        if isinstance(value, str):
+            return quantity(value, unit, f"{self.where} {key}")
+        if value is None:
+            raise InputError(
+                where=self.where,
+                found=f"no '{key}'{closest(key, self.content)}",
+                expected=f"a number '{key}' in [{unit}]",
+                remedy=f"add '{key}'",
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.wrong(key, f"a number in [{unit}]")
+        if unit != "1":
+            raise self.wrong(key, f"a text with a unit, such as '{value} {unit}'")
+        return float(value)
+
+    def wrong(self, key: str, expected: str, remedy: str = "correct the value") -> InputError:
+        """The error of an entry that is not as expected."""
+        found = repr(self.content.get(key))
+        return InputError(
+            where=f"{self.where} {key}", found=found, expected=expected, remedy=remedy
+        )
+
+    def refuse_unknown(self, keys: Iterable[str]) -> None:
+        """Refuse what nobody reads, which is a mistake in writing.
+
+        Raises
+        ------
+        InputError
+            If the table has another key.
+        """
+        known = tuple(keys)
+        for key in self.content:
+            if key not in known:
+                raise InputError(
+                    where=self.where,
+                    found=f"unknown key '{key}'{closest(key, known)}",
+                    expected=f"only {', '.join(known)}",
+                    remedy="correct or remove the key",
+                )
+
+
+def read_table(path: Path, remedy: str, example: str) -> Table:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    remedy : what to do if it cannot be read.
+    example : of its lines, for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is no TOML.
+    """
+    text = read_text(path, remedy)
+    try:
+        return Table(tomllib.loads(text), str(path))
+    except ValueError as error:  # TOMLDecodeError, or a number too long to convert
+        place = re.search(r"line (\d+)", str(error))
+        line = int(place[1]) if place else text.count("\n") + 1
+        raise InputError(
+            where=f"{path}, line {line}",
+            found=f"text that is no TOML ({error})",
+            expected=f"lines such as {example}",
+            remedy="correct the line",
+        ) from None

@@ -1,0 +1,1 @@
+"""Estimators that know the wheelset and its rig."""
