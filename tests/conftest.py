@@ -15,6 +15,8 @@ import pytest
 
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
+from workbench.system import System
+from workbench.systems import load_system
 from workbench.objective import Weights
 from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
@@ -46,6 +48,11 @@ def reference_path() -> Path:
     return ROOT / "fmus" / "fmi2" / "Reference.fmu"
 
 
+@pytest.fixture(scope="session")
+def system() -> System:
+    return load_system("wheelset")
+
+
 @pytest.fixture
 def minimal(minimal_path: Path) -> Iterator[FMU]:
     with FMU(minimal_path) as fmu:
@@ -53,8 +60,8 @@ def minimal(minimal_path: Path) -> Iterator[FMU]:
 
 
 @pytest.fixture(scope="session")
-def dry_case() -> Case:
-    return read_case(ROOT / "cases" / "03_dry_120_3.6")
+def dry_case(system: System) -> Case:
+    return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
 
 
 # --- tuning ---

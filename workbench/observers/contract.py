@@ -295,12 +295,33 @@ def output(model, layout, j):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slope(model, layout, j, row):  # type: ignore[no-untyped-def]
-    """Derivative of output j by state or correction `row`, after `linearise` of all columns."""
+def add_slope(model, layout, j, factor, places, row):  # type: ignore[no-untyped-def]
+    """Add a multiple of output j's derivatives to a row, after `linearise` of all columns.
+
+    Parameters
+    ----------
+    places : (n + q,) where in the row a state or correction stands, -1: nowhere.
+    """
     at = layout.seen[j]
     if at >= 0:
-        return 1.0 if at == row else 0.0
-    return model.jacobian[row, model.x.size - 1 - at]
+        row[places[at]] += factor
+    else:
+        for k in range(places.size):
+            if places[k] >= 0:
+                row[places[k]] += factor * model.jacobian[k, model.x.size - 1 - at]
+
+
+@inlined
+def explained(model, layout, j, places, change):  # type: ignore[no-untyped-def]
+    """Change of output j, to first order, by changes of unknowns, (p, 1); see `add_slope`."""
+    at = layout.seen[j]
+    if at >= 0:
+        return change[places[at], 0]
+    total = 0.0
+    for k in range(places.size):
+        if places[k] >= 0:
+            total += model.jacobian[k, model.x.size - 1 - at] * change[places[k], 0]
+    return total
 
 
 @inlined

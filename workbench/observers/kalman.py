@@ -21,7 +21,6 @@ from workbench.observers.contract import (
     output,
     report,
     slipping,
-    slope,
     stick,
     width,
 )
@@ -185,13 +184,14 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                 innovation -= model.jacobian[i, n - 1 - at] * memory.change[i, 0]
         noise = variance(settings, fade, y, j)
         total += noise
-        row[row.size - 1] += innovation * innovation / total
-        for i in range(size):
-            memory.change[i, 0] += v[i] * innovation / total
+        inverse = 1.0 / total
+        row[row.size - 1] += innovation * innovation * inverse
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
         for i in range(size):
+            gain = v[i] * inverse
+            memory.change[i, 0] += gain * innovation
             for k in range(i + 1):
-                P[i, k] -= v[i] * v[k] / total
+                P[i, k] -= gain * v[k]
                 P[k, i] = P[i, k]
     for i in range(size):
         z[i] += memory.change[i, 0]
