@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.signal import butter, sosfiltfilt
 
 from workbench.case import Case
 from workbench.cosim import Outcome, Run
 from workbench.fmu import Vector
+from workbench.kernel import compiled
 
 BANDWIDTH = 5.0  # [Hz] below the 15..35 Hz modes of a rig's structure, above what friction does
 FIRST_PRESSURE = 0.1e5  # [Pa] twenty times the noise of a pressure sensor (5 mbar)
@@ -88,7 +88,7 @@ def samples(time: Vector) -> tuple[Vector, Vector]:
     return steps, 0.5 * (steps + np.append(steps[1:], 0.0)) / (time[-1] - time[0])
 
 
-@njit(cache=True)
+@compiled
 def integrate(z, memory, deviations, weights, steps, shares):  # type: ignore[no-untyped-def]
     """Add a piece of recording to z_k, equation (12) of Schwarz et al. (2018).
 

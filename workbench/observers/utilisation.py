@@ -8,13 +8,12 @@ that a model with the law of a dry one takes wet rails for slippery ones.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from workbench.case import Surface
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, place, plant, read
+from workbench.kernel import checked, compiled, place, plant, read
 from workbench.observers.contract import (
     ESTIMATE,
     FADING_SPEED,
@@ -34,7 +33,7 @@ _FRICTIONS = np.linspace(FRICTION_RANGE[0, 0], FRICTION_RANGE[0, 1], 10)
 _CREEPAGES = np.geomspace(1e-4, 1.0, 80)  # from elastic creep to a locked wheel
 
 
-@njit(cache=True)
+@compiled
 def _scan(plant, order, radii, nominal, grid, peaks):  # type: ignore[no-untyped-def]
     """Force and slip at the peak into peaks, (speeds, frictions, 2); returns a status."""
     speeds, frictions, creepages = grid
