@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.case import Case
-from workbench.fmu import FMUError, Matrix, Vector
+from workbench.errors import FMUError
+from workbench.fmu import Matrix, Vector
 from workbench.observers import ESTIMATE, MODELLED_CONTACT, Estimate, Estimator, PeakForce
 
 
