@@ -10,6 +10,7 @@ from workbench.commands.arguments import Commands, require_compiler, write_json
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
+from workbench.resources import fmus
 
 if TYPE_CHECKING:
     from workbench.compiler.benchmark import CallTimes
@@ -39,7 +40,7 @@ def _run(options: argparse.Namespace) -> int:
 
     calls = {}
     for model in _MODELS:
-        description = read_description(Path(f"fmus/fmi2/{model}.fmu"))
+        description = read_description(fmus() / "fmi2" / f"{model}.fmu")
         calls[model] = measure_calls(description, _SEED)
     print(_format_calls(calls))
     observers = bench_observers()

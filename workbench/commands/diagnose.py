@@ -8,9 +8,11 @@ from pathlib import Path
 
 from workbench.case import read_cases
 from workbench.commands.arguments import (
+    LIBRARY,
     MINIMAL_OBSERVER,
     Commands,
     add_recordings,
+    nearby,
     positive,
     require_compiler,
 )
@@ -21,8 +23,6 @@ from workbench.report.diagnosis import (
     summarise_diagnosis,
     write_diagnosis,
 )
-
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 
 def add(commands: Commands) -> None:
@@ -47,7 +47,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        default=MINIMAL_OBSERVER,
+        default=nearby(MINIMAL_OBSERVER),
         metavar="FMU",
         help="minimal observer model, or an extension of it (default: %(default)s)",
     )
@@ -61,7 +61,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--library",
         type=Path,
-        default=_PACKAGE,
+        default=nearby(LIBRARY),
         metavar="FILE",
         help="package.mo of the Modelica library (default: %(default)s)",
     )

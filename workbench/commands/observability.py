@@ -15,6 +15,7 @@ from workbench.commands.arguments import (
     Commands,
     add_observer_models,
     add_recordings,
+    nearby,
     positive,
 )
 from workbench.cosim import Outcome, observe
@@ -30,10 +31,12 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
+from workbench.resources import cases
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     observability = commands.add_parser(
         "observability",
         description="Show what the measured speeds can tell: a linear test of both observer "
@@ -42,7 +45,7 @@ def add(commands: Commands) -> None:
         "and figures.",
         epilog="examples:\n"
         "  python -m workbench observability\n"
-        "  python -m workbench observability cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        f"  python -m workbench observability {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench observability my_cases --full-fmu my_full_model.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -8,7 +8,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive
+from workbench.commands.arguments import REFERENCE, Commands, nearby, positive
 from workbench.fmu import CoSimulation
 from workbench.rig import (
     CONSTANT_PADS,
@@ -23,8 +23,6 @@ from workbench.rig import (
     simulate,
     write_recording,
 )
-
-_REFERENCE = Path("fmus/fmi2/Reference.fmu")
 
 
 def add(commands: Commands) -> None:
@@ -85,7 +83,7 @@ def add(commands: Commands) -> None:
     rig.add_argument(
         "--fmu",
         type=Path,
-        default=_REFERENCE,
+        default=nearby(REFERENCE),
         metavar="FILE",
         help="multibody model, with Co-Simulation (default: %(default)s)",
     )

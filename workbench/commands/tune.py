@@ -24,12 +24,14 @@ from workbench.commands.arguments import (
     Commands,
     add_map,
     model_names,
+    nearby,
     positive,
 )
 from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, Vector
 from workbench.objective import Weights
 from workbench.report.tuning import write_tuning_page
+from workbench.resources import cases as package_cases
 from workbench.tuning import (
     TUNABLE,
     Fold,
@@ -83,15 +85,15 @@ def add(commands: Commands) -> None:
         "--cases",
         nargs="+",
         type=Path,
-        default=[Path("cases")],
+        default=[nearby(package_cases())],
         metavar="CASE",
-        help="case folders, or folders of case folders (default: cases)",
+        help="case folders, or folders of case folders (default: the package's own)",
     )
     tune.add_argument(
         "--fmu",
         type=Path,
         metavar="FILE",
-        help="observer model (default: that of the estimator in fmus/fmi2)",
+        help="observer model (default: that of the estimator)",
     )
     add_map(tune)
     tune.add_argument(
