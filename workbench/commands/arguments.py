@@ -118,6 +118,13 @@ def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, 
     return check_names(names | given, "--map and [model.names]")
 
 
+def installing(extra: str) -> str:
+    """Say how an extra is installed: in a checkout with the versions that it pins."""
+    if CHECKOUT is None:
+        return f"pip install 'wheelset-workbench[{extra}]'"
+    return f"pip install -e '.[{extra}]' -c constraints.txt"
+
+
 def require_compiler() -> None:
     """Refuse to go on without the extra that holds the Modelica compiler.
 
@@ -131,9 +138,7 @@ def require_compiler() -> None:
             where="workbench.compiler",
             found=f"no package '{missing[0]}'",
             expected="the extra [compiler], which holds the Modelica compiler",
-            remedy="pip install 'wheelset-workbench[compiler]'"
-            if CHECKOUT is None
-            else "run 'make fmus', or: pip install -e '.[compiler]' -c constraints.txt",
+            remedy=installing("compiler"),
         )
 
 

@@ -23,6 +23,7 @@ from workbench.commands.arguments import (
     MINIMAL_OBSERVER,
     Commands,
     add_map,
+    installing,
     model_names,
     nearby,
     positive,
@@ -316,7 +317,7 @@ def _pool(options: argparse.Namespace, job: Job) -> Pool:
             where="command line, --cluster",
             found="no package 'distributed'",
             expected="the extra [cluster], which works with a Dask cluster",
-            remedy="pip install -e '.[cluster]' -c constraints.txt",
+            remedy=installing("cluster"),
         )
     from workbench.tuning.cluster import DaskPool
 
