@@ -3,13 +3,13 @@
 from functools import cache
 from pathlib import Path
 
+from workbench import resources
 from workbench.errors import InputError, closest
 from workbench.fmu import FMU
 from workbench.system import OBSERVER, System
 from workbench.system_file import read_system
 from workbench.tables import read_table
 
-_LIBRARIES = Path(__file__).resolve().parents[1] / "modelica"
 FILE = "system.toml"
 
 
@@ -17,7 +17,7 @@ FILE = "system.toml"
 def installed() -> dict[str, Path]:
     """System files that come with the workbench, by name."""
     found = {}
-    for path in sorted(_LIBRARIES.glob(f"*/{FILE}")):
+    for path in sorted(resources.modelica().glob(f"*/{FILE}")):
         table = read_table(path, "install the workbench again", 'title = "..."')
         found[table.text("name", path.parent.name)] = path
     return found

@@ -6,18 +6,25 @@ from importlib.metadata import version
 
 from workbench.accuracy import StopAccuracy, judge, read_truth, stop_accuracy
 from workbench.case import read_cases
-from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER, Commands, add_recordings
+from workbench.commands.arguments import (
+    FULL_OBSERVER,
+    MINIMAL_OBSERVER,
+    Commands,
+    add_recordings,
+    nearby,
+)
 from workbench.fmu import FMU
 from workbench.observers import ESTIMATORS, make_estimators
 from workbench.report.accuracy import format_accuracy, write_accuracies, write_accuracy
+from workbench.resources import cases
 from workbench.tuning import default_settings
 
 
-def add_accuracy(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     accuracy = commands.add_parser(
         "accuracy",
-        help="judge estimators against the truth of the virtual rig",
         description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
         "beside each recording and no estimator reads: force in the contact, a slide, friction of "
         "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "
@@ -26,7 +33,8 @@ def add_accuracy(commands: Commands) -> None:
         "  python -m workbench accuracy\n"
         "  python -m workbench rig --seed 1 --out /tmp/rig\n"
         "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
-        "  python -m workbench accuracy cases/09_wet_160_4.2_wsp --estimator ekf --estimator ukf",
+        f"  python -m workbench accuracy {own}/09_wet_160_4.2_wsp --estimator ekf "
+        "--estimator ukf",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(accuracy, out="results/accuracy")

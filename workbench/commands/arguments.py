@@ -9,11 +9,21 @@ from typing import Any, TypeAlias
 
 from workbench.case import Case, check_names
 from workbench.errors import InputError
+from workbench.resources import CHECKOUT, fmus, modelica
+from workbench.resources import cases as package_cases
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
-MINIMAL_OBSERVER = Path("fmus/fmi2/MinimalObserver.fmu")
-FULL_OBSERVER = Path("fmus/fmi2/FullObserver.fmu")
+MINIMAL_OBSERVER = fmus() / "fmi2" / "MinimalObserver.fmu"
+FULL_OBSERVER = fmus() / "fmi2" / "FullObserver.fmu"
+REFERENCE = fmus() / "fmi2" / "Reference.fmu"
+LIBRARY = modelica() / "WheelsetRig" / "package.mo"
+
+
+def nearby(path: Path) -> Path:
+    """Shorten a path to what people type for it: relative to the working directory, if inside."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def positive(text: str) -> int:
@@ -30,9 +40,9 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         "cases",
         nargs="*",
         type=Path,
-        default=[Path("cases")],
+        default=[nearby(package_cases())],
         metavar="CASE",
-        help="case folder, or folder of case folders (default: cases)",
+        help="case folder, or folder of case folders (default: the package's own)",
     )
     parser.add_argument(
         "--out",
@@ -52,7 +62,7 @@ def add_observer_models(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             option,
             type=Path,
-            default=default,
+            default=nearby(default),
             metavar="FILE",
             help=f"{name} observer model (default: %(default)s)",
         )
@@ -108,6 +118,13 @@ def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, 
     return check_names(names | given, "--map and [model.names]")
 
 
+def installing(extra: str) -> str:
+    """Say how an extra is installed: in a checkout with the versions that it pins."""
+    if CHECKOUT is None:
+        return f"pip install 'wheelset-workbench[{extra}]'"
+    return f"pip install -e '.[{extra}]' -c constraints.txt"
+
+
 def require_compiler() -> None:
     """Refuse to go on without the extra that holds the Modelica compiler.
 
@@ -121,7 +138,7 @@ def require_compiler() -> None:
             where="workbench.compiler",
             found=f"no package '{missing[0]}'",
             expected="the extra [compiler], which holds the Modelica compiler",
-            remedy="run 'make fmus', or: pip install -e '.[compiler]' -c constraints.txt",
+            remedy=installing("compiler"),
         )
 
 

@@ -10,6 +10,7 @@ from workbench.commands.arguments import Commands, require_compiler, write_json
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
+from workbench.resources import fmus
 
 if TYPE_CHECKING:
     from workbench.compiler.benchmark import CallTimes
@@ -18,11 +19,10 @@ _MODELS = ("MinimalObserver", "FullObserver", "Reference")
 _SEED = 1
 
 
-def add_bench(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     bench = commands.add_parser(
         "bench",
-        help="time calls into the FMUs, the observers, and the tuning",
         description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
         "sources in one program, and Co-Simulation steps; then the observers beside the same "
         "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
@@ -40,7 +40,7 @@ def _run(options: argparse.Namespace) -> int:
 
     calls = {}
     for model in _MODELS:
-        description = read_description(Path(f"fmus/fmi2/{model}.fmu"))
+        description = read_description(fmus() / "fmi2" / f"{model}.fmu")
         calls[model] = measure_calls(description, _SEED)
     print(_format_calls(calls))
     observers = bench_observers()

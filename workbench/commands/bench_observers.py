@@ -1,13 +1,13 @@
 """The observers' section of `workbench bench`."""
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from workbench.case import read_case, read_cases
 from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
+from workbench.resources import cases
 
-CASES = Path("cases")
+CASES = cases()
 CASE = "03_dry_120_3.6"
 
 

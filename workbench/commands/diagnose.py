@@ -8,9 +8,11 @@ from pathlib import Path
 
 from workbench.case import read_cases
 from workbench.commands.arguments import (
+    LIBRARY,
     MINIMAL_OBSERVER,
     Commands,
     add_recordings,
+    nearby,
     positive,
     require_compiler,
 )
@@ -22,14 +24,11 @@ from workbench.report.diagnosis import (
     write_diagnosis,
 )
 
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
-
-def add_diagnose(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "diagnose",
-        help="find what the simulation gets wrong, name the cause, extend the model",
         description="Compare recorded stops with the observer model: show where the simulation is "
         "wrong, name the physical cause, say what cannot be told apart, extend the Modelica model, "
         "and measure the gain on stops that were held out. Writes a page to read (index.html), "
@@ -48,7 +47,7 @@ def add_diagnose(commands: Commands) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        default=MINIMAL_OBSERVER,
+        default=nearby(MINIMAL_OBSERVER),
         metavar="FMU",
         help="minimal observer model, or an extension of it (default: %(default)s)",
     )
@@ -62,7 +61,7 @@ def add_diagnose(commands: Commands) -> None:
     parser.add_argument(
         "--library",
         type=Path,
-        default=_PACKAGE,
+        default=nearby(LIBRARY),
         metavar="FILE",
         help="package.mo of the Modelica library (default: %(default)s)",
     )

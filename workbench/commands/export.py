@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from workbench.commands.arguments import Commands, require_compiler
+from workbench.commands.arguments import LIBRARY, REFERENCE, Commands, nearby, require_compiler
 from workbench.errors import InputError
 from workbench.observers import (
     DisturbanceGains,
@@ -24,16 +24,13 @@ if TYPE_CHECKING:
 
 _Gains: TypeAlias = DisturbanceGains | ParameterGains
 
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
-_REFERENCE = Path("fmus/fmi2/Reference.fmu")
 _OBSERVERS = (DisturbanceObserver.name, ParameterEstimator.name)  # written in Modelica too
 
 
-def add_export(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     export = commands.add_parser(
         "export",
-        help="write an observer as an FMU and an SSP package",
         description="Write an observer with its gains as a Co-Simulation FMU for all platforms, "
         "which runs in any FMI tool without Python, and an SSP 1.0 package in which it observes "
         "the reference model. One communication step takes one sample. Needs the extra "
@@ -68,7 +65,7 @@ def add_export(commands: Commands) -> None:
     export.add_argument(
         "--reference",
         type=Path,
-        default=_REFERENCE,
+        default=nearby(REFERENCE),
         metavar="FILE",
         help="FMU (FMI 2.0) that the package connects the observer to (default: %(default)s)",
     )
@@ -90,7 +87,7 @@ def _export(options: argparse.Namespace) -> int:
     source = options.gains or DEFAULTS / f"{options.estimator}.toml"
     estimator, gains, text = _gains(source)
     name = OBSERVERS[estimator]
-    observer = ObserverModel(_PACKAGE, f"{_PACKAGE.parent.name}.Observers.{name}", gains, text)
+    observer = ObserverModel(LIBRARY, f"{LIBRARY.parent.name}.Observers.{name}", gains, text)
     with tempfile.TemporaryDirectory() as scratch:
 
         def build(fmi: int) -> "BuiltFMU":
@@ -115,7 +112,7 @@ def _export(options: argparse.Namespace) -> int:
             "provenance": {
                 "workbench": version("wheelset-workbench"),
                 "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
-                "source_sha256": source_hash(_PACKAGE),
+                "source_sha256": source_hash(LIBRARY),
                 "gains": source.name,
             },
         }

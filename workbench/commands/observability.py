@@ -15,10 +15,12 @@ from workbench.commands.arguments import (
     Commands,
     add_observer_models,
     add_recordings,
+    nearby,
     positive,
 )
 from workbench.cosim import Outcome, observe
-from workbench.fmu import FMU, FMUError
+from workbench.errors import FMUError
+from workbench.fmu import FMU
 from workbench.objective import braking_window
 from workbench.observability import LinearTest, linear_test, window_test
 from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
@@ -29,20 +31,21 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
+from workbench.resources import cases
 
 
-def add_observability(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     observability = commands.add_parser(
         "observability",
-        help="show when states and frictions can be observed",
         description="Show what the measured speeds can tell: a linear test of both observer "
         "models, and for each recorded stop how well half a second of samples can know the "
         "frictions dmuWR and dmuDC (Cramer-Rao bound). Writes windows (CSV), observability.json "
         "and figures.",
         epilog="examples:\n"
         "  python -m workbench observability\n"
-        "  python -m workbench observability cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        f"  python -m workbench observability {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench observability my_cases --full-fmu my_full_model.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

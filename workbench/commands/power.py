@@ -6,24 +6,28 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive, require_compiler
+from workbench.commands.arguments import (
+    LIBRARY,
+    REFERENCE,
+    Commands,
+    nearby,
+    positive,
+    require_compiler,
+)
 from workbench.power import measure, plan, summarise
 from workbench.report.power import format_power, write_power
 from workbench.rig import select
 
-_REFERENCE = Path("fmus/fmi2/Reference.fmu")
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
 _DRY = (
     *("01_dry_80_1.5", "02_dry_100_2.7", "03_dry_120_3.6", "04_dry_160_4.2"),
     *("05_dry_120_2.7_rev", "06_dry_160_3.6_rev"),
 )
 
 
-def add_power(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "power",
-        help="measure how often the diagnosis is right",
         description="Plant effects in the virtual rig, diagnose the recordings without telling, "
         "and count: false alarms on clean sets, right names against the size of the effect, pairs, "
         "causes that are not in the catalogue, coverage of the intervals. Writes power.json, "
@@ -68,8 +72,8 @@ def add_power(commands: Commands) -> None:
     )
     parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
     for option, default_path, text in (
-        ("--fmu", _REFERENCE, "multibody model, which makes the recordings"),
-        ("--library", _PACKAGE, "package.mo of the Modelica library"),
+        ("--fmu", nearby(REFERENCE), "multibody model, which makes the recordings"),
+        ("--library", nearby(LIBRARY), "package.mo of the Modelica library"),
         ("--out", Path("results/power"), "where to write"),
     ):
         parser.add_argument(

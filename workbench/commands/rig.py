@@ -8,7 +8,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive
+from workbench.commands.arguments import REFERENCE, Commands, nearby, positive
 from workbench.fmu import CoSimulation
 from workbench.rig import (
     CONSTANT_PADS,
@@ -24,14 +24,11 @@ from workbench.rig import (
     write_recording,
 )
 
-_REFERENCE = Path("fmus/fmi2/Reference.fmu")
 
-
-def add_rig(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     rig = commands.add_parser(
         "rig",
-        help="make recordings on a virtual rig",
         description="Make recordings by co-simulation of the multibody model with drive, brake, "
         "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
         "truth.json, which no estimator reads. The same seed gives the same bytes.",
@@ -86,7 +83,7 @@ def add_rig(commands: Commands) -> None:
     rig.add_argument(
         "--fmu",
         type=Path,
-        default=_REFERENCE,
+        default=nearby(REFERENCE),
         metavar="FILE",
         help="multibody model, with Co-Simulation (default: %(default)s)",
     )

@@ -19,6 +19,7 @@ from workbench.commands.arguments import (
     add_observer_models,
     add_recordings,
     model_names,
+    nearby,
     positive,
 )
 from workbench.cosim import observe
@@ -43,21 +44,22 @@ from workbench.report import (
     write_page,
     write_summary,
 )
+from workbench.resources import CHECKOUT, cases
 from workbench.tuning import default_settings, read_gains, with_tuned
 
 
-def add_simulate(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     simulate = commands.add_parser(
         "simulate",
-        help="run all estimators on recorded brake stops",
         description="Run all estimators on recorded brake stops; write a page to read "
         "(index.html), and beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"
         "  python -m workbench simulate\n"
-        "  python -m workbench simulate cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        f"  python -m workbench simulate {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        "  python -m workbench simulate cases/03_dry_120_3.6 --live\n"
+        f"  python -m workbench simulate {own}/03_dry_120_3.6 --live\n"
         "  python -m workbench simulate --estimator disturbance_observer "
         "--estimator disturbance_observer_disc",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -221,10 +223,9 @@ def _run_case(
 
 def _commit() -> str | None:
     """Commit of the checkout that this package is run from, "-dirty" if changed; None if none."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
+    if CHECKOUT is None or not (CHECKOUT / ".git").exists():
         return None
-    git = ["git", "--no-optional-locks", "-C", str(root)]
+    git = ["git", "--no-optional-locks", "-C", str(CHECKOUT)]
     describe = ["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         answer = subprocess.run([*git, *describe], capture_output=True, text=True, check=True)

@@ -23,13 +23,16 @@ from workbench.commands.arguments import (
     MINIMAL_OBSERVER,
     Commands,
     add_map,
+    installing,
     model_names,
+    nearby,
     positive,
 )
-from workbench.errors import InputError
-from workbench.fmu import FMU, FMUError, Vector
+from workbench.errors import FMUError, InputError
+from workbench.fmu import FMU, Vector
 from workbench.objective import Weights
 from workbench.report.tuning import write_tuning_page
+from workbench.resources import cases as package_cases
 from workbench.tuning import (
     TUNABLE,
     Fold,
@@ -63,11 +66,10 @@ RADIUS_ERROR = 0.05  # [%] a wheel measured to a quarter of a millimetre
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 
-def add_tune(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     tune = commands.add_parser(
         "tune",
-        help="find the gains whose worst case is best",
         description="Find gains that minimise z, the worst of the objectives z_k of all cases "
         "(Schwarz et al. 2018, equations 11 and 12), by differential evolution. Writes gains.toml, "
         "summary.json, figures and a page. Ctrl-C keeps the best so far; --resume goes on from "
@@ -84,15 +86,15 @@ def add_tune(commands: Commands) -> None:
         "--cases",
         nargs="+",
         type=Path,
-        default=[Path("cases")],
+        default=[nearby(package_cases())],
         metavar="CASE",
-        help="case folders, or folders of case folders (default: cases)",
+        help="case folders, or folders of case folders (default: the package's own)",
     )
     tune.add_argument(
         "--fmu",
         type=Path,
         metavar="FILE",
-        help="observer model (default: that of the estimator in fmus/fmi2)",
+        help="observer model (default: that of the estimator)",
     )
     add_map(tune)
     tune.add_argument(
@@ -315,7 +317,7 @@ def _pool(options: argparse.Namespace, job: Job) -> Pool:
             where="command line, --cluster",
             found="no package 'distributed'",
             expected="the extra [cluster], which works with a Dask cluster",
-            remedy="pip install -e '.[cluster]' -c constraints.txt",
+            remedy=installing("cluster"),
         )
     from workbench.tuning.cluster import DaskPool
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from workbench.compiler.archive import pack
 from workbench.description import CO_SIMULATION, read_description
 from workbench.errors import InputError
+from workbench.resources import fmus
 
 _COMMON = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 _STRUCTURE = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -118,7 +119,7 @@ def _check(fmu: Path, connectors: Mapping[str, tuple[str, str]]) -> None:
         where=str(fmu),
         found=found,
         expected=f"FMI 2.0, Co-Simulation, with {', '.join(connectors)}",
-        remedy="take fmus/fmi2/Reference.fmu, or a model with the same variables",
+        remedy=f"take {fmus() / 'fmi2' / 'Reference.fmu'}, or a model with the same variables",
     )
 
 
