@@ -4,9 +4,10 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive, require_compiler, write_json
+from workbench.commands.arguments import Commands, positive, require_compiler
 from workbench.description import Description, read_description
 from workbench.errors import InputError
+from workbench.files import write_json
 from workbench.fitness import Finding, check, is_fit
 
 _FMUS = Path("fmus")
@@ -150,7 +151,7 @@ def _info(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
     print(_format_description(description))
     if options.json:
-        write_json(asdict(description) | {"path": description.path.name}, options.json)
+        write_json(options.json, asdict(description) | {"path": description.path.name})
     return 0
 
 
@@ -169,7 +170,7 @@ def _check(options: argparse.Namespace) -> int:
             "sha256": description.sha256,
         }
         listed = [asdict(finding) for finding in findings]
-        write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
+        write_json(options.json, {"fmu": identity, "fit": fit, "findings": listed})
     return 0 if fit else 1
 
 

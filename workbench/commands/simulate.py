@@ -22,6 +22,7 @@ from workbench.commands.arguments import (
     positive,
 )
 from workbench.cosim import observe
+from workbench.files import write_json
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import (
@@ -41,7 +42,6 @@ from workbench.report import (
     summarise,
     write_estimates,
     write_page,
-    write_summary,
 )
 from workbench.tuning import default_settings, read_gains, with_tuned
 
@@ -175,7 +175,7 @@ def _simulate(options: argparse.Namespace) -> int:
         done.sort(key=lambda pair: pair[1].name)
         results = [result for result, _ in done]
         summary = summarise(results, weights, provenance)
-        write_summary(summary, options.out / "summary.json")
+        write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(summary, [figure for _, figure in done], len(cases), page)
         print(format_table(results))
