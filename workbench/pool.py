@@ -103,7 +103,7 @@ class Pool(Generic[State]):
         self._folder = self._stack.enter_context(folder)
         # In a file, because handing so much to a process that dies as it starts waits for ever.
         Path(self._folder, _GIVEN).write_bytes(pickle.dumps((dict(os.environ), begin, given)))
-        preload(begin.__module__)
+        preload(begin.__module__, type(given).__module__)
         for number in range(workers):
             thread = threading.Thread(target=self._attend, args=(number,), daemon=True)
             self._threads.append(thread)
@@ -306,8 +306,8 @@ def _end_with_master() -> None:
         os._exit(1)
 
 
-def preload(module: str) -> None:
-    """Have a module imported for workers to come, while this process does something else.
+def preload(*modules: str) -> None:
+    """Have modules imported for workers to come, while this process does something else.
 
     The first call in a process decides; see `multiprocessing.set_forkserver_preload`.
     """
@@ -319,7 +319,7 @@ def preload(module: str) -> None:
     with _starting, _hidden_program():
         before = {name: os.environ.get(name) for name in place}
         os.environ.update(place)
-        forkserver.set_forkserver_preload([module])
+        forkserver.set_forkserver_preload(list(modules))
         forkserver.ensure_running()
         for name, value in before.items():
             if value is None:
