@@ -4,7 +4,7 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,16 @@ from workbench.fmu import FMU
 from workbench.system import System
 from workbench.systems import load_system
 from workbench.objective import Weights
+from workbench.pool import Pool
 from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
-from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
-from workbench.tuning.cost import Bench, Candidate, Verdict
+from workbench.tuning import (
+    Evaluator,
+    Job,
+    SearchSpace,
+    reasoned_gains,
+    recording,
+    search_space,
+)
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
 pytest.register_assert_rewrite(
@@ -104,40 +111,17 @@ def problem(
     return prepare("disturbance_observer", minimal_path, stop_beginnings)
 
 
-class Inline:
-    """A pool of this process alone."""
-
-    size = 1
-    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
-
-    def __init__(self, job: Job) -> None:
-        self._bench = Bench(job)
-
-    def submit(self, candidates: Sequence[Candidate]) -> "Future[list[Verdict]]":
-        future: Future[list[Verdict]] = Future()
-        future.set_result([self._bench.judge(candidate) for candidate in candidates])
-        return future
-
-    def close(self) -> None:
-        self._bench.close()
-
-
 @pytest.fixture
-def inline() -> Iterator[Callable[[Job], Pool]]:
+def inline() -> Iterator[Callable[[Job], Pool[Evaluator]]]:
     """Opens pools of this process alone."""
-    pools: list[Inline] = []
-
-    def opened(job: Job) -> Pool:
-        pools.append(Inline(job))
-        return pools[-1]
-
-    yield opened
-    for pool in pools:
-        pool.close()
+    with ExitStack() as stack:
+        yield lambda job: stack.enter_context(Pool(1, Evaluator, job))
 
 
 @pytest.fixture
-def pool(inline: Callable[[Job], Pool], problem: tuple[Job, SearchSpace]) -> Pool:
+def pool(
+    inline: Callable[[Job], Pool[Evaluator]], problem: tuple[Job, SearchSpace]
+) -> Pool[Evaluator]:
     return inline(problem[0])
 
 

@@ -3,17 +3,15 @@
 import functools
 import json
 import math
-import multiprocessing
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from multiprocessing.queues import Queue
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +30,7 @@ from workbench.observers import (
     UnscentedKalmanFilter,
     reasoned_settings,
 )
+from workbench.pool import Pool
 
 RATES = (200.0, 1000.0, 5000.0)  # Hz
 LENGTH = 4  # times the recording, for the growth with length
@@ -41,7 +40,6 @@ _FEW = 3  # where one run is long
 _FMPY_STEPS = 1500
 _PROCESSES = 2
 _PROCESS_REPEATS = 5
-_PATIENCE = 60.0  # s, for an answer of a worker; it takes less than one
 
 Samples = tuple[Vector, Matrix, Matrix]
 
@@ -209,54 +207,39 @@ def _time_workers(
     workers: int, cases: Sequence[Case], minimal: Path, full: Path
 ) -> tuple[float, int]:
     """Median time of all cases [s], and the largest memory of a worker [bytes]."""
-    context = multiprocessing.get_context("spawn")
-    tasks: Queue[int | None] = context.Queue()
-    answers: Queue[int] = context.Queue()
-    arguments = (list(cases), minimal, full, tasks, answers)
-    processes = [context.Process(target=_work, args=arguments, daemon=True) for _ in range(workers)]
-    for process in processes:
-        process.start()
-    _collect(answers, workers)
     # The longest first, so that no worker is left with a long one at the end.
     order = sorted(range(len(cases)), key=lambda k: -cases[k].time[-1])
-    spent = []
-    for _ in range(_PROCESS_REPEATS):
-        begin = time.perf_counter()
-        for k in order:
-            tasks.put(k)
-        _collect(answers, len(order))
-        spent.append(time.perf_counter() - begin)
-    for _ in processes:
-        tasks.put(None)
-    memory = max(_collect(answers, workers))
-    for process in processes:
-        process.join()
+    spent, memory = [], 0
+    with Pool(workers, _prepared, (list(cases), minimal, full), isolated=True) as pool:
+        pool.map(_run, order)  # until all workers are ready
+        for _ in range(_PROCESS_REPEATS):
+            begin = time.perf_counter()
+            memory = max(memory, *pool.map(_run, order))
+            spent.append(time.perf_counter() - begin)
     return statistics.median(spent), memory
 
 
-def _collect(answers: "Queue[int]", count: int) -> list[int]:
-    return [answers.get(timeout=_PATIENCE) for _ in range(count)]
+_Prepared = tuple[list[Estimator], list[Samples]]
 
 
-def _work(
-    cases: Sequence[Case],
-    minimal: Path,
-    full: Path,
-    tasks: "Queue[int | None]",
-    answers: "Queue[int]",
-) -> None:
-    """Run cases by number until None comes; answers once when ready, once a case, and memory."""
+@contextmanager
+def _prepared(given: tuple[Sequence[Case], Path, Path]) -> Iterator[_Prepared]:
+    """All observers, and the cases at 1 kHz."""
+    cases, minimal, full = given
     with FMU(minimal) as small, FMU(full) as large:
         estimators = _observers(small, large, reasoned_settings(small, large))
         samples = [resample(case, _RATE) for case in cases]
         for estimator in estimators:
             estimator.run(*(part[:2] for part in samples[0]))
-        answers.put(0)
-        while (number := tasks.get()) is not None:
-            for estimator in estimators:
-                estimator.run(*samples[number])
-            answers.put(number)
-    answers.put(peak_memory())
+        yield estimators, samples
+
+
+def _run(prepared: _Prepared, number: int) -> int:
+    """Run all observers on a case; returns the peak memory of this process [bytes]."""
+    estimators, samples = prepared
+    for estimator in estimators:
+        estimator.run(*samples[number])
+    return peak_memory()
 
 
 def format_observers(

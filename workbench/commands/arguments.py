@@ -1,11 +1,10 @@
 """What the commands share."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from workbench.case import Case, check_names
 from workbench.errors import InputError
@@ -140,9 +139,3 @@ def require_compiler() -> None:
             expected="the extra [compiler], which holds the Modelica compiler",
             remedy=installing("compiler"),
         )
-
-
-def write_json(content: dict[str, Any], path: Path) -> None:
-    """Write results, in folders made as needed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=2) + "\n")

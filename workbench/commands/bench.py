@@ -6,10 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.commands.arguments import Commands, require_compiler, write_json
+from workbench.commands.arguments import Commands, require_compiler
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
+from workbench.files import write_json
 from workbench.resources import fmus
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def _run(options: argparse.Namespace) -> int:
             "observers": observers,
             "tuning": tuning,
         }
-        write_json(content, options.json)
+        write_json(options.json, content)
     return 0
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import hashlib
-import json
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from workbench.commands.arguments import LIBRARY, REFERENCE, Commands, nearby, require_compiler
 from workbench.errors import InputError
+from workbench.files import write_json, write_whole
 from workbench.observers import (
     DisturbanceGains,
     DisturbanceObserver,
@@ -17,7 +17,7 @@ from workbench.observers import (
     ParameterEstimator,
     ParameterGains,
 )
-from workbench.tuning import DEFAULTS, gain_names, read_gains, to_vector, write_whole
+from workbench.tuning import DEFAULTS, gain_names, read_gains, to_vector
 
 if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
@@ -117,11 +117,9 @@ def _export(options: argparse.Namespace) -> int:
             },
         }
         # Nothing is written before everything is made.
-        options.out.mkdir(parents=True, exist_ok=True)
         for file in (built.path, ssp):
             write_whole(options.out / file.name, file.read_bytes())
-        content = json.dumps(summary, indent=2) + "\n"
-        write_whole(options.out / "summary.json", content.encode())
+        write_json(options.out / "summary.json", summary)
     print(f"written: {options.out / built.path.name}, {ssp.name} and summary.json beside it")
     return 0
 

@@ -11,10 +11,10 @@ from workbench.commands.arguments import (
     nearby,
     positive,
     require_compiler,
-    write_json,
 )
 from workbench.description import Description, read_description
 from workbench.errors import InputError
+from workbench.files import write_json
 from workbench.fitness import Finding, check, is_fit
 from workbench.resources import CHECKOUT, fmus
 
@@ -172,7 +172,7 @@ def _info(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
     print(_format_description(description))
     if options.json:
-        write_json(asdict(description) | {"path": description.path.name}, options.json)
+        write_json(options.json, asdict(description) | {"path": description.path.name})
     return 0
 
 
@@ -191,7 +191,7 @@ def _check(options: argparse.Namespace) -> int:
             "sha256": description.sha256,
         }
         listed = [asdict(finding) for finding in findings]
-        write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
+        write_json(options.json, {"fmu": identity, "fit": fit, "findings": listed})
     return 0 if fit else 1
 
 

@@ -5,10 +5,10 @@ import os
 import platform
 import subprocess
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from workbench.commands.arguments import (
     positive,
 )
 from workbench.cosim import observe
+from workbench.files import write_json
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import (
@@ -32,6 +33,7 @@ from workbench.observers import (
     make_estimators,
     reasoned_settings,
 )
+from workbench.pool import Pool
 from workbench.report import (
     CaseFigure,
     CaseResult,
@@ -42,7 +44,6 @@ from workbench.report import (
     summarise,
     write_estimates,
     write_page,
-    write_summary,
 )
 from workbench.resources import CHECKOUT, cases
 from workbench.tuning import default_settings, read_gains, with_tuned
@@ -162,22 +163,22 @@ def _simulate(options: argparse.Namespace) -> int:
     done: list[tuple[CaseResult, CaseFigure]] = []
     begin = time.perf_counter()
     interrupted = False
-    if window is None:
-        runs = _in_processes(cases, options.workers, plan)
-    else:
-        runs = (_run_case(case, plan, window) for case in cases)
-    try:
-        for result, figure in runs:
-            done.append((result, figure))
-            _show_progress(len(done), len(cases), figure.name, begin)
-    except KeyboardInterrupt:
-        interrupted = True
-        print("interrupted", flush=True)
+    # A window shows one run after the other, in this process.
+    workers = min(options.workers, len(cases)) if window is None else 1
+    with Pool(workers, nullcontext, plan) as pool:
+        try:
+            for _, (result, figure) in pool.completed(partial(_run_case, window=window), cases):
+                done.append((result, figure))
+                _show_progress(len(done), len(cases), figure.name, begin)
+        except KeyboardInterrupt:
+            interrupted = True
+            print("interrupted", flush=True)
+            pool.finish()
     if done:
         done.sort(key=lambda pair: pair[1].name)
         results = [result for result, _ in done]
         summary = summarise(results, weights, provenance)
-        write_summary(summary, options.out / "summary.json")
+        write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(summary, [figure for _, figure in done], len(cases), page)
         print(format_table(results))
@@ -187,21 +188,8 @@ def _simulate(options: argparse.Namespace) -> int:
     return 130 if interrupted else 0
 
 
-def _in_processes(
-    cases: Sequence[Case], workers: int, plan: _Plan
-) -> Iterator[tuple[CaseResult, CaseFigure]]:
-    """All cases, each in a process, in the order they end; an interruption drops the others."""
-    with ProcessPoolExecutor(min(workers, len(cases))) as pool:
-        tasks = [pool.submit(_run_case, case, plan) for case in cases]
-        try:
-            for task in as_completed(tasks):
-                yield task.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
 def _run_case(
-    case: Case, plan: _Plan, window: LiveWindow | None = None
+    plan: _Plan, case: Case, window: LiveWindow | None = None
 ) -> tuple[CaseResult, CaseFigure]:
     """All estimators on one case; writes its CSV and figures."""
     with ExitStack() as stack:

@@ -23,6 +23,7 @@ from workbench.diagnosis.residuals import Dependence, Residuals, dependences, re
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, judge
 from workbench.errors import InputError
+from workbench.files import write_whole
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import DisturbanceObserver, ExtendedKalmanFilter
@@ -224,7 +225,7 @@ def _extend(
     folder = out / "model"
     folder.mkdir(parents=True, exist_ok=True)
     modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
-    modelica.write_text(text)
+    write_whole(modelica, text)
     build(package, EXTENDED, text, path, every_platform=True)
     bench = Bench(path, court.stops)
     difference = 0.0

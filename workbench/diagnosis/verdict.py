@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.stats import bootstrap
 
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit, seconds, variant
@@ -213,8 +214,13 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
 
 
 def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
-    draws = np.random.default_rng(0).integers(0, len(after), (_DRAWS, len(after)))
-    low, high = np.percentile(np.sqrt(after[draws].mean(axis=1)), [2.5, 97.5])
+    low, high = bootstrap(
+        (after,),
+        lambda squares, axis: np.sqrt(squares.mean(axis=axis)),
+        n_resamples=_DRAWS,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
     return Gain(
         before=float(np.sqrt(before.mean())),
         after=float(np.sqrt(after.mean())),

@@ -9,6 +9,7 @@ from typing import Any
 
 from workbench.diagnosis import Diagnosis
 from workbench.errors import InputError
+from workbench.files import write_whole
 from workbench.power.planting import BY_NAME, Planting
 
 
@@ -116,10 +117,8 @@ class Journal:
         self._path = path
         if resume and path.exists():
             self._read(identity)
-        part = path.with_name(path.name + ".part")
         lines = [json.dumps(identity), *(_line(one) for one in self.results)]
-        part.write_text("".join(f"{line}\n" for line in lines))
-        part.replace(path)
+        write_whole(path, "".join(f"{line}\n" for line in lines))
 
     def append(self, result: Judged) -> None:
         """Add a verdict; it is on the disk when this returns."""

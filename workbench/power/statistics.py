@@ -6,7 +6,7 @@ from dataclasses import fields
 from itertools import permutations
 from typing import Any
 
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 from workbench.diagnosis import CATALOGUE
 from workbench.power.journal import Judged
@@ -31,13 +31,10 @@ def share(outcomes: Iterable[bool]) -> dict[str, Any]:
     """
     values = list(outcomes)
     hits, of = sum(values), len(values)
-    return {
-        "hits": hits,
-        "of": of,
-        "share": hits / of if of else None,
-        "low": float(beta.ppf(0.025, hits, of - hits + 1)) if hits else 0.0,
-        "high": float(beta.ppf(0.975, hits + 1, of - hits)) if hits < of else 1.0,
-    }
+    if not of:
+        return {"hits": 0, "of": 0, "share": None, "low": 0.0, "high": 1.0}
+    low, high = binomtest(hits, of).proportion_ci(0.95, method="exact")
+    return {"hits": hits, "of": of, "share": hits / of, "low": float(low), "high": float(high)}
 
 
 def named_right(result: Judged) -> bool:

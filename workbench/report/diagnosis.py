@@ -12,6 +12,7 @@ from workbench.case import Case
 from workbench.diagnosis import Cause, Outcome, Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import CHANNELS
+from workbench.files import write_json, write_whole
 from workbench.report.diagnosis_figures import (
     FAST,
     LASTING,
@@ -24,7 +25,6 @@ from workbench.report.diagnosis_figures import (
 )
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import draw_case
-from workbench.report.results import write_summary, write_text
 
 _MEASURE = (
     "root mean square of prediction errors, in means over {span}, on stops that were held out, "
@@ -222,7 +222,7 @@ def write_diagnosis(
     cases : as diagnosed, in the order of the outcome's residuals.
     summary : of this outcome.
     """
-    write_summary(summary, out / "summary.json")
+    write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
     added = effects or summary["partial"]
     extension = f"with {', '.join(added)}" if added else ""
@@ -268,22 +268,22 @@ def _write_stop(one: Residuals, path: Path) -> None:
             columns[f"lasting_sigma.{channel} [{unit}]"] = means.sigma[:, c]
     for name, values in at_blocks(one).items():
         columns[f"residual.{name} [{RESIDUALS[name]}]"] = values
-    write_text(path, _csv(pd.DataFrame(columns)))
+    write_whole(path, _csv(pd.DataFrame(columns)))
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
     """Data of the figures that show all stops."""
     nested = ("shape", "shape_units")
     rows = [{**one, **{k: json.dumps(one[k]) for k in nested}} for one in summary["candidates"]]
-    write_text(out / "candidates.csv", _csv(pd.DataFrame(rows)))
-    write_text(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
+    write_whole(out / "candidates.csv", _csv(pd.DataFrame(rows)))
+    write_whole(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
-    write_text(out / "confusability.csv", _csv(pd.DataFrame(cells)))
+    write_whole(out / "confusability.csv", _csv(pd.DataFrame(cells)))
     if (gain := summary["gain"]) is not None:
         rows = [{"stop": name, **one} for name, one in gain["stops"].items()]
         total = {key: gain[key] for key in ("before", "after", "low", "high")}
-        write_text(out / "gain.csv", _csv(pd.DataFrame([*rows, {"stop": "all stops", **total}])))
+        write_whole(out / "gain.csv", _csv(pd.DataFrame([*rows, {"stop": "all stops", **total}])))
 
 
 def _csv(table: pd.DataFrame) -> str:

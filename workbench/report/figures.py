@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from workbench.cosim import Run
+from workbench.files import replacing
 from workbench.fmu import Vector
 from workbench.objective import BANDWIDTH, braking_window
 from workbench.report.results import CaseResult, label, percent
@@ -219,9 +220,7 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
             fontsize=8,
             frameon=False,
         )
-        for path in paths:
-            stamp = "Date" if path.suffix == ".svg" else "Software"
-            sheet.savefig(path, dpi=110, metadata={stamp: None})
+        save_figure(sheet, paths)
 
 
 def _force(result: CaseResult, styles: dict[str, str]) -> tuple[list[Curve], tuple[float, float]]:
@@ -311,3 +310,11 @@ def _finding(result: CaseResult) -> str:
     return f"The {first} errs least: {percent(share)} of the mean creep force, {rms:.0f} N rms" + (
         f"; {others}." if others else "."
     )
+
+
+def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
+    """Write one figure in each format, without the date, so that equal figures are equal files."""
+    for path in paths:
+        stamp = "Date" if path.suffix == ".svg" else "Software"
+        with replacing(path) as stream:
+            sheet.savefig(stream, format=path.suffix[1:], dpi=110, metadata={stamp: None})

@@ -1,6 +1,5 @@
 """Power of the diagnosis: figures, file and table."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workbench.diagnosis import CATALOGUE
+from workbench.files import write_json
 from workbench.power import CLEAR, VISIBLE
-from workbench.report.diagnosis_figures import draw_heat, save_figure
-from workbench.report.figures import LIGHT, STYLE
-from workbench.report.results import write_text
+from workbench.report.diagnosis_figures import draw_heat
+from workbench.report.figures import LIGHT, STYLE, save_figure
 
 _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
@@ -21,9 +20,7 @@ _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 def write_power(summary: Mapping[str, Any], provenance: Mapping[str, Any], out: Path) -> None:
     """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage."""
-    write_text(
-        out / "power.json", json.dumps({"provenance": provenance, **summary}, indent=2) + "\n"
-    )
+    write_json(out / "power.json", {"provenance": provenance, **summary})
     effects = summary["effects"]
     with mpl.rc_context(STYLE | {"font.size": 8}):
         figures = {"confusion": _confusion(summary["confusion"])} if summary["sets"] else {}

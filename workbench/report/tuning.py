@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from workbench.files import write_whole
 from workbench.objective import BANDWIDTH
 from workbench.report.drawing import ticks_within
-from workbench.report.results import label, write_text
+from workbench.report.results import label
 from workbench.report.templates import environment
 from workbench.tuning.settling import SETTLED
 from workbench.tuning.validation import NEGLIGIBLE, STEP
@@ -152,7 +153,7 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
         )
     )
     path = folder / "index.html"
-    write_text(path, text)
+    write_whole(path, text)
     return path
 
 
@@ -283,3 +284,37 @@ def _convergence(summary: Mapping[str, Any]) -> dict[str, Any]:
         "bottom": top + height,
         "total": left + width + 40,
     }
+
+
+def format_tuned(summary: Mapping[str, Any]) -> str:
+    """Table for the terminal: cases, and what is to be said of gains and folds."""
+    cases = summary["cases"]
+    width = max(map(len, cases))
+    lines = [f"{'case':<{width}} {'reasoned':>9} {'tuned':>9}  z_k, worst first"]
+    for name, case in sorted(cases.items(), key=lambda item: -item[1]["z_k"]):
+        lines.append(f"{name:<{width}} {case['z_k_reasoned']:>9.4f} {case['z_k']:>9.4f}")
+    work = summary["work"]
+    lines.append(
+        f"z = {summary['z']:.5f} after {work['generations']} generations, {work['candidates']} "
+        f"candidates, {work['saved']:.0%} of the work saved, {work['seconds']:.0f} s"
+    )
+    if bound := [name for name, gain in summary["gains"].items() if gain["at_bound"]]:
+        lines.append(f"at a bound of the search: {', '.join(bound)}")
+    if effects := summary["sensitivity"]:
+        idle = [name for name, effect in effects.items() if not effect["matters"]]
+        lines.append(f"gains that do not matter (z within 1 %): {', '.join(idle) or 'none'}")
+    for name, one in summary["beside"].items():
+        z = "diverges" if one["z"] is None else f"z = {one['z']:.5f}"
+        lines.append(f"{name}, not tuned: {z}, worst {one['worst']}")
+    for fold in summary["folds"]:
+        tuned, reasoned, force, untuned = (
+            np.inf if fold[name] is None else fold[name]
+            for name in ("tuned", "reasoned", "force", "force_reasoned")
+        )
+        verdict = "better" if tuned < reasoned else "not better"
+        lines.append(
+            f"not seen: {', '.join(fold['cases'])}: z {tuned:.4f}, {verdict} than reasoned "
+            f"{reasoned:.4f}; seen: {fold['z']:.4f}; error of Fx {force:.2%}, reasoned "
+            f"{untuned:.2%}"
+        )
+    return "\n".join(lines)

@@ -1,13 +1,14 @@
 """Recordings of the virtual rig as files."""
 
 import dataclasses
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
+import tomli_w
 
 from workbench.errors import InputError
+from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
 from workbench.rig.effects import Effects
 from workbench.rig.run import RATE, TRUTH, Stop
@@ -91,11 +92,10 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every
         "drawn": dataclasses.asdict(stop.drawn) | phases,
         "effects": planted,
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / "truth.json", json.dumps(made, indent=2) + "\n")
-    _write(folder / "truth.csv", _table(time[kept][::every], truth))
-    _write(folder / "measured.csv", _table(time[kept], measured))
-    _write(folder / "case.toml", _case(stop.scenario))
+    write_json(folder / "truth.json", made)
+    write_whole(folder / "truth.csv", _table(time[kept][::every], truth))
+    write_whole(folder / "measured.csv", _table(time[kept], measured))
+    write_whole(folder / "case.toml", _case(stop.scenario))
 
 
 def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
@@ -109,23 +109,15 @@ def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
 
 def _case(scenario: Scenario) -> str:
     c = scenario.conditions
-    return f"""\
-title = "{scenario.title}"
-
-[conditions]
-initial_speed = "{c.initial_speed * 3.6:g} km/h"
-brake_pressure = "{c.brake_pressure / 1e5:g} bar"
-wheel_rail = "{c.wheel_rail}"
-discs = {json.dumps(c.discs)}
-direction = {c.direction}
-
-[measurement]
-file = "measured.csv"
-"""
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file that is complete whenever it is there."""
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    content = {
+        "title": scenario.title,
+        "conditions": {
+            "initial_speed": f"{c.initial_speed * 3.6:g} km/h",
+            "brake_pressure": f"{c.brake_pressure / 1e5:g} bar",
+            "wheel_rail": c.wheel_rail,
+            "discs": c.discs,
+            "direction": c.direction,
+        },
+        "measurement": {"file": "measured.csv"},
+    }
+    return tomli_w.dumps(content)

@@ -3,8 +3,8 @@
 Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential evolution.
 """
 
-from workbench.tuning.checkpoint import Generation, write_whole
-from workbench.tuning.cost import Job, recording, recordings
+from workbench.tuning.checkpoint import Generation
+from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
 from workbench.tuning.gains import (
     DEFAULTS,
@@ -13,6 +13,7 @@ from workbench.tuning.gains import (
     read_gains,
     with_tuned,
 )
+from workbench.tuning.recipe import RADIUS_ERROR, Problem, Progress, Tuned, prepare, tune
 from workbench.tuning.search import Plan, Search, search
 from workbench.tuning.space import (
     TUNABLE,
@@ -24,37 +25,52 @@ from workbench.tuning.space import (
     search_space,
     to_vector,
 )
+from workbench.tuning.summary import summarise, tuned_gains
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
     cross_validate,
-    judge_gains,
+    evaluate_gains,
     sensitivities,
     untuned_filter,
 )
-from workbench.tuning.workers import Pool, ProcessPool
+from workbench.tuning.workers import LIMIT, Workers, evaluate_all, evaluators
 
 __all__ = [
     "DEFAULTS",
+    "LIMIT",
+    "RADIUS_ERROR",
     "TUNABLE",
+    "Candidate",
+    "Evaluation",
+    "Evaluator",
     "Fold",
     "Gains",
     "Generation",
     "Job",
     "Plan",
-    "Pool",
-    "ProcessPool",
+    "Problem",
+    "Progress",
     "Search",
     "SearchSpace",
     "Sensitivity",
+    "Tuned",
+    "Workers",
+    "(",
+    ")",
     "cross_validate",
     "default_settings",
     "draw_cases",
     "draw_convergence",
+    "evaluate_all",
+    "evaluate_gains",
+    "evaluators",
     "format_gains",
+    "from",
     "from_vector",
     "gain_names",
-    "judge_gains",
+    "import",
+    "prepare",
     "read_gains",
     "reasoned_gains",
     "recording",
@@ -62,8 +78,19 @@ __all__ = [
     "search",
     "search_space",
     "sensitivities",
+    "summarise",
     "to_vector",
+    "tune",
+    "tuned_gains",
     "untuned_filter",
     "with_tuned",
-    "write_whole",
+    "workbench.tuning.cost",
+    "workbench.tuning.figures",
+    "workbench.tuning.gains",
+    "workbench.tuning.recipe",
+    "workbench.tuning.search",
+    "workbench.tuning.space",
+    "workbench.tuning.summary",
+    "workbench.tuning.validation",
+    "workbench.tuning.workers",
 ]

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from types import TracebackType
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def _with_wheel(one: Recording, error: float) -> Recording:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """All that a worker needs to judge candidates, on any machine.
+    """All that a worker needs to evaluate candidates, on any machine.
 
     Attributes
     ----------
@@ -120,13 +121,13 @@ def load_model(job: Job) -> FMU:
 
 
 class Candidate(NamedTuple):
-    """Gains to be judged.
+    """Gains to be evaluated.
 
     Attributes
     ----------
     values : (n,) gains.
     limit : z beyond which the candidate has lost.
-    order : cases to be judged by, the one that decides most often first.
+    order : cases to be evaluated on, the one that decides most often first.
     """
 
     values: Vector
@@ -134,8 +135,8 @@ class Candidate(NamedTuple):
     order: tuple[int, ...]
 
 
-class Verdict(NamedTuple):
-    """Judgement of one candidate.
+class Evaluation(NamedTuple):
+    """What became of one candidate.
 
     Attributes
     ----------
@@ -143,7 +144,7 @@ class Verdict(NamedTuple):
     z_k : (k,) of all cases of the job; infinite where not known.
     samples : how many were evaluated.
     unstable : case in which the estimate diverged or the FMU failed; -1 if none.
-    crashed : whether it killed its worker.
+    crashed : whether it killed its worker, or took too long.
     """
 
     z: float
@@ -153,8 +154,8 @@ class Verdict(NamedTuple):
     crashed: bool = False
 
 
-class Bench:
-    """A model and its recordings, ready to judge one candidate after the other."""
+class Evaluator:
+    """A model and its recordings, ready for one candidate after the other."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
@@ -162,14 +163,22 @@ class Bench:
         self._settling = Settling(self._fmu) if np.isfinite(job.friction_left) else None
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))
-        self._judge_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
+        self._evaluate_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
 
-    def close(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Free the model."""
         self._fmu.close()
 
-    def judge(self, candidate: Candidate) -> Verdict:
-        """Judge a candidate until it has lost, or to the end; none that finds no friction.
+    def evaluate(self, candidate: Candidate) -> Evaluation:
+        """Evaluate a candidate until it has lost, or to the end; none that finds no friction.
 
         The integral of equation (12) only grows, piece by piece and in floating point too, so what
         is dropped has lost for certain.
@@ -181,19 +190,21 @@ class Bench:
         samples = 0
         limit = min(candidate.limit, DIVERGED)
         for k in candidate.order:
-            z, done = self._judge_case(estimator, job.recordings[k], limit)
+            z, done = self._evaluate_case(estimator, job.recordings[k], limit)
             samples += done
             if not z <= limit:
                 nothing = np.full(z_k.size, np.inf)
-                return Verdict(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
+                return Evaluation(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
             z_k[k] = z
         # Last, because few candidates come this far.
         slow = self._settling is not None and not self._settling.left(gains) < job.friction_left
         if slow:
-            return Verdict(np.inf, np.full(z_k.size, np.inf), samples, -1)
-        return Verdict(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
+            return Evaluation(np.inf, np.full(z_k.size, np.inf), samples, -1)
+        return Evaluation(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
 
-    def _judge_case(self, estimator: Estimator, case: Recording, limit: float) -> tuple[float, int]:
+    def _evaluate_case(
+        self, estimator: Estimator, case: Recording, limit: float
+    ) -> tuple[float, int]:
         """The z of one case, or the part of it that is beyond the limit, and samples evaluated."""
         z, size = 0.0, case.steps.size
         edges = [size * i // PIECES for i in range(PIECES + 1)]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from workbench.errors import InputError
 from workbench.fmu import FMU
@@ -34,26 +35,18 @@ _MEANING = {
 
 def format_gains(estimator: str, gains: Gains, provenance: Mapping[str, Any]) -> str:
     """The text of `gains.toml`; numbers have all their digits."""
-    lines = [
-        f"estimator = {_value(estimator)}",
-        "",
-        f"# {_MEANING[estimator]}",
-        "[gains]",
-        *(
-            f"{name} = {_value(float(value))}"
-            for name, value in zip(gain_names(gains), to_vector(gains), strict=True)
-        ),
-        "",
+    values = map(float, to_vector(gains))
+    parts = [
+        tomli_w.dumps({"estimator": estimator}),
+        f"# {_MEANING[estimator]}\n"
+        + tomli_w.dumps({"gains": dict(zip(gain_names(gains), values, strict=True))}),
     ]
     if not isinstance(gains, FilterNoise):
-        lines += [
-            "# effect of muWR, muDC on der(omegaW) from which on a friction has full authority",
-            "[design]",
-            f"effect = {_value(gains.effect.tolist())}",
-            "",
-        ]
-    lines += ["[provenance]", *(f"{key} = {_value(v)}" for key, v in provenance.items())]
-    return "\n".join(lines) + "\n"
+        parts.append(
+            "# effect of muWR, muDC on der(omegaW) from which on a friction has full authority\n"
+            + tomli_w.dumps({"design": {"effect": gains.effect.tolist()}})
+        )
+    return "\n".join([*parts, tomli_w.dumps({"provenance": provenance})])
 
 
 def read_gains(path: Path) -> tuple[str, Gains]:
@@ -139,20 +132,3 @@ def _wrong(path: Path, found: str, expected: str = "a file as the tuning writes 
         expected=expected,
         remedy="take the gains.toml that 'python -m workbench tune' wrote",
     )
-
-
-def _value(value: Any) -> str:
-    """A value of TOML: text, numbers, booleans, lists, and tables of these."""
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case str():
-            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-            return f'"{escaped}"'
-        case int() | float():
-            return repr(value)
-        case list() | tuple():
-            return "[" + ", ".join(map(_value, value)) + "]"
-        case dict():
-            return "{ " + ", ".join(f'"{k}" = {_value(v)}' for k, v in value.items()) + " }"
-    raise TypeError(f"{type(value).__name__} has no form in TOML")

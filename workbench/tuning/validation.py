@@ -1,7 +1,6 @@
 """What tuned gains are worth: on cases they have not seen, and each gain by itself."""
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +10,10 @@ from workbench.cosim import observe
 from workbench.fmu import Matrix, Vector
 from workbench.objective import score
 from workbench.observers import ExtendedKalmanFilter, FilterNoise
-from workbench.tuning.cost import DIVERGED, Bench, Candidate, Job, load_model
+from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, load_model
 from workbench.tuning.search import Search
 from workbench.tuning.space import SearchSpace, build, from_vector, gain_names, to_vector
-from workbench.tuning.workers import Pool, judge_all
+from workbench.tuning.workers import Workers, evaluate_all
 
 STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
 NEGLIGIBLE = 0.01  # relative change of z that does not matter
@@ -66,11 +65,11 @@ class Sensitivity:
         return max(abs(self.less), abs(self.more), abs(self.without)) > NEGLIGIBLE
 
 
-def judge_gains(pool: Pool, job: Job, gains: Sequence[Vector]) -> Matrix:
+def evaluate_gains(pool: Workers, job: Job, gains: Sequence[Vector]) -> Matrix:
     """z_k of gains in all cases, (g, k); infinite in all where an estimate diverges."""
     order = tuple(range(len(job.recordings)))
     candidates = [Candidate(values, np.inf, order) for values in gains]
-    return np.array([verdict.z_k for verdict in judge_all(pool, candidates, len(order))])
+    return np.array([one.z_k for one in evaluate_all(pool, candidates, len(order))])
 
 
 def untuned_filter(job: Job) -> Vector:
@@ -79,8 +78,8 @@ def untuned_filter(job: Job) -> Vector:
         job, estimator=ExtendedKalmanFilter.name, gains=FilterNoise(), friction_left=np.inf
     )
     order = tuple(range(len(job.recordings)))
-    with closing(Bench(kalman)) as bench:
-        return bench.judge(Candidate(to_vector(FilterNoise()), np.inf, order)).z_k
+    with Evaluator(kalman) as evaluator:
+        return evaluator.evaluate(Candidate(to_vector(FilterNoise()), np.inf, order)).z_k
 
 
 def force_errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
@@ -109,7 +108,7 @@ def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
 
 
 def cross_validate(
-    pool: Pool,
+    pool: Workers,
     job: Job,
     cases: Sequence[Case],
     reasoned: Vector,
@@ -131,7 +130,7 @@ def cross_validate(
         found = tune(number, [k for k in everything if k not in held_out])
         if found is None or found.interrupted:
             break
-        tuned, untuned = judge_gains(pool, job, [found.best, reasoned])
+        tuned, untuned = evaluate_gains(pool, job, [found.best, reasoned])
         names = tuple(dict.fromkeys(job.recordings[k].stop for k in held_out))
         left_out = [case for case in cases if case.name in names]
         force, force_untuned = force_errors(job, left_out, [found.best, reasoned]).max(axis=1)
@@ -150,7 +149,7 @@ def cross_validate(
     return results
 
 
-def sensitivities(pool: Pool, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
+def sensitivities(pool: Workers, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
     """Change one gain after the other."""
     names = gain_names(job.gains)
     changed: list[Vector] = []
@@ -162,7 +161,7 @@ def sensitivities(pool: Pool, job: Job, space: SearchSpace, found: Search) -> li
         without = found.best.copy()
         without[i] = 0.0
         changed.append(without)
-    z = judge_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
+    z = evaluate_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
     change = np.where(z < DIVERGED, z / found.z - 1.0, np.inf).reshape(-1, 3)
     return [
         Sensitivity(name, float(less), float(more), float(without))
