@@ -1,4 +1,4 @@
-"""`workbench tune`: gains that minimise the worst case over recorded brake stops."""
+"""`workbench tune`: gains that minimise the worst case over recordings."""
 
 import argparse
 import json
@@ -16,10 +16,9 @@ import numpy as np
 
 from workbench.case import Case, read_cases
 from workbench.commands.arguments import (
-    FULL_OBSERVER,
-    MINIMAL_OBSERVER,
     Commands,
     add_map,
+    add_system,
     installing,
     model_names,
     nearby,
@@ -30,10 +29,10 @@ from workbench.files import write_whole
 from workbench.pool import Pool
 from workbench.report.tuning import format_tuned, write_tuning_page
 from workbench.resources import cases as package_cases
+from workbench.system_file import with_model
+from workbench.systems import load_system
 from workbench.tuning import (
     LIMIT,
-    RADIUS_ERROR,
-    TUNABLE,
     Evaluator,
     Generation,
     Job,
@@ -45,6 +44,7 @@ from workbench.tuning import (
     evaluators,
     prepare,
     summarise,
+    tunable,
     tune,
     tuned_gains,
 )
@@ -70,7 +70,10 @@ def add(commands: Commands) -> None:
         "  python -m workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("estimator", choices=TUNABLE, metavar="ESTIMATOR", help=", ".join(TUNABLE))
+    parser.add_argument(
+        "estimator", metavar="ESTIMATOR", help="one with gains, such as disturbance_observer or ekf"
+    )
+    add_system(parser)
     parser.add_argument(
         "--cases",
         nargs="+",
@@ -116,13 +119,13 @@ def add(commands: Commands) -> None:
         help="scheduler of a Dask cluster to work on instead; needs the extra [cluster]",
     )
     parser.add_argument(
+        "--scale-error",
         "--radius-error",
         type=float,
-        default=100.0 * RADIUS_ERROR,
         metavar="PERCENT",
-        help="judge each case a second time with the wheel's radius off by this much, alternately "
-        "to both sides, so that gains do not rely on radii that nobody knows as well; 0: only as "
-        "recorded (default: %(default)s)",
+        help="judge each case again with an output's scale off by this much, alternately to both "
+        "sides, so that gains do not rely on what nobody knows as well; 0: only as recorded "
+        "(default: as the system says)",
     )
     parser.add_argument(
         "--timeout",
@@ -157,12 +160,19 @@ def add(commands: Commands) -> None:
 
 
 def _tune(options: argparse.Namespace) -> int:
-    cases = read_cases(options.cases)
+    system = load_system(options.system)
+    kind = tunable(system, options.estimator)
+    cases = read_cases(options.cases, system)
     _check(options, cases)
+    system = system.with_names(model_names(options.map, system, cases))
+    if options.fmu is not None:
+        system = with_model(system, kind.role, options.fmu)
     out = options.out or Path("results/tune") / options.estimator
-    default = FULL_OBSERVER if options.estimator == "parameter_estimator" else MINIMAL_OBSERVER
-    names, error = model_names(options.map, cases), options.radius_error / 100.0
-    problem = prepare(options.estimator, options.fmu or default, names, cases, error)
+    errors = None
+    if options.scale_error is not None:
+        share = options.scale_error / 100.0
+        errors = {one.name: share for one in system.outputs if one.scale_error and share}
+    problem = prepare(system, options.estimator, cases, errors)
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     print(
@@ -201,12 +211,12 @@ def _check(options: argparse.Namespace, cases: Sequence[Case]) -> None:
             expected="2 or more, and no more than there are cases",
             remedy="choose another number, or more cases with --cases",
         )
-    if not 0.0 <= options.radius_error < 10.0:
+    if options.scale_error is not None and not 0.0 <= options.scale_error < 10.0:
         raise InputError(
-            where="command line, --radius-error",
-            found=f"{options.radius_error:g}",
-            expected="a share of the radius in percent, from 0 to 10",
-            remedy=f"choose another, or leave it out for {100.0 * RADIUS_ERROR:g} %",
+            where="command line, --scale-error",
+            found=f"{options.scale_error:g}",
+            expected="a share of the scale in percent, from 0 to 10",
+            remedy="choose another, or leave it out for what the system says",
         )
 
 

@@ -80,6 +80,7 @@ class Estimator(ABC):
     rank : place in tables.
     standard : whether it runs unless others are asked for.
     tunable : whether it has gains.
+    adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
 
@@ -95,6 +96,7 @@ class Estimator(ABC):
     rank: ClassVar[int] = 50
     standard: ClassVar[bool] = True
     tunable: ClassVar[bool] = True
+    adapts: ClassVar[bool] = False
     meaning: ClassVar[str] = ""
     tuned_as: ClassVar[str] = ""
     _law: ClassVar[Any]
@@ -129,6 +131,16 @@ class Estimator(ABC):
         slowest, fastest : angular frequencies that recordings show [rad/s].
         """
         raise NotImplementedError(f"{cls.name} has no gains")
+
+    @classmethod
+    def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:
+        """States of the model that the gains act on, or act through."""
+        return fmu.states
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """What each gain does, and its unit."""
+        return {}
 
     @classmethod
     def error_dynamics(

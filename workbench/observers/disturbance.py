@@ -35,7 +35,13 @@ from workbench.observers.contract import (
     stick,
     width,
 )
-from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
 from workbench.observers.operating import (
     Linearised,
     corrected_states,
@@ -44,6 +50,7 @@ from workbench.observers.operating import (
     walks,
 )
 from workbench.system import System
+from workbench.units import quotient
 
 
 class Settings(NamedTuple):
@@ -217,6 +224,25 @@ class DisturbanceObserver(Estimator):
         for values in (memory.z, memory.integral, memory.target, memory.drift):
             values[:] = 0.0
         self._model.x[:] = self.fmu.get_states()
+
+    @classmethod
+    def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:
+        """See Estimator."""
+        return corrected_states(fmu, system)
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        states = corrected_states(fmu, system)
+        rows = {name: fmu.units.get(name, "1") for name in states}
+        rows |= {one.correction: one.unit for one in system.estimated}
+        rates = {f"rate of {name}": quotient(unit, "s") for name, unit in rows.items()}
+        told = feedback_meanings(rates, {one.name: one.unit for one in system.outputs})
+        decays = {
+            f"T_{one.name}": (f"rate at which {one.correction} decays", "1/s")
+            for one in system.estimated
+        }
+        return told | decays
 
     @classmethod
     def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:

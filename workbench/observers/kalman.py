@@ -251,6 +251,7 @@ class ExtendedKalmanFilter(Estimator):
     name = "ekf"
     label = "EKF"
     rank = 40
+    adapts = True
     meaning = "standard deviations of samples, and random walks"
     _law = staticmethod(ekf_law)
     _loop = staticmethod(_loop)
@@ -281,6 +282,20 @@ class ExtendedKalmanFilter(Estimator):
         memory.z[:] = 0.0
         memory.z[: len(self.fmu.states)] = self.fmu.get_states()
         memory.P[:] = np.diag(self._settings.spread**2)
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        told = {
+            "model": ("random walk of every state, over what the system says", "1"),
+            "initial": ("what is known of quantities at the start, over what it says", "1"),
+        }
+        for output in system.outputs:
+            told[output.name] = f"scatter of {output.name}", output.unit
+            told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
+        for one in system.estimated:
+            told[one.name] = f"random walk of {one.name}", f"{one.unit}/sqrt(s)"
+        return {name: told[name] for name in gains.names}
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:

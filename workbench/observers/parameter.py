@@ -26,7 +26,13 @@ from workbench.observers.contract import (
     width,
 )
 from workbench.observers.disturbance import effects
-from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
 from workbench.observers.operating import linearised, loops
 from workbench.system import System
 
@@ -157,6 +163,12 @@ class ParameterEstimator(Estimator):
         self._model.x[:] = self.fmu.get_states()
         self._memory.integral[:] = 0.0
         self._memory.z[:] = 0.0
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        rows = {one.correction: one.unit for one in system.estimated}
+        return feedback_meanings(rows, {one.name: one.unit for one in system.outputs})
 
     @classmethod
     def of(cls, L: Matrix, effect: Vector, source: str = "") -> Gains:

@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -10,24 +10,23 @@ from typing import Any
 import numpy as np
 
 from workbench.case import Case
-from workbench.fmu import FMU, FMUError, Vector
-from workbench.objective import Weights
+from workbench.errors import FMUError, InputError, closest
+from workbench.fmu import Vector
+from workbench.observers import Estimator, SearchSpace, estimators
+from workbench.system import System
+from workbench.systems import open_model
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Job, recordings
 from workbench.tuning.search import Plan, Search, search
-from workbench.tuning.space import SearchSpace, reasoned_gains, search_space, to_vector
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
     cross_validate,
     evaluate_gains,
     sensitivities,
-    untuned_filter,
+    untuned_filters,
 )
 from workbench.tuning.workers import Workers
-
-RADIUS_ERROR = 0.0005  # share of a radius: a wheel measured to a quarter of a millimetre
-
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -36,12 +35,14 @@ class Problem:
     Attributes
     ----------
     cases : that the job's recordings were made from.
+    meanings : what each gain does, and its unit, by its name.
     provenance : what the job was made from, for files of results.
     """
 
     job: Job
     space: SearchSpace
     cases: tuple[Case, ...]
+    meanings: Mapping[str, tuple[str, str]]
     provenance: Mapping[str, Any]
 
 
@@ -86,45 +87,66 @@ class Progress:
 
 
 def prepare(
+    system: System,
     estimator: str,
-    fmu: Path,
-    names: Mapping[str, str],
     cases: Sequence[Case],
-    radius_error: float = RADIUS_ERROR,
+    scale_errors: Mapping[str, float] | None = None,
 ) -> Problem:
     """Gains to start from, bounds to search in, and recordings to judge by.
 
     Parameters
     ----------
-    estimator : its name, one of TUNABLE.
-    fmu : its model.
-    names : our names of variables to those in the FMU.
-    radius_error : relative [1]; see `recordings`.
+    estimator : its name.
+    scale_errors : relative [1], by output; see `recordings`. None: as the system says.
 
     Raises
     ------
     InputError
-        If the FMU is not fit for the estimator, or a case cannot judge.
+        If there is no such estimator, the model is not fit for it, or a case cannot judge.
     """
-    weights = Weights()
+    kind = tunable(system, estimator)
+    if scale_errors is None:
+        scale_errors = {one.name: one.scale_error for one in system.outputs if one.scale_error}
     # A recording shows nothing slower than itself, and its samples carry nothing faster.
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
-    with FMU(fmu, names) as model:
-        gains = reasoned_gains(estimator, model)
-        space = search_space(model, gains, slowest, fastest)
+    with open_model(system, kind.role) as model:
+        gains = kind.reasoned(model, system)
+        space = kind.space(model, system, gains, slowest, fastest)
+        meanings = kind.meanings(model, system, gains)
         provenance = {
             "workbench": version("wheelset-workbench"),
             "python": platform.python_version(),
             "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
+            "system": system.name,
             "fmu": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
             "cases": [case.name for case in cases],
-            "radius_error": radius_error,
-            "weights": asdict(weights),
+            "scale_errors": dict(scale_errors),
+            "weights": dict(system.objective.weights),
         }
-    judged = recordings(cases, radius_error)
-    job = Job(estimator, fmu.read_bytes(), names, gains, judged, weights)
-    return Problem(job, space, tuple(cases), provenance)
+        content = model.path.read_bytes()
+    judged = recordings(cases, system, scale_errors)
+    job = Job(estimator, system, content, gains, judged)
+    return Problem(job, space, tuple(cases), meanings, provenance)
+
+
+def tunable(system: System, estimator: str) -> type[Estimator]:
+    """An estimator that has gains.
+
+    Raises
+    ------
+    InputError
+        If the system has none of this name.
+    """
+    known = {name: kind for name, kind in estimators(system).items() if kind.tunable}
+    if estimator not in known:
+        raise InputError(
+            where=f"estimator '{estimator}'",
+            found=f"none with gains of this name{closest(estimator, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    return known[estimator]
 
 
 def tune(
@@ -159,7 +181,7 @@ def tune(
     """
     run = _Run(pool, problem, plan, checkpoints, resume, progress or Progress())
     job = problem.job
-    before = evaluate_gains(pool, job, [to_vector(job.gains)])[0]
+    before = evaluate_gains(pool, job, [job.gains.values])[0]
     if not np.isfinite(before).all():
         raise FMUError(
             f"{problem.provenance['fmu']['file']}: the FMU fails, hangs or diverges with the "
@@ -202,12 +224,11 @@ class _Run:
     def examine(self, tuned: Tuned, folds: int) -> Tuned:
         """Find out what gains are worth; Ctrl-C leaves out the rest."""
         pool, problem = self.pool, self.problem
-        job, reasoned = problem.job, to_vector(problem.job.gains)
+        job, reasoned = problem.job, problem.job.gains.values
         try:
             effects = sensitivities(pool, job, problem.space, tuned.search)
             tuned = replace(tuned, sensitivities=effects)
-            if job.estimator not in ("ekf", "ukf"):
-                tuned = replace(tuned, beside={"ekf": untuned_filter(job)})
+            tuned = replace(tuned, beside=untuned_filters(job))
             if folds:
                 done = cross_validate(
                     *(pool, job, problem.cases, reasoned, folds),

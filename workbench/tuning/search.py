@@ -19,9 +19,9 @@ from scipy.stats.qmc import LatinHypercube
 
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
+from workbench.observers import SearchSpace
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.cost import Candidate, Evaluation, Job
-from workbench.tuning.space import SearchSpace, to_vector
 from workbench.tuning.workers import Workers, evaluate_all
 
 SPREAD = 0.1  # of the first candidates about the reasoned gains, as a share of the search space
@@ -73,13 +73,13 @@ class Search:
 def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> str:
     """Hash of everything that a search depends on, but for its length."""
     digest = hashlib.sha256(job.fmu)
-    what = [job.estimator, dict(job.names), vars(job.weights), job.friction_left, list(cases)]
-    digest.update(json.dumps([*what, plan.population, plan.seed]).encode())
+    what = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
+    digest.update(json.dumps(what).encode())
     for recording in job.recordings:
         digest.update(recording.name.encode())
         for values in recording[2:]:
             digest.update(np.ascontiguousarray(values).tobytes())
-    for values in (to_vector(job.gains), *vars(space).values()):
+    for values in (job.gains.values, *vars(space).values()):
         digest.update(values.tobytes())
     return digest.hexdigest()
 

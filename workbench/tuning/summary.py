@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from workbench.fmu import Vector
-from workbench.tuning.gains import format_gains
+from workbench.observers import estimators
+from workbench.observers.gains_file import format_gains
 from workbench.tuning.recipe import Tuned
-from workbench.tuning.space import from_vector, gain_names, to_vector
 
 
 def tuned_gains(tuned: Tuned) -> str:
@@ -21,9 +21,10 @@ def tuned_gains(tuned: Tuned) -> str:
         "z_k": _by_case(tuned, found.z_k),
         "generations": len(found.history) - 1,
         "interrupted": found.interrupted,
-        "at_bound": [n for n, at in zip(gain_names(job.gains), at_bound, strict=True) if at],
+        "at_bound": [n for n, at in zip(job.gains.names, at_bound, strict=True) if at],
     }
-    return format_gains(job.estimator, from_vector(job.gains, found.best), came_from)
+    meaning = estimators(job.system)[job.estimator].meaning
+    return format_gains(job.gains.with_values(found.best), meaning, came_from)
 
 
 def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
@@ -33,10 +34,15 @@ def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
     ----------
     folds : asked for; an interruption may have left fewer.
     """
-    found, history = tuned.search, tuned.search.history
+    found, history, job = tuned.search, tuned.search.history, tuned.problem.job
+    following = job.system.following if job.follows else None
     before, after = (_by_case(tuned, z_k) for z_k in (tuned.before, found.z_k))
     return {
-        "estimator": tuned.problem.job.estimator,
+        "estimator": job.estimator,
+        "label": estimators(job.system)[job.estimator].label,
+        "judged": job.system.objective.judged,
+        "bandwidth": job.system.objective.bandwidth,
+        "follows": None if following is None else vars(following),
         "z": found.z,
         "z_reasoned": max(before.values()),
         "cases": {
@@ -62,7 +68,10 @@ def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
             for fold in tuned.folds
         ],
         "beside": {
-            name: {"z": _finite(float(z_k.max())), "worst": list(after)[int(z_k.argmax())]}
+            name: {
+                "label": estimators(job.system)[name].label,
+                "z": _finite(float(z_k.max())), "worst": list(after)[int(z_k.argmax())],
+            }
             for name, z_k in tuned.beside.items()
         },
         "work": {
@@ -91,11 +100,13 @@ def _by_case(tuned: Tuned, z_k: Vector) -> dict[str, float]:
 
 def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
     job, space, found = tuned.problem.job, tuned.problem.space, tuned.search
-    names, reasoned = gain_names(job.gains), to_vector(job.gains)
+    names, reasoned = job.gains.names, job.gains.values
     lower, upper = space.gains(np.array([np.zeros(len(names)), np.ones(len(names))]))
     at_bound = space.at_bound(found.coordinates)
     return {
         name: {
+            "meaning": tuned.problem.meanings[name][0],
+            "unit": tuned.problem.meanings[name][1],
             "value": float(found.best[i]),
             "reasoned": float(reasoned[i]),
             "lower": float(lower[i]),
