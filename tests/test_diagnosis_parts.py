@@ -10,7 +10,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, Conditions
-from workbench.diagnosis import CATALOGUE, choose
+from workbench.diagnosis import choose, read_effects
 from workbench.diagnosis.evidence import Evidence
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Linearised, Point, StopSystem
@@ -19,9 +19,11 @@ from workbench.diagnosis.quadratic import add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
+from workbench.modelica import read_library
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
+EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
 DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
 
@@ -29,8 +31,8 @@ DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source("AllEffects", CATALOGUE, {}, {}, "Every effect at zero")
-    build(PACKAGE, "AllEffects", text, path, every_platform=False)
+    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
 
@@ -265,7 +267,7 @@ def test_covariance_is_the_same_in_any_unit() -> None:
 def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
     with FMU(everything) as fmu:
         described = {variable.name: variable for variable in fmu.description.variables}
-        for effect in CATALOGUE:
+        for effect in EFFECTS:
             for parameter in effect.sizes:
                 for name in variables(effect, parameter):
                     one = described[name]
@@ -283,11 +285,12 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
 
 def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
     with pytest.raises(InputError, match="closest: 'BrakeFade'"):
-        choose(["brakefade"])
+        choose(["brakefade"], EFFECTS)
 
 
 def test_source_with_an_error_says_where(tmp_path: Path) -> None:
-    text = source("Extended", CATALOGUE[:1], {CATALOGUE[0].name: {"slop": 0.1}}, {}, "a typo")
+    wrong = {EFFECTS[0].name: {"slop": 0.1}}
+    text = source(LIBRARY, "MinimalObserver", "Extended", EFFECTS[:1], wrong, {}, "a typo")
     with pytest.raises(InputError, match="slop"):
-        build(PACKAGE, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
+        build(LIBRARY, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
     assert not (tmp_path / "Extended.fmu").exists()

@@ -14,8 +14,9 @@ from workbench.commands.arguments import (
     positive,
     require_compiler,
 )
-from workbench.diagnosis import CATALOGUE, choose, diagnose
+from workbench.diagnosis import choose, diagnose, read_effects
 from workbench.fmu import FMU
+from workbench.modelica import read_library
 from workbench.report.diagnosis import (
     format_diagnosis,
     summarise_diagnosis,
@@ -23,6 +24,7 @@ from workbench.report.diagnosis import (
 )
 
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
+_BASE = "MinimalObserver"
 
 
 def add_diagnose(commands: Commands) -> None:
@@ -39,9 +41,8 @@ def add_diagnose(commands: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench diagnose my_stops --out results/mine\n"
         "  python -m workbench diagnose my_stops --effects BrakeFade CylinderLag\n"
-        "  python -m workbench diagnose new_stops --model results/mine/model/Extended.fmu\n\n"
-        "effects of the catalogue:\n"
-        + "\n".join(f"  {effect.name:<29} {effect.text}" for effect in CATALOGUE),
+        "  python -m workbench diagnose new_stops --model results/mine/model/Extended.fmu\n"
+        "  python -m workbench diagnose --list",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/diagnose")
@@ -57,7 +58,10 @@ def add_diagnose(commands: Commands) -> None:
         nargs="+",
         default=[],
         metavar="NAME",
-        help="effects to consider (default: all of the catalogue)",
+        help="effects to consider (default: all of the library)",
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="list the effects of the library, and end"
     )
     parser.add_argument(
         "--library",
@@ -77,8 +81,12 @@ def add_diagnose(commands: Commands) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> int:
+    library = read_library(options.library)
+    effects = choose(options.effects, read_effects(library, _BASE))
+    if options.list:
+        print("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
+        return 0
     require_compiler()
-    effects = choose(options.effects)
     cases = read_cases(options.cases)
     begin = time.perf_counter()
 
@@ -88,7 +96,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     report(f"{len(cases)} stops")
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
-        cases, effects, options.library, options.model, options.out, options.workers, report
+        cases, effects, library, _BASE, options.model, options.out, options.workers, report
     )
     with FMU(options.model) as model:
         provenance = {

@@ -7,12 +7,15 @@ from importlib.metadata import version
 from pathlib import Path
 
 from workbench.commands.arguments import Commands, positive, require_compiler
+from workbench.diagnosis import read_effects
+from workbench.modelica import read_library
 from workbench.power import measure, plan, summarise
 from workbench.report.power import format_power, write_power
 from workbench.rig import select
 
 _REFERENCE = Path("fmus/fmi2/Reference.fmu")
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
+_BASE = "MinimalObserver"
 _DRY = (
     *("01_dry_80_1.5", "02_dry_100_2.7", "03_dry_120_3.6", "04_dry_160_4.2"),
     *("05_dry_120_2.7_rev", "06_dry_160_3.6_rev"),
@@ -94,7 +97,9 @@ def _power(options: argparse.Namespace) -> int:
     require_compiler()
     scenarios = select(options.case or _DRY)
     sizes = sorted(set(options.sizes))
-    groups = plan(options.clean, sizes, options.repeats, options.pairs, options.seed)
+    library = read_library(options.library)
+    effects = read_effects(library, _BASE)
+    groups = plan(effects, options.clean, sizes, options.repeats, options.pairs, options.seed)
     begin = time.perf_counter()
 
     def report(line: str) -> None:
@@ -105,21 +110,23 @@ def _power(options: argparse.Namespace) -> int:
         groups,
         scenarios,
         options.fmu,
-        options.library,
+        library,
+        _BASE,
+        effects,
         options.out,
         seed=options.seed,
         workers=options.workers,
         resume=options.resume,
         report=report,
     )
-    summary = summarise(results)
+    summary = summarise(results, effects)
     provenance = {
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
         "stops": [scenario.name for scenario in scenarios],
         "interrupted": interrupted,
     }
-    write_power(summary, provenance, options.out)
+    write_power(summary, effects, provenance, options.out)
     print(format_power(summary))
     print(f"data and figures: {options.out}")
     return 130 if interrupted else 0

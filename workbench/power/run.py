@@ -16,12 +16,13 @@ from threadpoolctl import threadpool_limits
 
 from workbench import diagnosis, rig
 from workbench.case import read_cases
-from workbench.diagnosis import CATALOGUE
+from workbench.diagnosis import Effect
 from workbench.diagnosis.evidence import Court
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import judge
 from workbench.fmu import CoSimulation
+from workbench.modelica import Library
 from workbench.power.journal import Journal, Judged, judged
 from workbench.power.planting import Group
 from workbench.rig import Scenario, Stop, simulate, write_recording
@@ -39,18 +40,22 @@ class Setup:
     scenarios : the stops of a set.
     reference : multibody model, a Co-Simulation FMU, which makes the recordings.
     everything : FMU of the observer model with every effect at zero, which diagnoses them.
+    effects : that it has.
     """
 
     scenarios: tuple[Scenario, ...]
     reference: Path
     everything: Path
+    effects: tuple[Effect, ...]
 
 
 def measure(
     groups: Sequence[Group],
     scenarios: Sequence[Scenario],
     reference: Path,
-    package: Path,
+    library: Library,
+    base: str,
+    effects: Sequence[Effect],
     out: Path,
     *,
     seed: int,
@@ -65,7 +70,8 @@ def measure(
     groups : as planned; sets that are judged already are left out.
     scenarios : the stops of a set.
     reference : multibody model that makes the recordings.
-    package : `package.mo` of the Modelica library that diagnoses them.
+    library, base : the Modelica library that diagnoses them, and name of its observer model.
+    effects : of the library, that are considered.
     out : folder of the verdicts, and where a run resumes from.
     seed : of the plan.
     report : takes a line on each set.
@@ -83,14 +89,17 @@ def measure(
     with CoSimulation(reference):
         pass  # a file that is no FMU is refused here, once
     with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(tuple(scenarios), reference, Path(scratch) / "AllEffects.fmu")
-        text = source("AllEffects", CATALOGUE, {}, {}, "Observer model with every effect, at zero")
-        build(package, "AllEffects", text, setup.everything, every_platform=False)
+        everything = Path(scratch) / "AllEffects.fmu"
+        setup = Setup(tuple(scenarios), reference, everything, tuple(effects))
+        about = "Observer model with every effect, at zero"
+        text = source(library, base, "AllEffects", effects, {}, {}, about)
+        build(library, "AllEffects", text, everything, every_platform=False)
         identity = {
             "seed": seed,
             "scenarios": [repr(scenario) for scenario in scenarios],
             "reference": _hash([reference]),
-            "observer": _hash([setup.everything]),
+            "observer": _hash([everything]),
+            "effects": [repr(effect) for effect in effects],
             "code": _hash(sorted(f for m in (diagnosis, rig) for f in _sources(m.__path__))),
         }
         out.mkdir(parents=True, exist_ok=True)
@@ -180,7 +189,7 @@ def _evaluate(group: Group, setup: Setup) -> list[Judged]:
                     write_recording(stop, effects, _RATE, Path(folder) / stop.scenario.name)
                 cases = read_cases([Path(folder)])
             with Court(setup.everything, {}, cases, 1) as court:
-                found = judge(Fit(court, CATALOGUE), CATALOGUE, lambda _: None)
+                found = judge(Fit(court, setup.effects), setup.effects, lambda _: None)
         except Exception as error:  # one set must not end a run of hours; it is counted
             seconds = time.perf_counter() - begin
             results.append(Judged(planting, "failed", (), None, None, seconds, repr(error)))

@@ -1,7 +1,7 @@
 """Power of the diagnosis: figures, file and table."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from workbench.diagnosis import CATALOGUE
+from workbench.diagnosis import Effect
 from workbench.power import CLEAR, VISIBLE
 from workbench.report.diagnosis_figures import draw_heat, save_figure
 from workbench.report.figures import LIGHT, STYLE
@@ -19,16 +19,27 @@ _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 
-def write_power(summary: Mapping[str, Any], provenance: Mapping[str, Any], out: Path) -> None:
-    """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage."""
+def write_power(
+    summary: Mapping[str, Any],
+    effects: Sequence[Effect],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage.
+
+    Parameters
+    ----------
+    effects : of the library, in whose order they stand.
+    """
     write_text(
         out / "power.json", json.dumps({"provenance": provenance, **summary}, indent=2) + "\n"
     )
-    effects = summary["effects"]
+    names = [effect.name for effect in effects]
+    measured = summary["effects"]
     with mpl.rc_context(STYLE | {"font.size": 8}):
-        figures = {"confusion": _confusion(summary["confusion"])} if summary["sets"] else {}
-        if effects:
-            figures |= {"power": _curves(effects), "coverage": _coverage(summary)}
+        figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
+        if measured:
+            figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
         for name, figure in figures.items():
             save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
 
@@ -57,10 +68,10 @@ def _curves(effects: Mapping[str, Any]) -> Figure:
     return sheet
 
 
-def _confusion(confusion: Mapping[str, Mapping[str, int]]) -> Figure:
+def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> Figure:
     """Planted by named, each row in percent."""
     said = {name for row in confusion.values() for name in row}
-    order = ["nothing", *(effect.name for effect in CATALOGUE), "unexplained", "failed"]
+    order = ["nothing", *names, "unexplained", "failed"]
     columns = [name for name in order if name in said or name in confusion]
     table = np.array(
         [
