@@ -9,11 +9,11 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, Conditions
+from workbench.case import Case, Conditions, read_cases
 from workbench.diagnosis import choose, read_effects
-from workbench.diagnosis.evidence import Evidence
+from workbench.diagnosis.evidence import Court, Evidence
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import Linearised, Point, StopSystem
+from workbench.diagnosis.fit import Fit, Linearised, Point, StopSystem
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
@@ -281,6 +281,37 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
                 assert one.minimum is not None
                 assert one.maximum is not None
                 assert one.minimum <= min(values) <= max(values) <= one.maximum
+
+
+def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: Path) -> None:
+    effects = {effect.name: effect for effect in EFFECTS}
+    film, single, lag = (effects[n] for n in ("WaterFilm", "SingleDiscWaterFilm", "CylinderLag"))
+    named = ("03_dry_120_3.6", "13_onedisc_100_2.7", "11_brakewet_120_2.7_rev")
+    cases = read_cases([ROOT / "cases" / name for name in named])
+
+    def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
+        with Court(everything, {}, of, 1) as court:
+            fit = Fit(court, EFFECTS)
+            point = replace(fit.start(), sizes={("WaterFilm", "film"): 0.3})
+            values = fit.values(point)
+            both = [[fit.present(one, k) for k in range(len(of))] for one in (film, lag)]
+            assert [one["padFriction.waterFilm.film"] > 0.0 for one in values] == both[0]
+            wet = [one.get("padFriction.waterFilm.wet") for one in values]
+            return both[0], both[1], wet, fit.unseen(single)
+
+    reason = "the conditions of the stops say which discs are wet"
+    assert asked(cases) == ([False, True, True], [True] * 3, [0.0, 1 / 3, 1.0], reason)
+    # Nobody said that a disc is wet: then any may be.
+    assert asked([cases[0]] * 2) == ([True, True], [True, True], [None, None], "")
+
+
+def test_what_shows_only_where_an_input_falls_is_not_looked_for_elsewhere() -> None:
+    rising = ready(noisy(1))
+    assert not rising.falls("pB")
+    falling = replace(rising, u=rising.u[::-1])
+    assert falling.falls("pB")
+    with pytest.raises(InputError, match="no recorded input 'pC'"):
+        rising.falls("pC")
 
 
 def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
