@@ -207,7 +207,10 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path: Path) -> None:
     part.write_text("within P; model B end B;")
     with pytest.raises(InputError, match=r"found class P\.B; expected a class named A"):
         read_library(tmp_path / "package.mo")
-    with pytest.raises(InputError, match="no text"):
+    part.write_bytes(b'within P; model A "\xff" end A;')
+    with pytest.raises(InputError, match="expected Modelica in UTF-8"):
+        read_library(tmp_path / "package.mo")
+    with pytest.raises(InputError, match="no such file"):
         read_library(tmp_path / "Missing.mo")
 
 

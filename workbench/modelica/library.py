@@ -170,14 +170,21 @@ def read_library(file: Path) -> Library:
 
 def _read(file: Path, enclosing: str) -> Iterator[Class]:
     """Classes of a file and, of a package.mo, of all files and folders beside it."""
+    if not file.is_file():
+        raise InputError(
+            where=str(file),
+            found="no such file",
+            expected="the package.mo of a Modelica library, or its only file",
+            remedy="give its path, with --library on the command line",
+        )
     try:
         text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise InputError(
             where=str(file),
             found=f"no text ({error})",
-            expected="the package.mo of a Modelica library, or its only file",
-            remedy="correct the path, or save the file as UTF-8",
+            expected="Modelica in UTF-8",
+            remedy="save the file as UTF-8",
         ) from None
     classes = Reader(file, text).file(enclosing)
     name = classes[0].name
