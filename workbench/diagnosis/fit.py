@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from workbench.case import Case, Surface
-from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.catalogue import Effect, Unless, Where
 from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Evidence
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
+from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
 
 # Relative standard deviation from stop to stop, data sheet of the rig.
@@ -35,9 +36,6 @@ _HALVED = 4  # times: after that a step is given up
 _SECOND = 20  # blocks
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 _FURTHEST_LEVEL = 3.0  # the same of what differs by nature
-
-_FILM, _SINGLE, _HYSTERESIS = "WaterFilm", "SingleDiscWaterFilm", "CaliperHysteresis"
-
 
 # (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
 Key = tuple[str, str]
@@ -128,8 +126,6 @@ class Fit:
     def __init__(self, court: Court, effects: Sequence[Effect]) -> None:
         self._court = court
         self._effects = {effect.name: effect for effect in effects}
-        self._soaked = any("wet" in case.conditions.discs for case in court.cases)
-        self._released = any(stop.released for stop in court.stops)
         self.count = len(court.cases)
 
     @property
@@ -157,20 +153,34 @@ class Fit:
         return Point({}, levels, np.zeros((self.count, len(TOLERANCES))), {})
 
     def present(self, effect: Effect, k: int) -> bool:
-        """Whether stop k can have an effect: water is where the conditions say, if they do."""
-        return effect.name != _FILM or not self._soaked or self._wet(k) > 0.0
+        """Whether stop k can have an effect: where the conditions say, if those of any stop do."""
+        where = effect.where
+        return where is None or not self._told(where) or self._share(where, k) > 0.0
 
-    def _wet(self, k: int) -> float:
-        """Share of the discs that are wet, by the conditions of stop k."""
-        discs = self._court.cases[k].conditions.discs
-        return discs.count("wet") / len(discs)
+    def _share(self, said: Where | Unless, k: int) -> float:
+        """Share of what a condition of stop k says that is one state."""
+        states = getattr(self._court.cases[k].conditions, said.condition, None)
+        if states is None:
+            raise InputError(
+                where=f"conditions of {self._court.cases[k].name}",
+                found=f"no '{said.condition}', which an effect of the library asks for",
+                expected="a condition that stops have",
+                remedy="correct the annotation of the effect",
+            )
+        entries = states if isinstance(states, tuple) else (states,)
+        return entries.count(said.state) / len(entries)
+
+    def _told(self, said: Where | Unless) -> bool:
+        """Whether the conditions of any stop say so."""
+        return any(self._share(said, k) > 0.0 for k in range(self.count))
 
     def unseen(self, effect: Effect) -> str:
         """Why these stops cannot show an effect; empty if they can."""
-        if self._soaked and effect.name == _SINGLE:
-            return "the conditions of the stops say which discs are wet"
-        if effect.name == _HYSTERESIS and not self._released:
-            return "brake pressure never falls in these stops"
+        unless, falling = effect.unless, effect.falling
+        if unless is not None and self._told(unless):
+            return unless.because
+        if falling is not None and not any(s.falls(falling.signal) for s in self._court.stops):
+            return falling.because
         return effect.hidden
 
     def values(self, point: Point) -> list[dict[str, float]]:
@@ -186,9 +196,10 @@ class Fit:
         for j, (name, tolerance) in enumerate(TOLERANCES.items()):
             common = self._common(point, name, case)
             values[name] = common * (1.0 + tolerance * point.deviations[k, j])
-        if self._soaked and _FILM in self._effects:
-            for name in variables(self._effects[_FILM], "wet"):
-                values[name] = self._wet(k)
+        for effect in self._effects.values():
+            where = effect.where
+            if where is not None and where.share and self._told(where):
+                values |= dict.fromkeys(variables(effect, where.share), self._share(where, k))
         for (name, parameter), size in point.sizes.items():
             effect = self._effects[name]
             if parameter == "amplitude":

@@ -35,6 +35,7 @@ _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat it
 _MODE, _DAMPING = 21.6, 0.05  # [Hz], [1]
 
 CHANNELS = ("slip", "omegaR", "Fx")  # in m/s, rad/s, N
+_RECORDED = ("pB", "tauR")  # columns of u
 
 Mask = NDArray[np.bool_]
 
@@ -72,11 +73,24 @@ class Samples:
     speed: Vector
     set_aside: dict[str, int]
 
-    @property
-    def released(self) -> bool:
-        """Whether brake pressure falls, by more than its sensor's noise and a valve's overshoot."""
-        pB = np.concatenate([self.u[first:end, 0] for first, end in self.blocks])
-        return bool(np.max(np.maximum.accumulate(pB) - pB) > _RELEASED * pB.max())
+    def falls(self, signal: str) -> bool:
+        """Whether an input falls, by more than its sensor's noise and a valve's overshoot.
+
+        Raises
+        ------
+        InputError
+            If it is none of the recorded inputs.
+        """
+        if signal not in _RECORDED:
+            raise InputError(
+                where=f"stop {self.name}",
+                found=f"no recorded input '{signal}', which an effect of the library asks for",
+                expected=f"one of {', '.join(_RECORDED)}",
+                remedy="correct the annotation of the effect",
+            )
+        column = _RECORDED.index(signal)
+        u = np.concatenate([self.u[first:end, column] for first, end in self.blocks])
+        return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
 
     def behind_structure(self, force: Vector) -> Vector:
         """What load cells read of a creep force [N], (n,): a mode of second order in between."""

@@ -9,28 +9,26 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.diagnosis import CATALOGUE
+from workbench.diagnosis import Effect
 from workbench.rig import CONSTANT_PADS, Effects, plant
 
 Kind = Literal["clean", "single", "pair", "outside"]
 
-_MATTERS = {effect.name: effect.matters for effect in CATALOGUE}
 _LEAST = {one.name: one.metadata["least"] for one in dataclasses.fields(Effects)}
-HIDDEN = frozenset(effect.name for effect in CATALOGUE if effect.hidden)
 
 
 @dataclass(frozen=True)
 class Plantable:
-    """An effect of the rig, and what the catalogue calls it.
+    """An effect of the rig, and what the library calls it.
 
     Attributes
     ----------
     name : of the rig's effect.
-    effect : of the catalogue's; empty if the catalogue has none.
+    effect : of the library's; empty if the library has none.
     signed : whether it is planted in both directions.
     sensed : whether it changes readings only, so that one simulation serves all sizes.
-    shapes : what the rig's law has for other parameters of the catalogue's, SI.
-    outside : unit of sizes of an effect that the catalogue does not have, SI.
+    shapes : what the rig's law has for other parameters of the library's, SI.
+    outside : unit of sizes of an effect that the library does not have, SI.
     """
 
     name: str
@@ -40,10 +38,9 @@ class Plantable:
     shapes: Mapping[str, float] = field(default_factory=dict)
     outside: float = math.nan
 
-    @property
-    def size(self) -> float:
+    def size(self, effects: Sequence[Effect]) -> float:
         """Unit of all sizes, in the SI unit of the effect: the least that is worth a finding."""
-        return _MATTERS.get(self.effect, self.outside)
+        return next((one.matters for one in effects if one.name == self.effect), self.outside)
 
 
 _FILM = {"E0": 0.45e6}
@@ -117,13 +114,21 @@ class Planting:
 Group = tuple[Planting, ...]
 
 
-def plan(clean: int, sizes: Sequence[float], repeats: int, pairs: int, seed: int) -> list[Group]:
+def plan(
+    effects: Sequence[Effect],
+    clean: int,
+    sizes: Sequence[float],
+    repeats: int,
+    pairs: int,
+    seed: int,
+) -> list[Group]:
     """Plan sets of stops; the sets of a group share their simulation.
 
     What a set is does not depend on how many others there are, so that a plan can be extended.
 
     Parameters
     ----------
+    effects : of the library: how large they must be to matter, and which are hidden.
     clean : number of sets without an effect.
     sizes : multiples of the size that matters.
     repeats : sets of each effect at each size.
@@ -132,9 +137,9 @@ def plan(clean: int, sizes: Sequence[float], repeats: int, pairs: int, seed: int
     largest_first = sorted(sizes, reverse=True)
     kinds: list[list[Group]] = [
         [(Planting("clean", _seed(seed, "clean", n), 0.0, {}),) for n in range(clean)],
-        _each([one for one in PLANTABLE if one.effect], largest_first, repeats, seed),
-        [(_pair(_seed(seed, "pair", n), largest_first[0]),) for n in range(pairs)],
-        _each([one for one in PLANTABLE if not one.effect], largest_first, repeats, seed),
+        _each(effects, [one for one in PLANTABLE if one.effect], largest_first, repeats, seed),
+        [(_pair(effects, _seed(seed, "pair", n), largest_first[0]),) for n in range(pairs)],
+        _each(effects, [one for one in PLANTABLE if not one.effect], largest_first, repeats, seed),
     ]
     # All kinds advance alike, so that a run that is cut short has something of each.
     ranked = [((i + 0.5) / len(kind), group) for kind in kinds for i, group in enumerate(kind)]
@@ -142,37 +147,43 @@ def plan(clean: int, sizes: Sequence[float], repeats: int, pairs: int, seed: int
 
 
 def _each(
-    plantables: Sequence[Plantable], sizes: Sequence[float], repeats: int, seed: int
+    effects: Sequence[Effect],
+    plantables: Sequence[Plantable],
+    sizes: Sequence[float],
+    repeats: int,
+    seed: int,
 ) -> list[Group]:
     groups: list[Group] = []
     for repeat in range(repeats):
         for one in plantables:
             if one.sensed:
                 own = _seed(seed, one.name, repeat)
-                groups.append(tuple(_single(one, size, own) for size in sizes))
+                groups.append(tuple(_single(effects, one, size, own) for size in sizes))
         for size in sizes:
             for one in plantables:
                 if not one.sensed:
                     own = _seed(seed, f"{one.name} {size:g}", repeat)
-                    groups.append((_single(one, size, own),))
+                    groups.append((_single(effects, one, size, own),))
     return groups
 
 
-def _single(one: Plantable, size: float, seed: int) -> Planting:
-    gain = _gain(one, size, np.random.default_rng(seed))
+def _single(effects: Sequence[Effect], one: Plantable, size: float, seed: int) -> Planting:
+    gain = _gain(one, size * one.size(effects), np.random.default_rng(seed))
     return Planting("single" if one.effect else "outside", seed, size, {one.name: gain})
 
 
-def _pair(seed: int, size: float) -> Planting:
+def _pair(effects: Sequence[Effect], seed: int, size: float) -> Planting:
     """Two effects, drawn from those that stops can show."""
     rng = np.random.default_rng(seed)
-    able = [one for one in PLANTABLE if one.effect and one.effect not in HIDDEN]
+    seen = {effect.name for effect in effects if not effect.hidden}
+    able = [one for one in PLANTABLE if one.effect in seen]
     both = [able[i] for i in rng.choice(len(able), 2, replace=False)]
-    return Planting("pair", seed, size, {one.name: _gain(one, size, rng) for one in both})
+    gains = {one.name: _gain(one, size * one.size(effects), rng) for one in both}
+    return Planting("pair", seed, size, gains)
 
 
 def _gain(one: Plantable, size: float, rng: np.random.Generator) -> float:
-    gain = float(f"{size * one.size:.6g}")
+    gain = float(f"{size:.6g}")
     negative = one.signed and rng.random() < 0.5 and -gain >= _LEAST[one.name]
     return -gain if negative else gain
 

@@ -8,14 +8,13 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from workbench.diagnosis import CATALOGUE
+from workbench.diagnosis import Effect
 from workbench.power.journal import Judged
-from workbench.power.planting import BY_NAME, HIDDEN, PLANTABLE
+from workbench.power.planting import BY_NAME, PLANTABLE
 from workbench.rig import Effects
 
 VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
 CLEAR = 4.0  # standard deviations that a size must have to be more than noise
-_LABELS = {effect.name: effect.label for effect in CATALOGUE}
 _UNITS = {one.name: one.metadata["unit"] for one in fields(Effects)}
 
 
@@ -62,7 +61,7 @@ def named_all(result: Judged) -> bool:
     )
 
 
-def intervals_cover(result: Judged) -> list[bool]:
+def intervals_cover(result: Judged, effects: Sequence[Effect]) -> list[bool]:
     """For each interval of the planted effect, if it was named first: whether it holds the truth.
 
     A size within the interval of its twin is no claim, and is not judged.
@@ -71,18 +70,19 @@ def intervals_cover(result: Judged) -> list[bool]:
     plantable = BY_NAME[name]
     if result.first != plantable.effect:
         return []
-    label = _LABELS[plantable.effect]
+    label = next(one.label for one in effects if one.name == plantable.effect)
     true = {**plantable.shapes, label: abs(gain) if label == "amplitude" else gain}
     stated = result.causes[0].parameters
     return [low <= true[key] <= high for key, (_, low, high) in stated.items() if key in true]
 
 
-def summarise(results: Sequence[Judged]) -> dict[str, Any]:
+def summarise(results: Sequence[Judged], effects: Sequence[Effect]) -> dict[str, Any]:
     """All statistics of a run, as they are written to power.json.
 
     A share has `hits`, `of`, `share` and the 95 % interval `low` to `high`. Sizes are multiples of
     the size that matters. A diagnosis that failed counts as neither right nor "nothing".
     """
+    hidden = {effect.name for effect in effects if effect.hidden}
     kinds: dict[str, list[Judged]] = {"clean": [], "single": [], "pair": [], "outside": []}
     for result in results:
         kinds[result.planting.kind].append(result)
@@ -93,7 +93,7 @@ def summarise(results: Sequence[Judged]) -> dict[str, Any]:
     visible = [
         result
         for one in known
-        if one.effect not in HIDDEN
+        if one.effect not in hidden
         for result in by_name[one.name]
         if result.planting.multiple >= VISIBLE
     ]
@@ -119,26 +119,30 @@ def summarise(results: Sequence[Judged]) -> dict[str, Any]:
             for one in kinds["outside"]
             if one.planting.multiple >= VISIBLE
         ),
-        "coverage": share(held for one in kinds["single"] for held in intervals_cover(one)),
+        "coverage": share(
+            held for one in kinds["single"] for held in intervals_cover(one, effects)
+        ),
         "effects": {
             one.effect: {
                 "rig": one.name,
-                "size": one.size,
+                "size": one.size(effects),
                 "unit": _UNITS[one.name],
-                "hidden": one.effect in HIDDEN,
+                "hidden": one.effect in hidden,
                 "right_first": {
                     size: share(map(named_right, some))
                     for size, some in _by_size(by_name[one.name]).items()
                 },
                 "coverage": share(
-                    held for result in by_name[one.name] for held in intervals_cover(result)
+                    held
+                    for result in by_name[one.name]
+                    for held in intervals_cover(result, effects)
                 ),
             }
             for one in known
         },
         "outside": {
             one.name: {
-                "size": one.size,
+                "size": one.size(effects),
                 "unit": _UNITS[one.name],
                 "verdicts": {
                     size: dict(Counter(result.verdict for result in some))
