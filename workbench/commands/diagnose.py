@@ -67,6 +67,12 @@ def add_diagnose(commands: Commands) -> None:
         help="package.mo of the Modelica library (default: %(default)s)",
     )
     parser.add_argument(
+        "--platforms",
+        choices=("native", "all"),
+        default="native",
+        help="of the extended FMU: this machine's, or all (default: %(default)s)",
+    )
+    parser.add_argument(
         "--workers",
         type=positive,
         default=os.cpu_count() or 1,
@@ -88,7 +94,14 @@ def _diagnose(options: argparse.Namespace) -> int:
     report(f"{len(cases)} stops")
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
-        cases, effects, options.library, options.model, options.out, options.workers, report
+        cases,
+        effects,
+        options.library,
+        options.model,
+        options.out,
+        options.workers,
+        report,
+        every_platform=options.platforms == "all",
     )
     with FMU(options.model) as model:
         provenance = {

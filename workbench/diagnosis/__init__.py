@@ -100,6 +100,8 @@ def diagnose(
     out: Path,
     workers: int,
     report: Reporter,
+    *,
+    every_platform: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recorded stops; write the extended model.
 
@@ -111,6 +113,7 @@ def diagnose(
     model : FMU of the minimal observer model, or of an extension of it: its values are kept.
     out : folder of the extended model.
     report : takes a line on what is being done.
+    every_platform : whether the extended FMU is for all platforms, or only for this machine's.
 
     Raises
     ------
@@ -138,7 +141,9 @@ def diagnose(
             diagnosis = judge(fit, effects, report)
             best = diagnosis.best
             found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
-            extension = _extend(court, fit, diagnosis, effects, package, out, report)
+            extension = _extend(
+                court, fit, diagnosis, effects, package, out, report, every_platform=every_platform
+            )
             observers: dict[str, dict[str, tuple[float, float]]] = {}
             turning = any(effect.order_locked for effect in best.active)
             if extension is not None and cases[0].Fx is not None and not turning:
@@ -194,6 +199,8 @@ def _extend(
     package: Path,
     out: Path,
     report: Reporter,
+    *,
+    every_platform: bool,
 ) -> Extension | None:
     """Write the extended model, compile it, compare its predictions with those of the fit."""
     if not diagnosis.causes:
@@ -225,7 +232,7 @@ def _extend(
     folder.mkdir(parents=True, exist_ok=True)
     modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
     modelica.write_text(text)
-    build(package, EXTENDED, text, path, every_platform=True)
+    build(package, EXTENDED, text, path, every_platform=every_platform)
     bench = Bench(path, court.stops)
     difference = 0.0
     for k, evidence in enumerate(diagnosis.best.linearised.evidence):

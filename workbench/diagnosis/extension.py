@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from workbench.diagnosis import shelf
 from workbench.diagnosis.catalogue import Effect
 from workbench.errors import InputError
 
@@ -122,6 +123,8 @@ def _composed(
 def build(package: Path, name: str, text: str, fmu: Path, *, every_platform: bool) -> None:
     """Compile the source of an extended model to an FMU; needs the extra [compiler].
 
+    An FMU that was built before, of the same sources, is taken from where it is kept.
+
     Parameters
     ----------
     package : `package.mo` of the library that the source extends; it is left alone.
@@ -132,8 +135,6 @@ def build(package: Path, name: str, text: str, fmu: Path, *, every_platform: boo
     InputError
         If the library is not there, or the source has errors.
     """
-    from workbench import compiler  # an extra: everything else runs without it
-
     if not package.is_file():
         raise InputError(
             where=str(package),
@@ -141,9 +142,15 @@ def build(package: Path, name: str, text: str, fmu: Path, *, every_platform: boo
             expected=f"the package.mo of {LIBRARY}, which effects are taken from",
             remedy="give its path with --library, or run this in the workbench's folder",
         )
-    with tempfile.TemporaryDirectory() as scratch:
-        library = Path(scratch) / LIBRARY
-        shutil.copytree(package.parent, library)
-        (library / f"{name}.mo").write_text(f"within {LIBRARY};\n{text}")
-        platforms = compiler.PLATFORMS if every_platform else [compiler.native()]
-        compiler.build(library / "package.mo", f"{LIBRARY}.{name}", fmu, platforms=list(platforms))
+
+    def make(path: Path) -> None:
+        from workbench import compiler  # an extra: everything else runs without it
+
+        platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
+        with tempfile.TemporaryDirectory() as scratch:
+            library = Path(scratch) / LIBRARY
+            shutil.copytree(package.parent, library)
+            (library / f"{name}.mo").write_text(f"within {LIBRARY};\n{text}")
+            compiler.build(library / "package.mo", f"{LIBRARY}.{name}", path, platforms=platforms)
+
+    shelf.fetch(shelf.key(package.parent, name, text, f"{every_platform}"), fmu, make)
