@@ -241,7 +241,7 @@ def _extend(
             for name, value in fit.values(point)[k].items()
             if name in bench.parameters or name == FORCE_DELAY
         }
-        errors, _ = bench.errors(k, given)
+        errors = bench.at(k, given).errors
         difference = max(difference, float(np.abs(errors - evidence.errors).max()))
     bench.close()
     return Extension(modelica, path, difference)

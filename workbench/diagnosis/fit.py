@@ -6,7 +6,7 @@ is left of a stop is a small quadratic form in the common unknowns, which sums a
 are made of.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.case import Case, Surface
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Evidence
+from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Evidence, Item, Result
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.fmu import Matrix, Vector
@@ -43,6 +43,7 @@ _FILM, _SINGLE, _HYSTERESIS = "WaterFilm", "SingleDiscWaterFilm", "CaliperHyster
 Key = tuple[str, str]
 _STOP = ""
 _LATE: Key = (FORCE_DELAY, "load cell")
+_DELAY: Key = (_STOP, FORCE_DELAY)
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Linearised:
 
     Attributes
     ----------
-    keys : of the columns of each jacobian: TOLERANCES, then (effect, parameter).
+    keys : of the columns of each jacobian: FORCE_DELAY, TOLERANCES, (effect, parameter).
     inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
     away : chi-squared of levels and deviations against what tolerances say of them.
     """
@@ -79,6 +80,14 @@ class Linearised:
     evidence: tuple[Evidence, ...]
     inflation: Vector
     away: float
+
+    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
+        """The same with more columns, (b*m + 1, p) of each stop."""
+        evidence = tuple(
+            replace(one, jacobian=np.column_stack([one.jacobian, more]))
+            for one, more in zip(self.evidence, jacobians, strict=True)
+        )
+        return replace(self, keys=(*self.keys, *keys), evidence=evidence)
 
     @property
     def misfit(self) -> float:
@@ -211,25 +220,57 @@ class Fit:
             return point.levels[name, case.conditions.wheel_rail]
         return self._court.nominal[name]
 
+    def at(self, point: Point) -> Linearised:
+        """Gather errors at a point; of derivatives, only what costs no simulation."""
+        evidence = self._court.at(self.values(point))
+        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
+        return Linearised(point, (_DELAY,), tuple(evidence), slowness(evidence), away)
+
     def linearise(
         self,
-        point: Point,
+        lin: Linearised,
         active: Sequence[Effect],
         candidates: Sequence[tuple[Effect, Mapping[str, float]]] = (),
+        *,
+        tolerances: bool = True,
     ) -> Linearised:
-        """Gather evidence about a point.
+        """Add the derivatives that are not there yet.
 
         Parameters
         ----------
         active : effects that the point has.
         candidates : others, each with the shape it is tried with.
+        tolerances : whether those by the tolerances are asked for.
         """
-        columns = [
-            Column((name,), 0.5 * tolerance * self._court.nominal[name])
+        columns = self._tolerances() if tolerances else {}
+        columns |= self._present(lin.point, active)
+        for effect, shape in candidates:
+            setting = {
+                name: value
+                for parameter, value in shape.items()
+                for name in variables(effect, parameter)
+            }
+            for parameter in effect.sizes:
+                column = Column(variables(effect, parameter), effect.step, setting)
+                columns[variant(effect, shape), parameter] = column
+        missing = {key: column for key, column in columns.items() if key not in lin.keys}
+        if not missing:
+            return lin
+        values = self.values(lin.point)
+        return lin.extended(
+            missing, self._court.derivatives(values, list(missing.values()), lin.evidence)
+        )
+
+    def _tolerances(self) -> dict[Key, Column]:
+        """Columns of what differs from stop to stop."""
+        return {
+            (_STOP, name): Column((name,), 0.5 * tolerance * self._court.nominal[name])
             for name, tolerance in TOLERANCES.items()
-        ]
-        columns.append(Column((FORCE_DELAY,), _FORCE_DELAY))
-        keys: list[Key] = [(_STOP, name) for name in (*TOLERANCES, FORCE_DELAY)]
+        }
+
+    def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Column]:
+        """Columns of the effects that a point has."""
+        columns = {}
         for effect in active:
             for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
                 names = variables(effect, parameter)
@@ -238,20 +279,8 @@ class Fit:
                 high = self._court.bounds[names[0]][1]
                 if not is_shape and point.sizes[effect.name, effect.label] + step > high:
                     step = -step
-                columns.append(Column(names, step))
-                keys.append((effect.name, parameter))
-        for effect, shape in candidates:
-            setting = {
-                name: value
-                for parameter, value in shape.items()
-                for name in variables(effect, parameter)
-            }
-            for parameter in effect.sizes:
-                columns.append(Column(variables(effect, parameter), effect.step, setting))
-                keys.append((variant(effect, shape), parameter))
-        evidence = self._court.hear(self.values(point), [columns] * self.count)
-        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
-        return Linearised(point, tuple(keys), tuple(evidence), slowness(evidence), away)
+                columns[effect.name, parameter] = Column(names, step)
+        return columns
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> "Joint":
         """Every stop over the common unknowns, local ones eliminated.
@@ -275,7 +304,7 @@ class Fit:
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
             if key == _LATE:
-                J[:, j] = at[_STOP, FORCE_DELAY]
+                J[:, j] = at[_DELAY]
             elif key in point.levels:
                 name, surface = key
                 mine = _discs(case) if name == "muDC" else case.conditions.wheel_rail
@@ -321,37 +350,65 @@ class Fit:
         return middle, _RAIL_SPREAD * middle
 
     def refine(
-        self, point: Point, active: Sequence[Effect], rounds: int, spread: Vector | None = None
+        self,
+        best: Linearised,
+        active: Sequence[Effect],
+        rounds: int,
+        spread: Vector | None = None,
+        lender: Linearised | None = None,
     ) -> Linearised:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
+        What a tolerance does changes little with the size of an effect. So its derivatives are
+        taken from a point before, until that leads no further; then all are those of the point.
+
         Parameters
         ----------
-        point : where to begin.
-        rounds : most evaluations; a step that made things worse is halved, which costs one.
+        best : where to begin.
+        rounds : most steps that are tried; one that made things worse is halved.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
+        lender : of a point near by, whose derivatives by the tolerances serve to begin with.
 
         Returns
         -------
-        best : about the best point that was met.
+        best : the best point that was met; derivatives may be missing.
         """
-        best = self.linearise(point, active)
-        point, halved = self._stepped(best, best.spread if spread is None else spread), 0
+        if lender is None:
+            best = lender = self.linearise(best, active)
+        else:
+            lender = self.linearise(lender, ())
+        best = self.linearise(best, active, tolerances=False)
+        point = self._stepped(best, lender, best.spread if spread is None else spread)
+        halved = 0
         for _ in range(rounds):
-            tried = self.linearise(point, active)
+            tried, exact = self.at(point), lender is best
             fall = best.deviance - tried.deviance
             if fall > -_WORSE:
-                best, point, halved = tried, self._stepped(tried, tried.spread), 0
-            else:
-                point, halved = _between(best.point, point), halved + 1
-            if abs(fall) < _WORSE or halved > _HALVED:
+                best, halved = tried, 0
+            if exact and abs(fall) < _WORSE:
                 break
+            if exact and fall < 0.0:
+                point, halved = _between(best.point, point), halved + 1
+                if halved > _HALVED:
+                    break
+                continue
+            if fall < _WORSE:
+                best = lender = self.linearise(best, active)
+            best = self.linearise(best, active, tolerances=False)
+            point = self._stepped(best, lender, best.spread)
         return best
 
-    def _stepped(self, lin: Linearised, spread: Vector) -> Point:
-        joint = self.quadratics(replace(lin, inflation=spread))
+    def _stepped(self, lin: Linearised, lender: Linearised, spread: Vector) -> Point:
+        lent = [key for key in self._tolerances() if key not in lin.keys]
+        at = [lender.keys.index(key) for key in lent]
+        full = lin.extended(lent, [one.jacobian[:, at] for one in lender.evidence])
+        joint = self.quadratics(replace(full, inflation=spread))
         return self._moved(lin.point, joint, joint.solve())
+
+    def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Results of a job that fits, by item."""
+        return self._court.together(job, items)
 
     def _moved(self, point: Point, joint: "Joint", step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def shapes(effect: Effect) -> list[dict[str, float]]:
 
 
 def tried(fit: Fit, lin: Linearised, candidates: Sequence[Candidate]) -> "Trial":
-    """Put candidates to the trial about a point that is fitted."""
+    """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
     extra = [
         (variant(effect, shape), parameter)
         for effect, shape in candidates
@@ -240,7 +241,7 @@ def search(
     steps: list[Step] = []
     try:
         while True:
-            trial = examine(fit, best, catalogue, report)
+            best, trial = examine(fit, best, catalogue, report)
             step = _step(fit, catalogue, best, trial, report)
             if step is None:
                 return best, steps, trial, False
@@ -250,7 +251,8 @@ def search(
         if not steps:
             raise
         report("interrupted: no more causes are sought, what was found is finished")
-        return best, steps, examine(fit, best, catalogue, report), True
+        best, trial = examine(fit, best, catalogue, report)
+        return best, steps, trial, True
 
 
 def _step(
@@ -287,15 +289,17 @@ def beyond(one: Fitted, other: Fitted) -> float:
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    begun = [one for one in (_begun(fit, best, rival) for rival in rivals) if _gains(best, one)]
+    begun = [one for one in fit.together(partial(_begun, fit, best), rivals) if _gains(best, one)]
     if not begun:
         return []
     misfits = _misfits(begun)
     near = misfits < _BEHIND * misfits.min()
-    every = [
-        fitted(fit, one.point, one.active) if worth else one
-        for one, worth in zip(begun, near, strict=True)
-    ]
+
+    def finished(one: Fitted) -> Fitted:
+        return fitted(fit, one.linearised, one.active, lender=best.linearised)
+
+    ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
+    every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
     return [every[i] for i in np.argsort(_misfits(every))]
 
 
@@ -307,19 +311,30 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
 
 def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
     """First rounds of a fit with one more effect, begun at half the size where it was too much."""
-    active, before = (*best.active, rival.effect), best.linearised
-    one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
-    for _ in range(_HALVINGS):
+    for halvings in range(_HALVINGS + 1):
+        # A law bends: half the contact's stiffness is twice the slip.
+        one = extended(fit, best, replace(rival, size=0.5**halvings * rival.size), _BEGUN)
         if _gains(best, one):
             break
-        # A law bends: half the contact's stiffness is twice the slip.
-        rival = replace(rival, size=0.5 * rival.size)
-        one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
     return one
 
 
-def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter) -> Trial:
-    """Try every effect that the data can show and the point does not have."""
+def extended(fit: Fit, before: Fitted, rival: Score, rounds: int = _ROUNDS) -> Fitted:
+    """Fit with one more effect, begun where it was fitted without."""
+    start, lin = fit.at(joined(before.point, rival)), before.linearised
+    return fitted(fit, start, (*before.active, rival.effect), rounds, lin.spread, lin)
+
+
+def examine(
+    fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter
+) -> tuple[Fitted, Trial]:
+    """Try every effect that the data can show and the point does not have.
+
+    Returns
+    -------
+    best : with the derivatives by all of them.
+    trial : of all of them.
+    """
     candidates: list[Candidate] = [
         (effect, shape)
         for effect in catalogue
@@ -327,13 +342,24 @@ def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporte
         for shape in shapes(effect)
     ]
     report(f"signatures of {len(candidates)} candidates")
-    return tried(fit, fit.linearise(best.point, best.active, candidates), candidates)
+    lin = fit.linearise(best.linearised, best.active, candidates)
+    return replace(best, linearised=lin), tried(fit, lin, candidates)
 
 
 def pruned(
-    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: Fitted,
+    base: Fitted,
+    trial: Trial,
+    report: Reporter,
 ) -> tuple[Fitted, Trial]:
-    """Drop effects that, beside the others, do not matter or are not significant."""
+    """Drop effects that, beside the others, do not matter or are not significant.
+
+    Parameters
+    ----------
+    base : the nominal model, with all derivatives.
+    """
     while best.active:
         sigma = np.sqrt(np.diag(trial.covariance()))
         ratios = {}
@@ -342,22 +368,36 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
             ratios[effect] = min(clear, size / effect.matters)
-            if len(best.active) > 1:
-                needed = beyond(lesser(fit, best, effect), best)
-                ratios[effect] = min(ratios[effect], needed / _NEEDED)
+        less = lesser(fit, best, base)
+        if len(less) > 1:
+            for effect, one in less.items():
+                ratios[effect] = min(ratios[effect], beyond(one, best) / _NEEDED)
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
         report(f"dropping {weakest.name}")
-        best = lesser(fit, best, weakest)
-        trial = examine(fit, best, catalogue, report)
+        best, trial = examine(fit, less[weakest], catalogue, report)
     return best, trial
 
 
-def lesser(fit: Fit, one: Fitted, effect: Effect) -> Fitted:
-    """The best fit without one effect."""
-    kept = tuple(other for other in one.active if other is not effect)
-    return fitted(fit, without(one.point, effect), kept)
+def lesser(fit: Fit, best: Fitted, base: Fitted) -> dict[Effect, Fitted]:
+    """The best fit without each of the effects, with all derivatives.
+
+    Parameters
+    ----------
+    base : the nominal model, with all derivatives.
+    """
+
+    def refitted(effect: Effect) -> Fitted:
+        kept = tuple(other for other in best.active if other is not effect)
+        if not kept:
+            return base
+        start = fit.at(without(best.point, effect))
+        one = fitted(fit, start, kept, lender=best.linearised)
+        return replace(one, linearised=fit.linearise(one.linearised, kept))
+
+    fits = fit.together(refitted, best.active)
+    return dict(zip(best.active, fits, strict=True))
 
 
 def without(point: Point, effect: Effect) -> Point:
@@ -371,13 +411,14 @@ def without(point: Point, effect: Effect) -> Point:
 
 def fitted(
     fit: Fit,
-    point: Point,
+    start: Linearised,
     active: tuple[Effect, ...],
     rounds: int = _ROUNDS,
     spread: Vector | None = None,
+    lender: Linearised | None = None,
 ) -> Fitted:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""
-    lin = fit.refine(point, active, rounds, spread)
+    lin = fit.refine(start, active, rounds, spread, lender)
     return Fitted(active, lin.point, lin, lin.misfit)
 
 
