@@ -110,7 +110,7 @@ def _diagnose(options: argparse.Namespace) -> int:
             "effects": [effect.name for effect in effects],
         }
     summary = summarise_diagnosis(outcome, cases, provenance)
-    page = write_diagnosis(outcome, cases, summary, options.out)
+    page = write_diagnosis(outcome, cases, summary, options.out, options.workers)
     report("done")
     print(format_diagnosis(summary))
     print(f"to read: {page}, data and figures beside it")

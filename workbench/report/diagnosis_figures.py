@@ -250,4 +250,3 @@ def draw_heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> 
     for (row, column), value in np.ndenumerate(percents):
         if value >= least:
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7)
-
