@@ -101,10 +101,9 @@ class Bench:
         values : of the FMU's variables and of FORCE_DELAY, SI.
         """
         simulated, rest = self._simulated(number, values)
-        errors, late = (
-            self._whitened(number, simulated, values[FORCE_DELAY] + delay)
-            for delay in (0.0, _DELAY_STEP)
-        )
+        delay = values[FORCE_DELAY]
+        errors = self._whitened(number, simulated, delay)
+        late = self._whitened(number, simulated, delay + _DELAY_STEP)
         by_delay = np.append((late - errors).ravel() / _DELAY_STEP, 0.0)
         return Evidence(errors, rest, by_delay[:, None])
 
@@ -140,11 +139,12 @@ class Bench:
         """Whitened errors of the blocks, (b, m), with the load cell late by `delay` [s]."""
         stop, nominal = self._stops[number], self._fmu.defaults
         if errors.shape[1] == 3:
-            read = stop.behind_structure(stop.y[:, 2] - errors[:, 2])
-            late = read - delay * np.gradient(read, stop.time)
-            errors = np.column_stack([errors[:, :2], stop.y[:, 2] - late])
+            errors, force = errors.copy(), stop.y[:, 2]
+            read = stop.behind_structure(force - errors[:, 2])
+            errors[:, 2] = force - (read - delay * np.gradient(read, stop.time))
         means = stop.channels(errors, nominal["rW"], nominal["rR"])
-        return np.einsum("bij,bj->bi", stop.whitening, means)
+        whitened: Matrix = np.einsum("bij,bj->bi", stop.whitening, means)
+        return whitened
 
 
 _bench: Bench | None = None

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from workbench.diagnosis import CATALOGUE
 from workbench.power import CLEAR, VISIBLE
-from workbench.report.diagnosis_figures import draw_heat, save_figure
-from workbench.report.figures import LIGHT, STYLE
+from workbench.report.diagnosis_figures import draw_heat
+from workbench.report.figures import LIGHT, STYLE, save_figure
 from workbench.report.results import write_text
 
 _COLUMNS = 5  # of power curves
