@@ -13,9 +13,9 @@ from workbench.case import Case, Conditions
 from workbench.diagnosis import CATALOGUE, choose
 from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Column, Evidence
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import Linearised, Point, StopSystem
+from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import add, covariance, minimum
+from workbench.diagnosis.quadratic import StopSystem, add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector

@@ -6,18 +6,18 @@ is left of a stop is a small quadratic form in the common unknowns, which sums a
 are made of.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from workbench.case import Case, Surface
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Evidence, Item, Result
+from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Item, Result
 from workbench.diagnosis.extension import variables
-from workbench.diagnosis.quadratic import Quadratic, add, minimum
-from workbench.fmu import Matrix, Vector
+from workbench.diagnosis.linearised import Linearised, Point, between, slowness
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
+from workbench.fmu import Vector
 
 # Relative standard deviation from stop to stop, data sheet of the rig.
 TOLERANCES = {"muDC": 0.02, "muWR": 0.02, "JW": 0.01, "JR": 0.002, "Fz": 0.003}
@@ -29,100 +29,17 @@ _RAIL: Mapping[Surface, Mapping[str, float]] = {
 }
 _RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
 _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
-_NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
 _WORSE = 1.0  # of deviance, which no step is worth
 _HALVED = 4  # times: after that a step is given up
-_SECOND = 20  # blocks
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 _FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
 _FILM, _SINGLE, _HYSTERESIS = "WaterFilm", "SingleDiscWaterFilm", "CaliperHysteresis"
 
 
-# (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
-Key = tuple[str, str]
 _STOP = ""
 _LATE: Key = (FORCE_DELAY, "load cell")
 _DELAY: Key = (_STOP, FORCE_DELAY)
-
-
-@dataclass(frozen=True)
-class Point:
-    """Values of all unknowns.
-
-    Attributes
-    ----------
-    sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
-    levels : common level by quantity and surface, as ("muDC", "dry"), or sensor.
-    deviations : of each stop from the common values, in standard deviations, (K, 5).
-    phases : [rad] of order-locked effects, (K,) by effect.
-    """
-
-    sizes: Mapping[Key, float]
-    levels: Mapping[Key, float]
-    deviations: Matrix
-    phases: Mapping[str, Vector]
-
-
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """Evidence of all stops about a point.
-
-    Attributes
-    ----------
-    keys : of the columns of each jacobian: FORCE_DELAY, TOLERANCES, (effect, parameter).
-    inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
-    away : chi-squared of levels and deviations against what tolerances say of them.
-    """
-
-    point: Point
-    keys: tuple[Key, ...]
-    evidence: tuple[Evidence, ...]
-    inflation: Vector
-    away: float
-
-    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
-        """The same with more columns, (b*m + 1, p) of each stop."""
-        evidence = tuple(
-            replace(one, jacobian=np.column_stack([one.jacobian, more]))
-            for one, more in zip(self.evidence, jacobians, strict=True)
-        )
-        return replace(self, keys=(*self.keys, *keys), evidence=evidence)
-
-    @property
-    def misfit(self) -> float:
-        """Chi-squared of all stops at the point, in units of the noise."""
-        return float(sum(one.residual @ one.residual for one in self.evidence))
-
-    @property
-    def _squares(self) -> tuple[int, Vector]:
-        """Number of blocks, and mean square of their errors by channel (m,)."""
-        errors = np.concatenate([one.errors for one in self.evidence])
-        return len(errors), np.square(errors).mean(axis=0)
-
-    @property
-    def deviance(self) -> float:
-        """What a fit makes least: minus twice the log likelihood, up to a constant.
-
-        Of a channel that is wrong, the variance is unknown, and errors that last count once in a
-        second: its logarithm counts. To spoil one channel for another is no gain then.
-        Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
-        """
-        count, mean = self._squares
-        noise = count * np.minimum(mean, _NOISE)
-        wrong = count / _SECOND * np.log(self.spread)
-        rest = sum(one.rest**2 for one in self.evidence)
-        return float((noise + wrong).sum()) + rest + self.away
-
-    @property
-    def spread(self) -> Vector:
-        """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        spread: Vector = 1.0 + _SECOND * np.maximum(0.0, self._squares[1] - _NOISE)
-        return spread
-
-    def weighed(self, inflation: Vector) -> float:
-        """Chi-squared, each channel in units of what is wrong with it, (m,)."""
-        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
 
 
 class Fit:
@@ -282,7 +199,7 @@ class Fit:
                 columns[effect.name, parameter] = Column(names, step)
         return columns
 
-    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> "Joint":
+    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.
 
         Parameters
@@ -295,7 +212,7 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
-    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> "StopSystem":
+    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> StopSystem:
         point, case = lin.point, self._court.cases[k]
         evidence = lin.evidence[k]
         b, m = evidence.errors.shape
@@ -389,7 +306,7 @@ class Fit:
             if exact and abs(fall) < _WORSE:
                 break
             if exact and fall < 0.0:
-                point, halved = _between(best.point, point), halved + 1
+                point, halved = between(best.point, point), halved + 1
                 if halved > _HALVED:
                     break
                 continue
@@ -410,7 +327,7 @@ class Fit:
         """Results of a job that fits, by item."""
         return self._court.together(job, items)
 
-    def _moved(self, point: Point, joint: "Joint", step: Vector) -> Point:
+    def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             if key in levels:
@@ -438,111 +355,6 @@ class Fit:
         if parameter not in effect.sizes:
             low, high = max(low, 0.5 * old), min(high, 2.0 * old)
         return float(np.clip(new, low, high))
-
-
-@dataclass(frozen=True, eq=False)
-class StopSystem:
-    """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
-
-    Attributes
-    ----------
-    r : (n,); J : (n, p); P : (n, q).
-    deviations : (5,) of the present point, of the first unknowns in l; phases are free.
-    """
-
-    r: Vector
-    J: Matrix
-    P: Matrix
-    deviations: Vector
-
-    def _local(self) -> tuple[Matrix, Matrix, Vector]:
-        """Normal matrix of l, its coupling to z, its gradient."""
-        count, q = self.deviations.size, self.P.shape[1]
-        prior = np.zeros(q)
-        prior[:count] = 1.0
-        normal = self.P.T @ self.P + np.diag(prior + 1e-9)
-        gradient = self.P.T @ self.r
-        gradient[:count] += self.deviations
-        return normal, self.P.T @ self.J, gradient
-
-    def eliminated(self) -> Quadratic:
-        """Chi-squared over z alone."""
-        normal, coupling, gradient = self._local()
-        both = np.column_stack([coupling, gradient])
-        solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
-        N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
-        g: Vector = self.J.T @ self.r - coupling.T @ solved[:, -1]
-        c = self.r @ self.r + self.deviations @ self.deviations - gradient @ solved[:, -1]
-        return Quadratic(N, g, float(c), self.r.size)
-
-    def local(self, z: Vector) -> Vector:
-        """Best l for a step z of the common unknowns."""
-        normal, coupling, gradient = self._local()
-        step: Vector = np.asarray(np.linalg.solve(normal, -coupling @ z - gradient), np.float64)
-        return step
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """All stops over the common unknowns.
-
-    Attributes
-    ----------
-    shared : names of the unknowns.
-    known : those that the point has; the others are candidates.
-    levels : those that differ by nature, in no need of a cause.
-    """
-
-    shared: tuple[Key, ...]
-    known: tuple[Key, ...]
-    levels: tuple[Key, ...]
-    systems: tuple[StopSystem, ...]
-    prior: Quadratic
-
-    def stops(self) -> list[Quadratic]:
-        """Chi-squared of each stop."""
-        return [system.eliminated() for system in self.systems]
-
-    def total(self) -> Quadratic:
-        """Chi-squared of all stops and the prior."""
-        return add([*self.stops(), self.prior])
-
-    def solve(self) -> Vector:
-        """Best step of the common unknowns."""
-        return minimum(self.total())
-
-
-def seconds(errors: Matrix) -> Matrix:
-    """Mean squares over seconds of whitened errors (b, m), times blocks, (s, m): noise leaves 1."""
-    count = len(errors) // _SECOND * _SECOND
-    means = errors[:count].reshape(-1, _SECOND, errors.shape[1]).mean(axis=1)
-    squares: Matrix = _SECOND * means**2
-    return squares
-
-
-def slowness(evidence: Sequence[Evidence]) -> Vector:
-    """Variance of errors that last a second over that of white noise, by channel, at least 1.
-
-    What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
-    against that, not against the noise.
-    """
-    lasting = np.concatenate([seconds(one.errors) for one in evidence])
-    slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
-    return slow
-
-
-def _between(one: Point, other: Point) -> Point:
-    """Half way; nothing that one of them lacks."""
-
-    def half(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> dict[Any, Any]:
-        return {key: 0.5 * (value + b[key]) for key, value in a.items()}
-
-    return Point(
-        half(one.sizes, other.sizes),
-        half(one.levels, other.levels),
-        0.5 * (one.deviations + other.deviations),
-        half(one.phases, other.phases),
-    )
 
 
 def _discs(case: Case) -> Surface:

@@ -8,15 +8,14 @@ from typing import Literal
 import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, seconds, variant
+from workbench.diagnosis.fit import Fit, variant
+from workbench.diagnosis.linearised import seconds
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
     WRONG,
     Fitted,
     Reporter,
-    Score,
     Step,
-    Trial,
     beyond,
     examine,
     extended,
@@ -24,8 +23,8 @@ from workbench.diagnosis.search import (
     lesser,
     pruned,
     search,
-    shapes,
 )
+from workbench.diagnosis.trial import Score, Trial, shapes
 from workbench.fmu import Matrix, Vector
 
 Verdict = Literal["nothing", "found", "unexplained"]

@@ -1,6 +1,7 @@
 """Results of a diagnosis: summary.json, the text for the terminal, data and figures, the page."""
 
 import json
+import signal
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -232,7 +233,9 @@ def write_diagnosis(
     pairs = list(zip(outcome.residuals, cases, strict=True))
     pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(effects)))
     figures = [stop_figure(one, case, extension, span) for one, case in pairs]
-    with ProcessPoolExecutor(workers) as pool:
+    # Ctrl-C is this process's affair.
+    ignored = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
         drawn = [pool.submit(draw_case, figure, _pictures(out, figure.name)) for figure in figures]
         names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
         drawn += [
