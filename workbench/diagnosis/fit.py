@@ -282,7 +282,8 @@ class Fit:
         Parameters
         ----------
         best : where to begin.
-        rounds : most steps that are tried; one that made things worse is halved.
+        rounds : most steps; one that made things worse is halved, which counts, or if derivatives
+            were taken from elsewhere, tried again with those of the point.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
         lender : of a point near by, whose derivatives by the tolerances serve to begin with.
@@ -297,10 +298,11 @@ class Fit:
             lender = self.linearise(lender, ())
         best = self.linearise(best, active, tolerances=False)
         point = self._stepped(best, lender, best.spread if spread is None else spread)
-        halved = 0
-        for _ in range(rounds):
+        taken, halved = 0, 0
+        while taken < rounds:
             tried, exact = self.at(point), lender is best
             fall = best.deviance - tried.deviance
+            taken += exact or fall >= _WORSE
             if fall > -_WORSE:
                 best, halved = tried, 0
             if exact and abs(fall) < _WORSE:

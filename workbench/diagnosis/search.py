@@ -158,8 +158,8 @@ def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
 
 def extended(fit: Fit, before: Fitted, rival: Score, rounds: int = _ROUNDS) -> Fitted:
     """Fit with one more effect, begun where it was fitted without."""
-    start, lin = fit.at(joined(before.point, rival)), before.linearised
-    return fitted(fit, start, (*before.active, rival.effect), rounds, lin.spread, lin)
+    start, spread = fit.at(joined(before.point, rival)), before.linearised.spread
+    return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
 
 
 def examine(
