@@ -9,13 +9,13 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, Conditions, read_cases
+from workbench.case import Case, Conditions
 from workbench.diagnosis import choose, read_effects
-from workbench.diagnosis.evidence import Court, Evidence
+from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Column, Evidence
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import Fit, Linearised, Point, StopSystem
+from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import add, covariance, minimum
+from workbench.diagnosis.quadratic import StopSystem, add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
@@ -325,3 +325,20 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="slop"):
         build(LIBRARY, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
     assert not (tmp_path / "Extended.fmu").exists()
+
+
+def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
+    stop, point = ready(noisy(6)), {FORCE_DELAY: 0.002, "muWR": 0.4}
+    steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
+    bench = Bench(MINIMAL, [stop])
+    with FMU(MINIMAL) as fmu:
+        nominal = {name: fmu.defaults[name] for name in steps} | point
+    about = bench.at(0, nominal)
+    found = bench.derivatives(0, nominal, [Column((n,), h) for n, h in steps.items()], about)
+    found = np.column_stack([about.jacobian, found])
+    for j, (name, step) in enumerate({FORCE_DELAY: 1e-3, **steps}.items()):
+        sides = [bench.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
+        central = (sides[0].residual - sides[1].residual) / step
+        # Forward over a step in which curvature adds no more than a hundredth.
+        np.testing.assert_allclose(found[:, j], central, atol=0.01 * np.abs(central).max())
+    bench.close()

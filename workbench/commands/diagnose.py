@@ -70,6 +70,12 @@ def add(commands: Commands) -> None:
         help="package.mo of the Modelica library (default: %(default)s)",
     )
     parser.add_argument(
+        "--platforms",
+        choices=("native", "all"),
+        default="native",
+        help="of the extended FMU: this machine's, or all (default: %(default)s)",
+    )
+    parser.add_argument(
         "--workers",
         type=positive,
         default=os.cpu_count() or 1,
@@ -95,7 +101,15 @@ def _diagnose(options: argparse.Namespace) -> int:
     report(f"{len(cases)} stops")
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
-        cases, effects, library, _BASE, options.model, options.out, options.workers, report
+        cases,
+        effects,
+        library,
+        _BASE,
+        options.model,
+        options.out,
+        options.workers,
+        report,
+        every_platform=options.platforms == "all",
     )
     with FMU(options.model) as model:
         provenance = {
@@ -104,7 +118,7 @@ def _diagnose(options: argparse.Namespace) -> int:
             "effects": [effect.name for effect in effects],
         }
     summary = summarise_diagnosis(outcome, cases, provenance)
-    page = write_diagnosis(outcome, cases, summary, options.out)
+    page = write_diagnosis(outcome, cases, summary, options.out, options.workers)
     report("done")
     print(format_diagnosis(summary))
     print(f"to read: {page}, data and figures beside it")

@@ -101,6 +101,8 @@ def diagnose(
     out: Path,
     workers: int,
     report: Reporter,
+    *,
+    every_platform: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recorded stops; write the extended model.
 
@@ -112,6 +114,7 @@ def diagnose(
     model : FMU of the base model, or of an extension of it: its values are kept.
     out : folder of the extended model.
     report : takes a line on what is being done.
+    every_platform : whether the extended FMU is for all platforms, or only for this machine's.
 
     Raises
     ------
@@ -140,7 +143,10 @@ def diagnose(
             diagnosis = judge(fit, effects, report)
             best = diagnosis.best
             found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
-            extension = _extend(court, fit, diagnosis, effects, library, base, out, report)
+            extension = _extend(
+                *(court, fit, diagnosis, effects, library, base, out, report),
+                every_platform=every_platform,
+            )
             observers: dict[str, dict[str, tuple[float, float]]] = {}
             turning = any(effect.order_locked for effect in best.active)
             if extension is not None and cases[0].Fx is not None and not turning:
@@ -197,6 +203,8 @@ def _extend(
     base: str,
     out: Path,
     report: Reporter,
+    *,
+    every_platform: bool,
 ) -> Extension | None:
     """Write the extended model, compile it, compare its predictions with those of the fit."""
     if not diagnosis.causes:
@@ -228,7 +236,7 @@ def _extend(
     folder.mkdir(parents=True, exist_ok=True)
     modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
     write_whole(modelica, text)
-    build(library, EXTENDED, text, path, every_platform=True)
+    build(library, EXTENDED, text, path, every_platform=every_platform)
     bench = Bench(path, court.stops)
     difference = 0.0
     for k, evidence in enumerate(diagnosis.best.linearised.evidence):
@@ -237,7 +245,7 @@ def _extend(
             for name, value in fit.values(point)[k].items()
             if name in bench.parameters or name == FORCE_DELAY
         }
-        errors, _ = bench.errors(k, given)
+        errors = bench.at(k, given).errors
         difference = max(difference, float(np.abs(errors - evidence.errors).max()))
     bench.close()
     return Extension(modelica, path, difference)

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from workbench import shelf
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError
@@ -153,6 +154,8 @@ def _class(
 def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: bool) -> None:
     """Compile the source of an extended model to an FMU; needs the extra [compiler].
 
+    An FMU that was built before, of the same sources, is taken from where it is kept.
+
     Parameters
     ----------
     library : that the source extends; its files are left alone.
@@ -163,17 +166,20 @@ def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: 
     InputError
         If the source has errors.
     """
-    from workbench import compiler  # an extra: everything else runs without it
 
-    with tempfile.TemporaryDirectory() as scratch:
-        copy = Path(scratch) / library.name
-        if library.file.name == "package.mo":
-            shutil.copytree(library.file.parent, copy)
-        else:
-            copy.mkdir()
-            shutil.copyfile(library.file, copy / library.file.name)
-        (copy / f"{name}.mo").write_text(f"within {library.name};\n{text}")
-        platforms = compiler.PLATFORMS if every_platform else [compiler.native()]
-        compiler.build(
-            copy / library.file.name, f"{library.name}.{name}", fmu, platforms=list(platforms)
-        )
+    def make(path: Path) -> None:
+        from workbench import compiler  # an extra: everything else runs without it
+
+        platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
+        with tempfile.TemporaryDirectory() as scratch:
+            copy = Path(scratch) / library.name
+            if library.file.name == "package.mo":
+                shutil.copytree(library.file.parent, copy)
+            else:
+                copy.mkdir()
+                shutil.copyfile(library.file, copy / library.file.name)
+            (copy / f"{name}.mo").write_text(f"within {library.name};\n{text}")
+            whole = f"{library.name}.{name}"
+            compiler.build(copy / library.file.name, whole, path, platforms=platforms)
+
+    shelf.fetch(shelf.key(library.file, name, text, f"{every_platform}"), fmu, make)

@@ -6,6 +6,7 @@ enough to average most of the 20 Hz ringing of a load cell.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,18 +93,25 @@ class Samples:
         u = np.concatenate([self.u[first:end, column] for first, end in self.blocks])
         return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
 
-    def behind_structure(self, force: Vector) -> Vector:
-        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
+    @cached_property
+    def _structure(self) -> tuple[Vector, Vector] | None:
+        """Numerator and denominator of the mode before the load cell, as a digital filter."""
         h = float(np.median(np.diff(self.time)))
         omega = 2.0 * np.pi * _MODE
         if omega * h > 2.0:
-            return force  # sampled too slowly to show the mode
+            return None  # sampled too slowly to show the mode
         poles = omega * (-_DAMPING + 1j * np.sqrt(1.0 - _DAMPING**2)) * np.array([1.0, 1.0])
         poles[1] = np.conj(poles[0])
         z = np.exp(h * poles)
         denominator = np.real(np.poly(z))
         # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below 15 Hz.
-        numerator = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0
+        return np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+
+    def behind_structure(self, force: Vector) -> Vector:
+        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
+        if self._structure is None:
+            return force
+        numerator, denominator = self._structure
         begin = lfiltic(numerator, denominator, force[:1].repeat(2), force[:1].repeat(2))
         read: Vector = lfilter(numerator, denominator, force, zi=begin)[0]
         return read
@@ -114,8 +122,9 @@ class Samples:
         The error of the slip is free of what both speeds have in common.
         """
         slip = rR * errors[:, 1] - rW * errors[:, 0]
-        columns = np.column_stack([slip, errors[:, 1:]])
-        total = np.vstack([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
+        total = np.zeros((len(errors) + 1, errors.shape[1]))
+        np.cumsum(slip, out=total[1:, 0])
+        np.cumsum(errors[:, 1:], axis=0, out=total[1:, 1:])
         first, end = self.blocks.T
         means: Matrix = (total[end] - total[first]) / (end - first)[:, None]
         return means

@@ -1,7 +1,9 @@
 """Results of a diagnosis: summary.json, the text for the terminal, data and figures, the page."""
 
 import json
+import signal
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +215,7 @@ def format_diagnosis(summary: Mapping[str, Any]) -> str:
 
 
 def write_diagnosis(
-    outcome: Outcome, cases: Sequence[Case], summary: Mapping[str, Any], out: Path
+    outcome: Outcome, cases: Sequence[Case], summary: Mapping[str, Any], out: Path, workers: int
 ) -> Path:
     """Write summary.json, data and figures, and the page that shows them; returns the page.
 
@@ -221,6 +223,7 @@ def write_diagnosis(
     ----------
     cases : as diagnosed, in the order of the outcome's residuals.
     summary : of this outcome.
+    workers : processes that draw.
     """
     write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
@@ -229,19 +232,27 @@ def write_diagnosis(
     span = FAST if _turns(outcome) else LASTING
     pairs = list(zip(outcome.residuals, cases, strict=True))
     pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(effects)))
-    figures = []
-    for one, case in pairs:
-        figure = stop_figure(one, case, extension, span)
-        draw_case(figure, _pictures(out, one.name))
-        _write_stop(one, out / f"{one.name}.csv")
-        figures.append(figure)
-    _write_tables(summary, out)
-    draw_dependences(summary["dependences"], _pictures(out, "dependences"))
-    names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
-    draw_confusability(names, cosines, effects, _pictures(out, "confusability"))
-    if summary["gain"] is not None:
-        draw_gain(summary["gain"], _pictures(out, "gain"))
-    return write_diagnosis_page(summary, figures, out)
+    figures = [stop_figure(one, case, extension, span) for one, case in pairs]
+    # Ctrl-C is this process's affair.
+    ignored = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
+        drawn = [pool.submit(draw_case, figure, _pictures(out, figure.name)) for figure in figures]
+        names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
+        drawn += [
+            pool.submit(
+                draw_confusability, names, cosines, effects, _pictures(out, "confusability")
+            ),
+            pool.submit(draw_dependences, summary["dependences"], _pictures(out, "dependences")),
+        ]
+        if summary["gain"] is not None:
+            drawn.append(pool.submit(draw_gain, summary["gain"], _pictures(out, "gain")))
+        for one, _ in pairs:
+            _write_stop(one, out / f"{one.name}.csv")
+        _write_tables(summary, out)
+        page = write_diagnosis_page(summary, figures, out)
+        for picture in drawn:
+            picture.result()
+    return page
 
 
 def _clearness(one: Residuals, span: int, found: bool) -> float:
