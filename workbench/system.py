@@ -224,6 +224,7 @@ class Objective:
     weights : of the mean absolute deviation by signal [1/unit].
     bandwidth : below which deviations count [Hz].
     begins, ends : of the time that is judged: from the first sample above to the last one above.
+    when : what that time is, for people.
     """
 
     judged: str
@@ -231,6 +232,7 @@ class Objective:
     bandwidth: float
     begins: Threshold | None
     ends: Threshold | None
+    when: str
 
 
 @dataclass(frozen=True)
@@ -243,15 +245,17 @@ class Following:
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One panel of a figure: measured or estimated signals on one axis.
+class View:
+    """What one panel of a figure shows: measured or estimated signals on one axis.
 
     Attributes
     ----------
+    title, note : before and after the unit.
     low, high : of the axis in the shown unit; None: what the signals need.
     """
 
     title: str
+    note: str
     signals: tuple[str, ...]
     height: float
     low: float | None
@@ -440,7 +444,7 @@ class System:
     fading: Fading | None = None
     rolling: Rolling | None = None
     following: Following | None = None
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[View, ...] = ()
     companion: str = ""
     shortest: float = 0.0
     settles: float = 10.0

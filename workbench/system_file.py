@@ -26,12 +26,12 @@ from workbench.system import (
     Model,
     Objective,
     OperatingPoint,
-    Panel,
     Rest,
     Rolling,
     Signal,
     System,
     Threshold,
+    View,
 )
 from workbench.tables import Table, read_table
 from workbench.units import si_factor
@@ -177,7 +177,7 @@ def _signals(file: Table, path: Path) -> System:
         conditions=_conditions(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
-        objective=Objective("", {}, 0.0, None, None),
+        objective=Objective("", {}, 0.0, None, None, ""),
         comparison=Comparison(0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
@@ -339,7 +339,7 @@ def _placed(file: Table, system: System) -> System:
         fading=_fading(feedback.table("fades"), system) if "fades" in feedback else None,
         rolling=_rolling(feedback.table("rolls")) if "rolls" in feedback else None,
         following=_following(tuning.table("follows")) if "follows" in tuning else None,
-        panels=tuple(_panel(table, system) for table in file.tables("figures")),
+        panels=tuple(_view(table, system) for table in file.tables("figures")),
     )
 
 
@@ -365,7 +365,7 @@ def _threshold(table: Table, system: System) -> Threshold:
 
 
 def _objective(table: Table, system: System) -> Objective:
-    table.refuse_unknown(("judged", "weights", "bandwidth", "begins", "ends"))
+    table.refuse_unknown(("judged", "weights", "bandwidth", "begins", "ends", "when"))
     first = (*system.judged, *system.outputs)[0].name
     judged = table.text("judged", first)
     compared = {one.name: one for one in (*system.outputs, *system.judged)}
@@ -381,6 +381,7 @@ def _objective(table: Table, system: System) -> Objective:
         bandwidth=table.number("bandwidth", "Hz", math.inf),
         begins=_threshold(table.table("begins"), system) if "begins" in table else None,
         ends=_threshold(table.table("ends"), system) if "ends" in table else None,
+        when=table.text("when", ""),
     )
 
 
@@ -404,14 +405,15 @@ def _following(table: Table) -> Following:
     )
 
 
-def _panel(table: Table, system: System) -> Panel:
-    table.refuse_unknown(("title", "signals", "height", "low", "high"))
+def _view(table: Table, system: System) -> View:
+    table.refuse_unknown(("title", "note", "signals", "height", "low", "high"))
     signals = table.texts("signals")
     for signal in signals:
         system.refuse_missing(signal, f"{table.where} signals")
     low, high = (table.number(key, "1", math.nan) for key in ("low", "high"))
-    return Panel(
+    return View(
         title=table.take("title", str),
+        note=table.text("note", ""),
         signals=signals,
         height=table.number("height", "1", 1.0),
         low=None if math.isnan(low) else low,
