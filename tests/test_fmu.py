@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from workbench.errors import InputError
-from workbench.fmu import FMU, FMUError
+from workbench.errors import FMUError, InputError
+from workbench.fmu import FMU
 
 INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
 

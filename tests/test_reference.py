@@ -14,7 +14,8 @@ import casadi as ca
 
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
-from workbench.fmu import FMU, FMUError
+from workbench.errors import FMUError
+from workbench.fmu import FMU
 
 LIBRARY = Path(__file__).parents[1] / "modelica" / "WheelsetRig" / "package.mo"
 RADIUS_WHEEL, RADIUS_ROLLER = 0.46, 0.70  # m

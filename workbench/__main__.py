@@ -3,27 +3,17 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.metadata import version
 
-from workbench.commands import (
-    add_accuracy,
-    add_bench,
-    add_diagnose,
-    add_export,
-    add_fmu,
-    add_observability,
-    add_power,
-    add_rig,
-    add_simulate,
-    add_tune,
-)
-from workbench.errors import InputError
-from workbench.fmu import FMUError
+from workbench.commands import COMMANDS
+from workbench.errors import FMUError, InputError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0 done, 1 failed, 2 wrong input, 130 interrupted."""
-    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    options = _parser(given[0] if given else "").parse_args(given)
     try:
         return int(options.run(options))
     except InputError as error:
@@ -37,23 +27,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(command: str) -> argparse.ArgumentParser:
+    """Parser of the command line, which knows the arguments of one command only."""
     parser = argparse.ArgumentParser(
         prog="workbench",
         description="Observers for the longitudinal dynamics of a wheelset, on FMUs.",
     )
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    add_simulate(commands)
-    add_accuracy(commands)
-    add_tune(commands)
-    add_diagnose(commands)
-    add_power(commands)
-    add_observability(commands)
-    add_rig(commands)
-    add_export(commands)
-    add_fmu(commands)
-    add_bench(commands)
+    for name, text in COMMANDS.items():
+        if name == command:
+            import_module(f"workbench.commands.{name}").add(commands)
+        else:
+            commands.add_parser(name, help=text)
     return parser
 
 

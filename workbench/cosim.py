@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.case import Case
-from workbench.fmu import FMUError, Matrix, Vector
+from workbench.errors import FMUError
+from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimate, Estimator
 
 

@@ -1,4 +1,4 @@
-"""Errors that a user can mend."""
+"""Errors that a user can mend, and those of an FMU."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -27,6 +27,10 @@ class InputError(ValueError):
         # Pickle would call the class with the message alone and hang a pool of processes.
         parts = {key: getattr(self, key) for key in ("where", "found", "expected", "remedy")}
         return partial(type(self), **parts), ()
+
+
+class FMUError(RuntimeError):
+    """A call into an FMU failed; the message holds what the FMU logged."""
 
 
 def closest(name: str, names: Iterable[str]) -> str:

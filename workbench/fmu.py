@@ -23,7 +23,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
-from workbench.errors import InputError, closest
+from workbench.errors import FMUError, InputError, closest
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -51,10 +51,6 @@ _CLASSES = {
     (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
     (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
 }
-
-
-class FMUError(RuntimeError):
-    """A call into an FMU failed; the message holds what the FMU logged."""
 
 
 @dataclass(frozen=True)

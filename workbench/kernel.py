@@ -18,7 +18,8 @@ from numba.core.types import WrapperAddressProtocol
 from numba.experimental import function_type as _first_class_functions  # noqa: F401  registers them
 from numpy.typing import NDArray
 
-from workbench.fmu import FMU, FMUError, Matrix, Vector
+from workbench.errors import FMUError
+from workbench.fmu import FMU, Matrix, Vector
 
 
 def _cache_folder() -> str:

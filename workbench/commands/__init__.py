@@ -1,25 +1,14 @@
-"""The commands of the command line, one module each."""
+"""The commands of the command line, one module each, imported only when its command runs."""
 
-from workbench.commands.accuracy import add_accuracy
-from workbench.commands.bench import add_bench
-from workbench.commands.diagnose import add_diagnose
-from workbench.commands.export import add_export
-from workbench.commands.fmu import add_fmu
-from workbench.commands.observability import add_observability
-from workbench.commands.power import add_power
-from workbench.commands.rig import add_rig
-from workbench.commands.simulate import add_simulate
-from workbench.commands.tune import add_tune
-
-__all__ = [
-    "add_accuracy",
-    "add_bench",
-    "add_diagnose",
-    "add_export",
-    "add_fmu",
-    "add_observability",
-    "add_power",
-    "add_rig",
-    "add_simulate",
-    "add_tune",
-]
+COMMANDS = {
+    "simulate": "run all estimators on recorded brake stops",
+    "accuracy": "judge estimators against the truth of the virtual rig",
+    "tune": "find the gains whose worst case is best",
+    "diagnose": "find what the simulation gets wrong, name the cause, extend the model",
+    "power": "measure how often the diagnosis is right",
+    "observability": "show when states and frictions can be observed",
+    "rig": "make recordings on a virtual rig",
+    "export": "write an observer as an FMU and an SSP package",
+    "fmu": "build, describe and check FMUs",
+    "bench": "time calls into the FMUs, the observers, and the tuning",
+}

@@ -13,11 +13,10 @@ from workbench.report.accuracy import format_accuracy, write_accuracies, write_a
 from workbench.tuning import default_settings
 
 
-def add_accuracy(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     accuracy = commands.add_parser(
         "accuracy",
-        help="judge estimators against the truth of the virtual rig",
         description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
         "beside each recording and no estimator reads: force in the contact, a slide, friction of "
         "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "

@@ -18,11 +18,10 @@ _MODELS = ("MinimalObserver", "FullObserver", "Reference")
 _SEED = 1
 
 
-def add_bench(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     bench = commands.add_parser(
         "bench",
-        help="time calls into the FMUs, the observers, and the tuning",
         description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
         "sources in one program, and Co-Simulation steps; then the observers beside the same "
         "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "

@@ -25,11 +25,10 @@ from workbench.report.diagnosis import (
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 
-def add_diagnose(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "diagnose",
-        help="find what the simulation gets wrong, name the cause, extend the model",
         description="Compare recorded stops with the observer model: show where the simulation is "
         "wrong, name the physical cause, say what cannot be told apart, extend the Modelica model, "
         "and measure the gain on stops that were held out. Writes a page to read (index.html), "

@@ -29,11 +29,10 @@ _REFERENCE = Path("fmus/fmi2/Reference.fmu")
 _OBSERVERS = (DisturbanceObserver.name, ParameterEstimator.name)  # written in Modelica too
 
 
-def add_export(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     export = commands.add_parser(
         "export",
-        help="write an observer as an FMU and an SSP package",
         description="Write an observer with its gains as a Co-Simulation FMU for all platforms, "
         "which runs in any FMI tool without Python, and an SSP 1.0 package in which it observes "
         "the reference model. One communication step takes one sample. Needs the extra "

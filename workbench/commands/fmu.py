@@ -14,9 +14,9 @@ _OMC = Path("build/omc")
 _PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 
-def add_fmu(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command and its jobs to the parser."""
-    fmu = commands.add_parser("fmu", help="build, describe and check FMUs")
+    fmu = commands.add_parser("fmu")
     jobs = fmu.add_subparsers(required=True, metavar="JOB")
     _add_build(jobs)
     _add_info(jobs)

@@ -18,7 +18,8 @@ from workbench.commands.arguments import (
     positive,
 )
 from workbench.cosim import Outcome, observe
-from workbench.fmu import FMU, FMUError
+from workbench.errors import FMUError
+from workbench.fmu import FMU
 from workbench.objective import braking_window
 from workbench.observability import LinearTest, linear_test, window_test
 from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
@@ -31,11 +32,10 @@ from workbench.report.observability import (
 )
 
 
-def add_observability(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     observability = commands.add_parser(
         "observability",
-        help="show when states and frictions can be observed",
         description="Show what the measured speeds can tell: a linear test of both observer "
         "models, and for each recorded stop how well half a second of samples can know the "
         "frictions dmuWR and dmuDC (Cramer-Rao bound). Writes windows (CSV), observability.json "

@@ -19,11 +19,10 @@ _DRY = (
 )
 
 
-def add_power(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "power",
-        help="measure how often the diagnosis is right",
         description="Plant effects in the virtual rig, diagnose the recordings without telling, "
         "and count: false alarms on clean sets, right names against the size of the effect, pairs, "
         "causes that are not in the catalogue, coverage of the intervals. Writes power.json, "

@@ -27,11 +27,10 @@ from workbench.rig import (
 _REFERENCE = Path("fmus/fmi2/Reference.fmu")
 
 
-def add_rig(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     rig = commands.add_parser(
         "rig",
-        help="make recordings on a virtual rig",
         description="Make recordings by co-simulation of the multibody model with drive, brake, "
         "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
         "truth.json, which no estimator reads. The same seed gives the same bytes.",

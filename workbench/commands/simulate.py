@@ -46,11 +46,10 @@ from workbench.report import (
 from workbench.tuning import default_settings, read_gains, with_tuned
 
 
-def add_simulate(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     simulate = commands.add_parser(
         "simulate",
-        help="run all estimators on recorded brake stops",
         description="Run all estimators on recorded brake stops; write a page to read "
         "(index.html), and beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"

@@ -26,8 +26,8 @@ from workbench.commands.arguments import (
     model_names,
     positive,
 )
-from workbench.errors import InputError
-from workbench.fmu import FMU, FMUError, Vector
+from workbench.errors import FMUError, InputError
+from workbench.fmu import FMU, Vector
 from workbench.objective import Weights
 from workbench.report.tuning import write_tuning_page
 from workbench.tuning import (
@@ -63,11 +63,10 @@ RADIUS_ERROR = 0.05  # [%] a wheel measured to a quarter of a millimetre
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 
-def add_tune(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Add the command to the parser."""
     tune = commands.add_parser(
         "tune",
-        help="find the gains whose worst case is best",
         description="Find gains that minimise z, the worst of the objectives z_k of all cases "
         "(Schwarz et al. 2018, equations 11 and 12), by differential evolution. Writes gains.toml, "
         "summary.json, figures and a page. Ctrl-C keeps the best so far; --resume goes on from "

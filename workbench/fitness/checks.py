@@ -10,6 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, Description, read_description
+from workbench.errors import FMUError
 from workbench.fitness.cost import endure, time_calls
 from workbench.fitness.excitation import (
     COMMUNICATION_STEPS,
@@ -41,7 +42,7 @@ from workbench.fitness.finding import (
     Finding,
 )
 from workbench.fitness.isolation import isolated
-from workbench.fmu import FMU, CoSimulation, FMUError, Matrix, Vector
+from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 
 
 def check(path: Path, instantiations: int = 2000, timeout: float = 120.0) -> list[Finding]:

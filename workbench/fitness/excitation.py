@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.errors import FMUError
 from workbench.fitness.finding import Finding
-from workbench.fmu import FMU, CoSimulation, FMUError, Matrix, Variables, Vector
+from workbench.fmu import FMU, CoSimulation, Matrix, Variables, Vector
 
 COMMUNICATION_STEPS = 100
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from multiprocessing.connection import Connection
 
+from workbench.errors import FMUError
 from workbench.fitness.finding import Finding
-from workbench.fmu import FMUError
 
 # A check yields findings, and numbers that say how far it is.
 Task = Callable[[], Iterator[int | Finding]]

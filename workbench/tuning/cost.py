@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.case import Case
-from workbench.errors import InputError
-from workbench.fmu import FMU, FMUError, Matrix, Vector
+from workbench.errors import FMUError, InputError
+from workbench.fmu import FMU, Matrix, Vector
 from workbench.objective import Weights, integrate, samples
 from workbench.observers import ESTIMATE, Estimator
 from workbench.tuning.settling import SETTLED, Settling
