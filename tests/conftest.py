@@ -16,7 +16,7 @@ import pytest
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
 from workbench.objective import Weights
-from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
 from workbench.tuning.cost import Bench, Candidate, Verdict
 

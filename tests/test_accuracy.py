@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.accuracy import (
+from workbench.wheelset.accuracy import (
     Judged,
     contact_errors,
     fall_delay,
@@ -26,7 +26,7 @@ from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import ESTIMATORS, Estimator, PeakForce, make_estimators
 from workbench.recording import read_columns
-from workbench.rig import Effects, Stop, select, simulate, write_recording
+from workbench.wheelset.rig import Effects, Stop, select, simulate, write_recording
 from workbench.tuning import default_settings
 
 ROOT = Path(__file__).parent.parent

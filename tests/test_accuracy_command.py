@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
-from workbench.accuracy import (
+from workbench.wheelset.accuracy import (
     ROWS,
     Accuracy,
     Judged,
@@ -34,7 +34,7 @@ from workbench.cosim import Outcome, Run
 from workbench.fmu import FMU, Vector
 from workbench.observers import ESTIMATE, FilterNoise
 from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.report.accuracy import format_accuracy
+from workbench.wheelset.accuracy_report import format_accuracy
 
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
 RR = 0.70  # [m]

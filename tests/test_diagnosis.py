@@ -20,7 +20,7 @@ from workbench.diagnosis.evidence import Court
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import judge
-from workbench.rig import SCENARIOS, Effects, select, simulate, write_recording
+from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"

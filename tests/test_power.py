@@ -31,7 +31,7 @@ from workbench.power import (
 from workbench.power.planting import Group, Kind
 from workbench.power.statistics import intervals_cover, named_all, named_right
 from workbench.report.power import format_power, write_power
-from workbench.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"

@@ -16,7 +16,7 @@ import pytest
 from workbench.__main__ import main
 from workbench.case import read_case, read_cases
 from workbench.errors import InputError
-from workbench.rig import (
+from workbench.wheelset.rig import (
     ORDINARY_PADS,
     SCENARIOS,
     STANDARD,

@@ -10,7 +10,7 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.case import read_cases
-from workbench.rig import STANDARD
+from workbench.wheelset.rig import STANDARD
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"

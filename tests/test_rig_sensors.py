@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from workbench.case import read_case
-from workbench.rig import CONSTANT_PADS, SCENARIOS, Stop, measure, plant, simulate, write_recording
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Stop, measure, plant, simulate, write_recording
 
 REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1

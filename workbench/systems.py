@@ -1,26 +1,12 @@
 """Systems by name or file, and their models."""
 
-from functools import cache
 from pathlib import Path
 
 from workbench.errors import InputError, closest
 from workbench.fmu import FMU
+from workbench.installed import FILE, system_files
 from workbench.system import OBSERVER, System
 from workbench.system_file import read_system
-from workbench.tables import read_table
-
-_LIBRARIES = Path(__file__).resolve().parents[1] / "modelica"
-FILE = "system.toml"
-
-
-@cache
-def installed() -> dict[str, Path]:
-    """System files that come with the workbench, by name."""
-    found = {}
-    for path in sorted(_LIBRARIES.glob(f"*/{FILE}")):
-        table = read_table(path, "install the workbench again", 'title = "..."')
-        found[table.text("name", path.parent.name)] = path
-    return found
 
 
 def load_system(which: str | Path) -> System:
@@ -31,7 +17,7 @@ def load_system(which: str | Path) -> System:
     InputError
         If there is none of this name, or its file has a mistake.
     """
-    known, path = installed(), Path(which)
+    known, path = system_files(), Path(which)
     if str(which) in known:
         return read_system(known[str(which)])
     if path.is_dir():

@@ -4,12 +4,12 @@ import argparse
 import time
 from importlib.metadata import version
 
-from workbench.accuracy import StopAccuracy, judge, read_truth, stop_accuracy
+from workbench.wheelset.accuracy import StopAccuracy, judge, read_truth, stop_accuracy
 from workbench.case import read_cases
 from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER, Commands, add_recordings
 from workbench.fmu import FMU
 from workbench.observers import ESTIMATORS, make_estimators
-from workbench.report.accuracy import format_accuracy, write_accuracies, write_accuracy
+from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
 from workbench.tuning import default_settings
 
 

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
-from workbench.rig.effects import Effects
-from workbench.rig.run import RATE, TRUTH, Stop
-from workbench.rig.scenarios import Scenario
-from workbench.rig.sensors import measure, received
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.run import RATE, TRUTH, Stop
+from workbench.wheelset.rig.scenarios import Scenario
+from workbench.wheelset.rig.sensors import received, sample
 
 # Column of the recording, unit, factor from SI, digits that hold the resolution.
 _COLUMNS = {
@@ -66,7 +67,7 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every
     """
     recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
     time = stop.time[recorded]
-    channels = measure(stop, effects, time)
+    channels = sample(stop, effects, time)
     kept = received(stop, effects, time)
     measured = {
         f"{name} [{unit}]": (channels[name][kept] * factor, f"%.{digits}f")
@@ -91,11 +92,10 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every
         "drawn": dataclasses.asdict(stop.drawn) | phases,
         "effects": planted,
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / "truth.json", json.dumps(made, indent=2) + "\n")
-    _write(folder / "truth.csv", _table(time[kept][::every], truth))
-    _write(folder / "measured.csv", _table(time[kept], measured))
-    _write(folder / "case.toml", _case(stop.scenario))
+    write_json(folder / "truth.json", made)
+    write_whole(folder / "truth.csv", _table(time[kept][::every], truth))
+    write_whole(folder / "measured.csv", _table(time[kept], measured))
+    write_whole(folder / "case.toml", _case(stop.scenario))
 
 
 def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
@@ -122,10 +122,3 @@ direction = {c.direction}
 [measurement]
 file = "measured.csv"
 """
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file that is complete whenever it is there."""
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)

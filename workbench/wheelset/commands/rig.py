@@ -8,9 +8,10 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive
+from workbench.commands.arguments import Commands, add_system, positive
 from workbench.fmu import CoSimulation
-from workbench.rig import (
+from workbench.systems import load_system
+from workbench.wheelset.rig import (
     CONSTANT_PADS,
     ORDINARY_PADS,
     SCENARIOS,
@@ -23,8 +24,6 @@ from workbench.rig import (
     simulate,
     write_recording,
 )
-
-_REFERENCE = Path("fmus/fmi2/Reference.fmu")
 
 
 def add(commands: Commands) -> None:
@@ -85,10 +84,10 @@ def add(commands: Commands) -> None:
     rig.add_argument(
         "--fmu",
         type=Path,
-        default=_REFERENCE,
         metavar="FILE",
-        help="multibody model, with Co-Simulation (default: %(default)s)",
+        help="multibody model, with Co-Simulation (default: the reference model of the system)",
     )
+    add_system(rig)
     rig.add_argument(
         "--workers",
         type=positive,
@@ -137,7 +136,8 @@ def _rig(options: argparse.Namespace) -> int:
     effects = plant(pads, options.effect)
     folders = {scenario.name: options.out / scenario.name for scenario in scenarios}
     check_files(folders.values(), options.rate)
-    with CoSimulation(options.fmu):
+    fmu = options.fmu or load_system(options.system).model("reference").path
+    with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
     done = 0
@@ -153,7 +153,7 @@ def _rig(options: argparse.Namespace) -> int:
                 effects,
                 options.seed,
                 (options.rate, options.truth_every),
-                options.fmu,
+                fmu,
                 folders[s.name],
             )
             for s in scenarios

@@ -19,7 +19,7 @@ from workbench.fmu import Vector
 from workbench.objective import LOWEST_SPEED, braking_window, low_pass
 from workbench.observers import Estimator
 from workbench.recording import read_columns
-from workbench.rig import TRUTH
+from workbench.wheelset.rig import TRUTH
 
 # Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
 NOISE = 0.03

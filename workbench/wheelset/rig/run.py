@@ -9,12 +9,12 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import CoSimulation, Vector
-from workbench.rig.brake import DEAD_TIME, PROTECTION_PERIOD, Brake, Valve, WheelSlideProtection
-from workbench.rig.drive import Drive, Losses
-from workbench.rig.effects import Effects
-from workbench.rig.pads import FRICTION, Pads
-from workbench.rig.scenarios import Scenario
-from workbench.rig.wheel import CleanedContact, OutOfRoundWheel
+from workbench.wheelset.rig.brake import DEAD_TIME, PROTECTION_PERIOD, Brake, Valve, WheelSlideProtection
+from workbench.wheelset.rig.drive import Drive, Losses
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.pads import FRICTION, Pads
+from workbench.wheelset.rig.scenarios import Scenario
+from workbench.wheelset.rig.wheel import CleanedContact, OutOfRoundWheel
 
 RATE = 1000  # [Hz] of the co-simulation
 

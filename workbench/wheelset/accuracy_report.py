@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
+from workbench.wheelset.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
 from workbench.report.results import write_text
 
 _QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
