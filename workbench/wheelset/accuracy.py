@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.case import Case
-from workbench.cosim import Outcome, Run, observe
+from workbench.case import Case, sign
+from workbench.cosim import Ending, Run, replay
 from workbench.errors import InputError
 from workbench.fmu import Vector
-from workbench.objective import LOWEST_SPEED, braking_window, low_pass
+from workbench.objective import judged_window, low_pass
 from workbench.observers import Estimator
 from workbench.recording import read_columns
+from workbench.system import System
 from workbench.wheelset.rig import TRUTH
 
 # Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
@@ -58,19 +59,19 @@ class Truth:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class KnownStop:
     """A stop whose truth is known, and what estimators make of it.
 
     Attributes
     ----------
     runs : by the name of the estimator.
-    roller_radius : [m], nominal.
+    system : whose estimators they are.
     """
 
     case: Case
     truth: Truth
     runs: Mapping[str, Run]
-    roller_radius: float
+    system: System
 
     def between(self, begin: float, end: float) -> NDArray[np.bool_]:
         """Samples between two times [s] after the first contact, (n,)."""
@@ -79,23 +80,27 @@ class Judged:
 
     def force(self, name: str) -> Vector:
         """Estimated force [N], (n,), positive if it brakes."""
-        return self.case.conditions.direction * self.runs[name].signal("Fx")
+        return sign(self.case, self.system) * self.runs[name].signal("Fx")
 
     @property
     def true_force(self) -> Vector:
         """True force [N], (n,), positive if it brakes."""
-        return self.case.conditions.direction * self.truth.Fx
+        return sign(self.case, self.system) * self.truth.Fx
 
     def force_error(self, name: str) -> Vector:
         """Estimated minus true force below 5 Hz [N], (n,), positive if it is too large."""
-        return low_pass(self.case.time, self.force(name) - self.true_force)
+        return self.smooth(self.force(name) - self.true_force)
+
+    def smooth(self, signal: Vector) -> Vector:
+        """The part of a signal that counts, below 5 Hz, (n,)."""
+        return low_pass(self.case.time, signal, self.system.objective.bandwidth)
 
     @property
     def slide(self) -> NDArray[np.bool_]:
         """Samples in which the wheel slides for the first time, (n,); none if it never does."""
-        speed = self.roller_radius * np.abs(self.truth.omegaR)
-        slip = self.case.conditions.direction * self.truth.slip
-        sliding = (slip > _SLIDING * speed) & (speed > LOWEST_SPEED)
+        speed = rolling_speed(self.system, self.truth.omegaR)
+        slip = sign(self.case, self.system) * self.truth.slip
+        sliding = (slip > _SLIDING * speed) & (speed > lowest_speed(self.system))
         begin = float(self.case.time[np.argmax(sliding)])
         return np.logical_and(sliding, self.case.time < begin + _SLIDE)
 
@@ -220,12 +225,19 @@ class Worst:
     value: float
 
 
-def read_truth(case: Case, roller_radius: float) -> Truth:
-    """Read the truth beside a recording, at the times of the recording.
+def rolling_speed(system: System, omegaR: Vector) -> Vector:
+    """Rolling velocity of a nominal roller [m/s], (n,)."""
+    return np.abs(system.signal("speed", {"omegaR": omegaR}))
 
-    Parameters
-    ----------
-    roller_radius : [m], nominal.
+
+def lowest_speed(system: System) -> float:
+    """Rolling velocity down to which estimates count [m/s]."""
+    ends = system.objective.ends
+    return ends.level if ends else 0.0
+
+
+def read_truth(case: Case, system: System) -> Truth:
+    """Read the truth beside a recording, at the times of the recording.
 
     Raises
     ------
@@ -245,7 +257,7 @@ def read_truth(case: Case, roller_radius: float) -> Truth:
     columns = _read_si(path)
     # The rig may have kept the truth of every Nth sample only.
     signals = {name: np.interp(case.time, columns["time"], columns[name]) for name in _READ}
-    contact = _first_contact(case, signals, roller_radius)
+    contact = _first_contact(case, signals, system)
     muDC: Vector = np.mean([signals[name] for name in _DISCS], axis=0)
     return Truth(signals["Fx"], signals["slip"], signals["omegaR"], muDC, contact)
 
@@ -265,51 +277,46 @@ def _read_si(path: Path) -> dict[str, Vector]:
     return {name: column.values for name, column in columns.items()}
 
 
-def _first_contact(case: Case, signals: Mapping[str, Vector], roller_radius: float) -> float:
+def _first_contact(case: Case, signals: Mapping[str, Vector], system: System) -> float:
     """Time of the first contact [s]."""
     touching = signals["pads"] > _PADS_TOUCH
     contact = float(case.time[np.argmax(touching)])
-    fast = roller_radius * np.abs(signals["omegaR"]) > LOWEST_SPEED
+    fast = rolling_speed(system, signals["omegaR"]) > lowest_speed(system)
     if not (touching & fast & (case.time >= contact + _BUILT_UP[0])).any():
         raise InputError(
             where=str(case.source.parent / "truth.csv"),
             found="a stop that ends before its force is built up",
             expected=f"{_BUILT_UP[0]:g} s or more from the first contact of the pads to "
-            f"{LOWEST_SPEED:g} m/s",
+            f"{lowest_speed(system):g} m/s",
             remedy="leave this case out, or make one that begins faster",
         )
     return contact
 
 
-def judge(
-    case: Case, truth: Truth, estimators: Sequence[Estimator], roller_radius: float
-) -> Judged:
-    """Run estimators on a recording whose truth is known.
-
-    Parameters
-    ----------
-    roller_radius : [m], nominal.
-    """
-    runs = {estimator.name: observe(case, estimator) for estimator in estimators}
-    return Judged(case, truth, runs, roller_radius)
+def observe_stop(
+    case: Case, truth: Truth, estimators: Sequence[Estimator], system: System
+) -> KnownStop:
+    """Run estimators on a recording whose truth is known."""
+    runs = {estimator.name: replay(case, estimator) for estimator in estimators}
+    return KnownStop(case, truth, runs, system)
 
 
-def stop_accuracy(stop: Judged) -> StopAccuracy:
+def stop_accuracy(stop: KnownStop) -> StopAccuracy:
     """All quantities of all estimators in one stop."""
     return StopAccuracy(
         name=stop.case.name,
         title=stop.case.title,
-        wet="wet" in stop.case.conditions.discs,
+        wet="wet" in stop.case.conditions["discs"],
         slides=bool(stop.slide.any()),
         estimators={name: accuracy(stop, name) for name in stop.runs},
     )
 
 
-def accuracy(stop: Judged, name: str) -> Accuracy:
+def accuracy(stop: KnownStop, name: str) -> Accuracy:
     """All quantities of one estimator in one stop."""
     run = stop.runs[name]
-    if run.outcome is not Outcome.OK:
-        return Accuracy(failure=f"{run.outcome.value} {run.message}".strip())
+    if run.ending is not Ending.OK:
+        return Accuracy(failure=f"{run.ending.value} {run.message}".strip())
     slides = bool(stop.slide.any())
     too_high, too_low = contact_errors(stop, name)
     # A friction that never moves, as that of the nominal model, is no estimate.
@@ -328,53 +335,53 @@ def accuracy(stop: Judged, name: str) -> Accuracy:
     )
 
 
-def force_error(stop: Judged, name: str) -> float:
+def force_error(stop: KnownStop, name: str) -> float:
     """Error of the force below 5 Hz, rms over mean, from first pressure to 1 m/s [1]."""
-    window = braking_window(stop.case, stop.roller_radius)
+    window = judged_window(stop.case, stop.system)
     return _rms(stop.force_error(name)[window]) / float(np.abs(stop.truth.Fx[window]).mean())
 
 
-def slide_error(stop: Judged, name: str) -> float:
+def slide_error(stop: KnownStop, name: str) -> float:
     """Error of the force below 5 Hz, rms over mean, inside the slide [1]."""
     return _rms(stop.force_error(name)[stop.slide]) / _sliding_force(stop)
 
 
-def slide_error_all_frequencies(stop: Judged, name: str) -> float:
+def slide_error_all_frequencies(stop: KnownStop, name: str) -> float:
     """Error of the force inside the slide sample by sample, ringing included [1]."""
     return _rms((stop.force(name) - stop.true_force)[stop.slide]) / _sliding_force(stop)
 
 
-def _sliding_force(stop: Judged) -> float:
+def _sliding_force(stop: KnownStop) -> float:
     """Mean force inside the slide [N]."""
-    return float(low_pass(stop.case.time, stop.true_force)[stop.slide].mean())
+    return float(stop.smooth(stop.true_force)[stop.slide].mean())
 
 
 def _rms(values: Vector) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def minimum_error(stop: Judged, name: str) -> float:
+def minimum_error(stop: KnownStop, name: str) -> float:
     """Lowest estimated over lowest true force of the slide below 5 Hz, minus 1 [1]."""
     around = stop.around_slide(0.5, _SLIDE)
-    true = low_pass(stop.case.time, stop.true_force)
+    true = stop.smooth(stop.true_force)
     estimated = true + stop.force_error(name)
     return float(estimated[around].min() / true[around].min()) - 1.0
 
 
-def rise_delay(stop: Judged, name: str) -> float:
+def rise_delay(stop: KnownStop, name: str) -> float:
     """Delay at nine tenths of the force that is reached 2 s after the first contact [s]."""
     level = 0.9 * float(stop.true_force[stop.between(1.9, 2.1)].mean())
     return _delay(stop, name, level, stop.truth.contact)
 
 
-def fall_delay(stop: Judged, name: str) -> float:
+def fall_delay(stop: KnownStop, name: str) -> float:
     """Delay at nine tenths of the fall of the force in the slide [s]."""
     falling = stop.around_slide(_BEFORE_FALL, _FALL - _BEFORE_FALL)
     high, low = float(stop.true_force[falling][0]), float(stop.true_force[falling].min())
     return _delay(stop, name, high - 0.9 * (high - low), float(stop.case.time[falling][0]))
 
 
-def _delay(stop: Judged, name: str, level: float, begin: float) -> float:
+def _delay(stop: KnownStop, name: str, level: float, begin: float) -> float:
     """Time [s] by which an estimate reaches a force [N] later than the truth; inf if never."""
     late = arrival(stop.case.time, stop.force(name), level, begin)
     return late - arrival(stop.case.time, stop.true_force, level, begin)
@@ -402,7 +409,7 @@ def arrival(time: Vector, force: Vector, level: float, begin: float) -> float:
     return float(time[crossed][0] - begin) if crossed.any() else math.inf
 
 
-def contact_errors(stop: Judged, name: str) -> tuple[float, float]:
+def contact_errors(stop: KnownStop, name: str) -> tuple[float, float]:
     """How far the force is too high and too low within 2 s of the first contact [1].
 
     As shares of the force that is being built up, below 5 Hz. An error to both sides is an
@@ -413,10 +420,10 @@ def contact_errors(stop: Judged, name: str) -> tuple[float, float]:
     return float(error.max() / force), float(-error.min() / force)
 
 
-def friction_error(stop: Judged, name: str) -> float:
+def friction_error(stop: KnownStop, name: str) -> float:
     """Largest error of the pads' friction below 5 Hz, from 1 s after the first contact to 1 m/s."""
-    error = low_pass(stop.case.time, stop.runs[name].signal("muDC") - stop.truth.muDC)
-    moving = stop.roller_radius * np.abs(stop.case.omegaR) > LOWEST_SPEED
+    error = stop.smooth(stop.runs[name].signal("muDC") - stop.truth.muDC)
+    moving = rolling_speed(stop.system, stop.case["omegaR"]) > lowest_speed(stop.system)
     return float(np.abs(error[stop.between(1.0, np.inf) & moving]).max())
 
 

@@ -1,6 +1,5 @@
 """Accuracy against the truth of the virtual rig: files and table."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -9,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
+from workbench.files import write_json, write_whole
 from workbench.wheelset.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
-from workbench.report.results import write_text
 
 _QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
 _CELL = 8  # characters, that of "+100.0 %"
@@ -29,7 +28,7 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
         for stop in stops
         for name, result in stop.estimators.items()
     ]
-    write_text(path, pd.DataFrame(lines).to_csv(index=False, float_format="%.6g"))
+    write_whole(path, pd.DataFrame(lines).to_csv(index=False, float_format="%.6g"))
 
 
 def write_accuracy(
@@ -60,7 +59,7 @@ def write_accuracy(
             for name in stops[0].estimators
         },
     }
-    write_text(path, json.dumps(summary, indent=2) + "\n")
+    write_json(path, summary)
 
 
 def _plain(result: Accuracy) -> dict[str, Any]:

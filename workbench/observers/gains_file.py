@@ -1,0 +1,108 @@
+"""The file of gains, `gains.toml`: what the tuning writes, and who runs observers reads."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.fmu import FMU, Vector
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import Gains
+from workbench.recording import read_text
+from workbench.system import System
+
+_AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
+
+
+def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
+    """Gains of a file, for the estimator that it names.
+
+    Parameters
+    ----------
+    reasoned : gains of the estimators that it may be for, by name; their values are not used.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is for another estimator, or lacks a gain.
+    """
+    content = _content(path)
+    estimator = content.get("estimator")
+    if estimator not in reasoned:
+        raise _wrong(path, f"estimator = {estimator!r}", f"one of {', '.join(reasoned)}")
+    blank = reasoned[estimator]
+    given = _table(content, "gains", path)
+    if missing := [name for name in blank.names if name not in given]:
+        raise _wrong(path, f"no {missing[0]} in [gains]", f"the gains {', '.join(blank.names)}")
+    if unknown := [name for name in given if name not in blank.names]:
+        raise _wrong(path, f"{unknown[0]} in [gains]", f"the gains {', '.join(blank.names)}")
+    values = np.array([_number(given[name], name, path) for name in blank.names])
+    design = _table(content, "design", path)
+    constants = {
+        name: _constants(design.get(name), name, len(usual), path)
+        for name, usual in blank.design.items()
+    }
+    return Gains(blank.estimator, blank.names, values, constants, path.name)
+
+
+def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
+    """Gains of an estimator where none are given.
+
+    Those that the system's companion brings serve the model that they were tuned on; another one
+    gets gains that follow from its linearisation. The FMU is left at an operating point.
+    """
+    reasoned = kind.reasoned(fmu, system)
+    name = kind.tuned_as or kind.name
+    path = _companion_file(system, name)
+    if path is None:
+        return reasoned
+    tuned_on = _content(path).get("provenance", {}).get("fmu", {}).get("model")
+    return read_gains(path, {name: reasoned}) if tuned_on == fmu.name else reasoned
+
+
+def _companion_file(system: System, name: str) -> Path | None:
+    if not system.companion:
+        return None
+    (folder,) = import_module(system.companion).__path__
+    path = Path(folder) / "gains" / f"{name}.toml"
+    return path if path.exists() else None
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_text(path, _AGAIN))
+    except tomllib.TOMLDecodeError as error:
+        raise _wrong(path, f"no TOML ({error})") from None
+
+
+def _table(content: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:
+    table = content.get(name, {})
+    if not isinstance(table, dict):
+        raise _wrong(path, f"{name} = {table!r}", f"a table [{name}]")
+    return table
+
+
+def _constants(given: object, name: str, count: int, path: Path) -> Vector:
+    """Constants of the design, which gains are divided by."""
+    if isinstance(given, list) and len(given) == count:
+        values = np.array([_number(value, name, path) for value in given])
+        if values.all():
+            return values
+    raise _wrong(path, f"{name} = {given!r} in [design]", f"{count} numbers other than zero")
+
+
+def _number(value: object, name: str, path: Path) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _wrong(path, f"{name} = {value!r}", "a number")
+    if not math.isfinite(value):
+        raise _wrong(path, f"{name} = {value!r}", "a finite number")
+    return float(value)
+
+
+def _wrong(path: Path, found: str, expected: str = "a file as the tuning writes it") -> InputError:
+    return InputError(where=str(path), found=found, expected=expected, remedy=_AGAIN)
