@@ -82,6 +82,7 @@ class Estimator(ABC):
     tunable : whether it has gains.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
+    sticks : whether a follower rolls where a step would reverse its slip close to standstill.
 
     Raises
     ------
@@ -97,6 +98,7 @@ class Estimator(ABC):
     tunable: ClassVar[bool] = True
     meaning: ClassVar[str] = ""
     tuned_as: ClassVar[str] = ""
+    sticks: ClassVar[bool] = False
     _law: ClassVar[Any]
     _loop: ClassVar[Any]
 

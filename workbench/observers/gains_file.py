@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
@@ -50,6 +51,26 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     return Gains(blank.estimator, blank.names, values, constants, path.name)
 
 
+def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:
+    """The text of `gains.toml`; numbers have all their digits.
+
+    Parameters
+    ----------
+    meaning : of the gains, for whoever reads the file.
+    """
+    values = dict(zip(gains.names, gains.values.tolist(), strict=True))
+    design = {name: constants.tolist() for name, constants in gains.design.items()}
+    return "\n".join(
+        [
+            tomli_w.dumps({"estimator": gains.estimator}),
+            *([f"# {meaning}"] if meaning else []),
+            tomli_w.dumps({"gains": values}),
+            *([tomli_w.dumps({"design": design})] if design else []),
+            tomli_w.dumps({"provenance": provenance}),
+        ]
+    )
+
+
 def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     """Gains of an estimator where none are given.
 
@@ -58,18 +79,19 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     """
     reasoned = kind.reasoned(fmu, system)
     name = kind.tuned_as or kind.name
-    path = _companion_file(system, name)
+    path = tuned_file(system, name)
     if path is None:
         return reasoned
     tuned_on = _content(path).get("provenance", {}).get("fmu", {}).get("model")
     return read_gains(path, {name: reasoned}) if tuned_on == fmu.name else reasoned
 
 
-def _companion_file(system: System, name: str) -> Path | None:
+def tuned_file(system: System, estimator: str) -> Path | None:
+    """The file of tuned gains that a system's companion brings for an estimator, if it does."""
     if not system.companion:
         return None
     (folder,) = import_module(system.companion).__path__
-    path = Path(folder) / "gains" / f"{name}.toml"
+    path = Path(folder) / "gains" / f"{estimator}.toml"
     return path if path.exists() else None
 
 

@@ -252,6 +252,7 @@ class ExtendedKalmanFilter(Estimator):
     label = "EKF"
     rank = 40
     meaning = "standard deviations of samples, and random walks"
+    sticks = True
     _law = staticmethod(ekf_law)
     _loop = staticmethod(_loop)
 

@@ -1,6 +1,6 @@
 within WheelsetRig.Observers;
 model ParameterEstimator "Full model, its frictions set by a PI controller from measured speeds"
-  extends PartialObserver(effectWR=42.4198268, effectDC=-105.223644);
+  extends PartialObserver(effect_muWR=42.4198268, effect_muDC=-105.223644);
   parameter Real L11(unit="s/rad") = 0.0 "From dy of the wheelset to muWR";
   parameter Real L12(unit="s/rad") = 0.0 "From dy of the roller to muWR";
   parameter Real L13(unit="1/rad") = 42.9677889 "From the integral of dy of the wheelset to muWR";
