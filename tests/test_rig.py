@@ -22,7 +22,7 @@ from workbench.wheelset.rig import (
     STANDARD,
     Stop,
     check_files,
-    measure,
+    sample,
     select,
     simulate,
 )
@@ -223,7 +223,7 @@ def test_another_seed_gives_another_stop() -> None:
     name = "03_dry_120_3.6"
     stops = [make(name), simulate(SCENARIOS[name], SEED + 1, ORDINARY_PADS, REFERENCE)]
     assert stops[0].drawn.muDC != stops[1].drawn.muDC
-    noise = [measure(s, ORDINARY_PADS, s.time[1000:1100])["pB"] for s in stops]
+    noise = [sample(s, ORDINARY_PADS, s.time[1000:1100])["pB"] for s in stops]
     assert not np.array_equal(noise[0], noise[1])
 
 
