@@ -4,7 +4,7 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,17 +16,26 @@ import pytest
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
 from workbench.objective import Weights
+from workbench.pool import Pool
+from workbench.system import System
+from workbench.systems import load_system
+from workbench.tuning import (
+    Evaluator,
+    Job,
+    SearchSpace,
+    reasoned_gains,
+    recording,
+    search_space,
+)
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
-from workbench.tuning import Job, Pool, SearchSpace, reasoned_gains, recording, search_space
-from workbench.tuning.cost import Bench, Candidate, Verdict
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
 pytest.register_assert_rewrite(
     "tests.case_folders", "tests.diagnosis_pages", "tests.runtime_instances"
 )
 
-from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
-from .runtime_instances import Fmu, compile_model  # noqa: E402
+from .diagnosis_pages import PLANTED, STOPS
+from .runtime_instances import Fmu, compile_model
 
 ROOT = Path(__file__).parent.parent
 
@@ -46,6 +55,11 @@ def reference_path() -> Path:
     return ROOT / "fmus" / "fmi2" / "Reference.fmu"
 
 
+@pytest.fixture(scope="session")
+def system() -> System:
+    return load_system("wheelset")
+
+
 @pytest.fixture
 def minimal(minimal_path: Path) -> Iterator[FMU]:
     with FMU(minimal_path) as fmu:
@@ -53,8 +67,8 @@ def minimal(minimal_path: Path) -> Iterator[FMU]:
 
 
 @pytest.fixture(scope="session")
-def dry_case() -> Case:
-    return read_case(ROOT / "cases" / "03_dry_120_3.6")
+def dry_case(system: System) -> Case:
+    return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
 
 
 # --- tuning ---
@@ -97,40 +111,17 @@ def problem(
     return prepare("disturbance_observer", minimal_path, stop_beginnings)
 
 
-class Inline:
-    """A pool of this process alone."""
-
-    size = 1
-    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
-
-    def __init__(self, job: Job) -> None:
-        self._bench = Bench(job)
-
-    def submit(self, candidates: Sequence[Candidate]) -> "Future[list[Verdict]]":
-        future: Future[list[Verdict]] = Future()
-        future.set_result([self._bench.judge(candidate) for candidate in candidates])
-        return future
-
-    def close(self) -> None:
-        self._bench.close()
-
-
 @pytest.fixture
-def inline() -> Iterator[Callable[[Job], Pool]]:
+def inline() -> Iterator[Callable[[Job], Pool[Evaluator]]]:
     """Opens pools of this process alone."""
-    pools: list[Inline] = []
-
-    def opened(job: Job) -> Pool:
-        pools.append(Inline(job))
-        return pools[-1]
-
-    yield opened
-    for pool in pools:
-        pool.close()
+    with ExitStack() as stack:
+        yield lambda job: stack.enter_context(Pool(1, Evaluator, job))
 
 
 @pytest.fixture
-def pool(inline: Callable[[Job], Pool], problem: tuple[Job, SearchSpace]) -> Pool:
+def pool(
+    inline: Callable[[Job], Pool[Evaluator]], problem: tuple[Job, SearchSpace]
+) -> Pool[Evaluator]:
     return inline(problem[0])
 
 

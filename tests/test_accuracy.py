@@ -8,6 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from workbench.case import Case, read_cases
+from workbench.cosim import replay
+from workbench.objective import score
+from workbench.observers import Estimator
+from workbench.observers import estimators as all_estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.recording import read_columns
+from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import (
     KnownStop,
     contact_errors,
@@ -20,15 +28,6 @@ from workbench.wheelset.accuracy import (
     rise_delay,
     slide_error,
 )
-from workbench.case import Case, read_cases
-from workbench.cosim import replay
-from workbench.objective import score
-from workbench.observers import Estimator
-from workbench.observers import estimators as all_estimators
-from workbench.observers.gains_file import usual_gains
-from workbench.recording import read_columns
-from workbench.system import System
-from workbench.systems import load_system, open_model
 from workbench.wheelset.claims import PeakForce
 from workbench.wheelset.rig import Effects, Stop, select, simulate, write_recording
 

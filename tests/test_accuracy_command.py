@@ -11,6 +11,12 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
+from workbench.case import Case, read_case
+from workbench.cosim import Ending, Run
+from workbench.fmu import Vector
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.system import System
+from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import (
     ROWS,
     Accuracy,
@@ -29,12 +35,6 @@ from workbench.wheelset.accuracy import (
     stop_accuracy,
     worst,
 )
-from workbench.case import Case, read_case
-from workbench.cosim import Ending, Run
-from workbench.fmu import Vector
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy_report import format_accuracy
 
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"

@@ -15,15 +15,17 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import CATALOGUE, Diagnosis
+from workbench.diagnosis import Diagnosis, read_effects
 from workbench.diagnosis.evidence import Court
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import judge
+from workbench.modelica import read_library
 from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
+EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 LABELLED = ROOT.parent / "shared" / "recordings" / "labelled"
 
 # Three stops: two directions, two pressures, three speeds of order one.
@@ -65,8 +67,8 @@ OUTSIDE = {"friction_step": 0.05, "friction_ripple": 0.02, "drive_beat": 0.03}
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The observer model with every effect at zero."""
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source("AllEffects", CATALOGUE, {}, {}, "Every effect at zero")
-    build(PACKAGE, "AllEffects", text, path, every_platform=False)
+    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
 
@@ -74,7 +76,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
     def run(cases: Sequence[Case]) -> Diagnosis:
         with Court(everything, {}, cases, 2) as court:
-            return judge(Fit(court, CATALOGUE), CATALOGUE, lambda _: None)
+            return judge(Fit(court, EFFECTS), EFFECTS, lambda _: None)
 
     return run
 
@@ -95,7 +97,7 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
 def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden() -> None:
     named = {name for name, _, _ in PLANTED.values()}
     hidden = {"CaliperHysteresis", "AdhesionRecovery", "WheelInertia"}
-    assert named | hidden == {effect.name for effect in CATALOGUE}
+    assert named | hidden == {effect.name for effect in EFFECTS}
 
 
 @pytest.mark.parametrize("planted", PLANTED)

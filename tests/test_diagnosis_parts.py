@@ -10,18 +10,20 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, Conditions
-from workbench.diagnosis import CATALOGUE, choose
-from workbench.diagnosis.evidence import Evidence
+from workbench.diagnosis import choose, read_effects
+from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Column, Evidence
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import Linearised, Point, StopSystem
+from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import add, covariance, minimum
+from workbench.diagnosis.quadratic import StopSystem, add, covariance, minimum
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
+from workbench.modelica import read_library
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
+EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
 DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
 
@@ -29,8 +31,8 @@ DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source("AllEffects", CATALOGUE, {}, {}, "Every effect at zero")
-    build(PACKAGE, "AllEffects", text, path, every_platform=False)
+    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
 
@@ -265,7 +267,7 @@ def test_covariance_is_the_same_in_any_unit() -> None:
 def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
     with FMU(everything) as fmu:
         described = {variable.name: variable for variable in fmu.description.variables}
-        for effect in CATALOGUE:
+        for effect in EFFECTS:
             for parameter in effect.sizes:
                 for name in variables(effect, parameter):
                     one = described[name]
@@ -281,13 +283,62 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
                 assert one.minimum <= min(values) <= max(values) <= one.maximum
 
 
+def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: Path) -> None:
+    effects = {effect.name: effect for effect in EFFECTS}
+    film, single, lag = (effects[n] for n in ("WaterFilm", "SingleDiscWaterFilm", "CylinderLag"))
+    named = ("03_dry_120_3.6", "13_onedisc_100_2.7", "11_brakewet_120_2.7_rev")
+    cases = read_cases([ROOT / "cases" / name for name in named])
+
+    def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
+        with Court(everything, {}, of, 1) as court:
+            fit = Fit(court, EFFECTS)
+            point = replace(fit.start(), sizes={("WaterFilm", "film"): 0.3})
+            values = fit.values(point)
+            both = [[fit.present(one, k) for k in range(len(of))] for one in (film, lag)]
+            assert [one["padFriction.waterFilm.film"] > 0.0 for one in values] == both[0]
+            wet = [one.get("padFriction.waterFilm.wet") for one in values]
+            return both[0], both[1], wet, fit.unseen(single)
+
+    reason = "the conditions of the stops say which discs are wet"
+    assert asked(cases) == ([False, True, True], [True] * 3, [0.0, 1 / 3, 1.0], reason)
+    # Nobody said that a disc is wet: then any may be.
+    assert asked([cases[0]] * 2) == ([True, True], [True, True], [None, None], "")
+
+
+def test_what_shows_only_where_an_input_falls_is_not_looked_for_elsewhere() -> None:
+    rising = ready(noisy(1))
+    assert not rising.falls("pB")
+    falling = replace(rising, u=rising.u[::-1])
+    assert falling.falls("pB")
+    with pytest.raises(InputError, match="no recorded input 'pC'"):
+        rising.falls("pC")
+
+
 def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
     with pytest.raises(InputError, match="closest: 'BrakeFade'"):
-        choose(["brakefade"])
+        choose(["brakefade"], EFFECTS)
 
 
 def test_source_with_an_error_says_where(tmp_path: Path) -> None:
-    text = source("Extended", CATALOGUE[:1], {CATALOGUE[0].name: {"slop": 0.1}}, {}, "a typo")
+    wrong = {EFFECTS[0].name: {"slop": 0.1}}
+    text = source(LIBRARY, "MinimalObserver", "Extended", EFFECTS[:1], wrong, {}, "a typo")
     with pytest.raises(InputError, match="slop"):
-        build(PACKAGE, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
+        build(LIBRARY, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
     assert not (tmp_path / "Extended.fmu").exists()
+
+
+def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
+    stop, point = ready(noisy(6)), {FORCE_DELAY: 0.002, "muWR": 0.4}
+    steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
+    bench = Bench(MINIMAL, [stop])
+    with FMU(MINIMAL) as fmu:
+        nominal = {name: fmu.defaults[name] for name in steps} | point
+    about = bench.at(0, nominal)
+    found = bench.derivatives(0, nominal, [Column((n,), h) for n, h in steps.items()], about)
+    found = np.column_stack([about.jacobian, found])
+    for j, (name, step) in enumerate({FORCE_DELAY: 1e-3, **steps}.items()):
+        sides = [bench.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
+        central = (sides[0].residual - sides[1].residual) / step
+        # Forward over a step in which curvature adds no more than a hundredth.
+        np.testing.assert_allclose(found[:, j], central, atol=0.01 * np.abs(central).max())
+    bench.close()

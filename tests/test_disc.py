@@ -61,7 +61,9 @@ def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(
     assert_array_equal(runs[0].estimate, runs[1].estimate)
 
 
-def test_the_two_observers_can_be_told_apart_by_name(fmu: FMU, system: System, gains: Gains) -> None:
+def test_the_two_observers_can_be_told_apart_by_name(
+    fmu: FMU, system: System, gains: Gains
+) -> None:
     names = [kind(fmu, system, gains).name for kind in (DisturbanceObserver, DiscObserver)]
     assert names == ["disturbance_observer", "disturbance_observer_disc"]
 
@@ -116,8 +118,7 @@ def test_a_disc_cools_to_the_air_with_its_time_constant(
     observer.step(1.0, pressed, y)
     muDC = column(system, "muDC")
     warmth = [
-        NOMINAL - observer.step(1.0 + 0.01 * k, np.zeros(2), y).values[muDC]
-        for k in range(1, 2002)
+        NOMINAL - observer.step(1.0 + 0.01 * k, np.zeros(2), y).values[muDC] for k in range(1, 2002)
     ]
     assert warmth[0] > 1e-4
     # Explicit Euler with h/tau = 0.01/20 over one time constant: relative error 1e-3/4.

@@ -24,6 +24,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.diagnosis.extension import build
+from workbench.modelica import read_library
 
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 WORN = 0.45  # m, wheel radius of Worn
@@ -41,6 +42,7 @@ FADING_STATES = ("omegaW", "omegaR", "padFriction.T")
 def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FMU]]:
     """The minimal model with one effect each."""
     folder = tmp_path_factory.mktemp("extended")
+    library = read_library(root / "modelica" / "WheelsetRig" / "package.mo")
     models = {}
     for name, effect in EFFECTS.items():
         text = (
@@ -49,8 +51,7 @@ def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[d
             f"end {name};\n"
         )
         path = folder / f"{name}.fmu"
-        package = root / "modelica" / "WheelsetRig" / "package.mo"
-        build(package, name, text, path, every_platform=False)
+        build(library, name, text, path, every_platform=False)
         models[name] = FMU(path)
     yield models
     for fmu in models.values():

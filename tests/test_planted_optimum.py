@@ -24,15 +24,16 @@ from workbench.case import Case
 from workbench.objective import BANDWIDTH, Weights
 from workbench.observers import DisturbanceGains
 from workbench.observers.contract import FADING_SPEED
+from workbench.pool import Pool
 from workbench.tuning import (
+    Evaluator,
     Gains,
     Job,
     Plan,
-    Pool,
     Search,
     SearchSpace,
+    evaluate_gains,
     gain_names,
-    judge_gains,
     recording,
     search,
     to_vector,
@@ -261,7 +262,7 @@ def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., J
 
 @pytest.mark.parametrize("step", [0.2, 0.02])
 def test_z_is_that_of_the_lyapunov_equation(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool], step: float
+    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], step: float
 ) -> None:
     """The low-pass follows a deviation wholly within 0.2 s, and by 39 % within 0.02 s."""
     process, samples, weights = Process(step), 100_000, Weights()
@@ -275,7 +276,7 @@ def test_z_is_that_of_the_lyapunov_equation(
         gains_of(L11, 0.0, T_DC),
     ]
     job = prepare_rolling(best, weights, record(process, samples, np.random.default_rng(1)))
-    z = judge_gains(inline(job), job, list(map(to_vector, several)))[:, 0]
+    z = evaluate_gains(inline(job), job, list(map(to_vector, several)))[:, 0]
     scale = weights.vector * [1.0, 1.0, 1e3]
     loops = [stationary(gains, process) for gains in several]
     expected = np.array([scale @ loop.means for loop in loops])
@@ -286,7 +287,7 @@ def test_z_is_that_of_the_lyapunov_equation(
 
 
 def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool], tmp_path: Path
+    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], tmp_path: Path
 ) -> None:
     """Samples 0.2 s apart: the low-pass has settled, and least variance is least z.
 
@@ -343,7 +344,7 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
 
 
 def test_search_ends_where_the_two_worst_cases_are_equally_bad(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool], tmp_path: Path
+    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], tmp_path: Path
 ) -> None:
     """A lively friction asks for more feedback, a noisy sensor for less; 5 Hz matter to both."""
     lively = Process(step=0.02)

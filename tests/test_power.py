@@ -52,7 +52,9 @@ def short(name: str, speed: float) -> Scenario:
 STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
 
 
-def said(gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = "") -> Diagnosed:
+def said(
+    gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = ""
+) -> Diagnosed:
     """A verdict on a set: causes, or other words, or nothing."""
     verdict = other or ("found" if causes else "nothing")
     effects = tuple(REPERTOIRE.plantable(name).effect for name in gains)

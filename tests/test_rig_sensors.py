@@ -9,7 +9,15 @@ import pandas as pd
 import pytest
 
 from workbench.case import read_case
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Stop, plant, sample, simulate, write_recording
+from workbench.wheelset.rig import (
+    CONSTANT_PADS,
+    SCENARIOS,
+    Stop,
+    plant,
+    sample,
+    simulate,
+    write_recording,
+)
 
 REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.optimize import differential_evolution, rosen
 
 from workbench.case import Case
 from workbench.cosim import observe
@@ -15,25 +14,25 @@ from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import DisturbanceObserver, ParameterEstimator
+from workbench.pool import Pool
 from workbench.tuning import (
+    Candidate,
+    Evaluator,
     Job,
     Plan,
-    Pool,
     Search,
     SearchSpace,
     cross_validate,
+    evaluate_all,
+    evaluate_gains,
     from_vector,
     gain_names,
-    judge_gains,
     reasoned_gains,
     recording,
     search,
     sensitivities,
     to_vector,
 )
-from workbench.tuning.cost import Candidate
-from workbench.tuning.evolution import first, latin_hypercube, propose, select
-from workbench.tuning.workers import judge_all
 
 FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 
@@ -41,42 +40,11 @@ FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 # --- the algorithm ---
 
 
-def test_generations_are_those_of_scipy_bit_for_bit() -> None:
-    """Reference: SciPy's differential_evolution with the same random numbers."""
-    n, generations, size = 4, 25, 20
-    path: list[np.ndarray] = []
-    differential_evolution(
-        rosen,
-        [(0.0, 1.0)] * n,
-        rng=np.random.default_rng(5),
-        popsize=size // n,
-        maxiter=generations,
-        tol=0.0,
-        polish=False,
-        updating="deferred",
-        callback=lambda intermediate_result: path.append(intermediate_result.x.copy()),
-    )
-
-    def judged(members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # SciPy's way from 0..1 to the bounds 0..1 rounds.
-        z = np.array([rosen(0.5 + (x - 0.5)) for x in members])
-        return z, z[:, np.newaxis]
-
-    rng = np.random.default_rng(5)
-    members = latin_hypercube(size, np.zeros(n), np.ones(n), rng)
-    population = first(members, *judged(members))
-    for expected in path:
-        trials, order = propose(population, rng)
-        population = select(population, trials, *judged(trials), order)
-        assert_array_equal(0.5 + (population.members[0] - 0.5), expected)
-    assert len(path) == generations
-
-
 def test_planted_gains_are_found(
     root: Path,
     prepare: Callable[..., tuple[Job, SearchSpace]],
     stop_beginnings: list[Case],
-    inline: Callable[[Job], Pool],
+    inline: Callable[[Job], Pool[Evaluator]],
     tmp_path: Path,
 ) -> None:
     """The force is replaced by what known gains estimate, so that these have z = 0."""
@@ -93,7 +61,7 @@ def test_planted_gains_are_found(
     pool = inline(job)
     found = search(pool, job, space, everything, Plan(80, 5, seed=2), tmp_path / "checkpoint.json")
     assert found is not None
-    z_reasoned = judge_gains(pool, job, [to_vector(reasoned)]).max()
+    z_reasoned = evaluate_gains(pool, job, [to_vector(reasoned)]).max()
     assert found.z < 0.02 * z_reasoned
     wanted = to_vector(planted)
     # Columns that decide about the force; a tenth is what is left of z over its slope.
@@ -143,11 +111,14 @@ def test_bounds_are_the_loops_that_samples_can_carry(problem: tuple[Job, SearchS
 
 
 def test_cost_is_z_of_the_objective(
-    problem: tuple[Job, SearchSpace], pool: Pool, minimal: FMU, stop_beginnings: list[Case]
+    problem: tuple[Job, SearchSpace],
+    pool: Pool[Evaluator],
+    minimal: FMU,
+    stop_beginnings: list[Case],
 ) -> None:
     job, _ = problem
     gains = job.gains
-    z_k = judge_gains(pool, job, [to_vector(gains)])[0]
+    z_k = evaluate_gains(pool, job, [to_vector(gains)])[0]
     estimator = DisturbanceObserver(minimal, gains)  # type: ignore[arg-type]
     expected = [score(c, observe(c, estimator), 0.7, Weights()).z for c in stop_beginnings]
     # The same terms, added in another order: 1200 roundings.
@@ -160,33 +131,33 @@ def test_a_case_without_force_is_refused(stop_beginnings: list[Case]) -> None:
 
 
 def test_a_lost_candidate_is_dropped_where_it_has_lost(
-    problem: tuple[Job, SearchSpace], pool: Pool
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator]
 ) -> None:
     job, _ = problem
     values = to_vector(job.gains)
     cases = len(job.recordings)
     order = tuple(range(cases))
-    [whole] = judge_all(pool, [Candidate(values, np.inf, order)], cases)
-    [kept] = judge_all(pool, [Candidate(values, whole.z, order)], cases)
-    [lost] = judge_all(pool, [Candidate(values, np.nextafter(whole.z, 0), order)], cases)
+    [whole] = evaluate_all(pool, [Candidate(values, np.inf, order)], cases)
+    [kept] = evaluate_all(pool, [Candidate(values, whole.z, order)], cases)
+    [lost] = evaluate_all(pool, [Candidate(values, np.nextafter(whole.z, 0), order)], cases)
     first_case = job.recordings[0].steps.size
-    [early] = judge_all(pool, [Candidate(values, 0.01 * whole.z, order)], cases)
+    [early] = evaluate_all(pool, [Candidate(values, 0.01 * whole.z, order)], cases)
     assert kept.z == whole.z
     assert (lost.z, lost.unstable) == (np.inf, -1)
     assert early.samples < first_case
 
 
 def test_unstable_candidates_are_counted_and_cost_little(
-    problem: tuple[Job, SearchSpace], pool: Pool
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator]
 ) -> None:
     """The roller's deviation fed back with the wrong sign, as fast as the samples allow."""
     job, _ = problem
     values = to_vector(job.gains)
     values[[0, 5]] = -0.99 * FASTEST
-    [verdict] = judge_all(pool, [Candidate(values, np.inf, (1, 0, 2))], 3)
-    assert verdict.z == np.inf
-    assert verdict.unstable == 1
-    assert verdict.samples <= job.recordings[1].steps.size
+    [evaluation] = evaluate_all(pool, [Candidate(values, np.inf, (1, 0, 2))], 3)
+    assert evaluation.z == np.inf
+    assert evaluation.unstable == 1
+    assert evaluation.samples <= job.recordings[1].steps.size
 
 
 # --- validation ---
@@ -195,7 +166,7 @@ def test_unstable_candidates_are_counted_and_cost_little(
 def test_folds_are_judged_by_gains_that_have_not_seen_them(
     root: Path,
     problem: tuple[Job, SearchSpace],
-    pool: Pool,
+    pool: Pool[Evaluator],
     stop_beginnings: list[Case],
     tmp_path: Path,
 ) -> None:
@@ -210,7 +181,7 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
     reasoned = to_vector(job.gains)
     folds = cross_validate(pool, job, stop_beginnings, reasoned, 3, tune)
     assert seen == [[1, 2], [0, 2], [0, 1]]
-    z_k = judge_gains(pool, job, [reasoned])[0]
+    z_k = evaluate_gains(pool, job, [reasoned])[0]
     assert [fold.cases for fold in folds] == [(r.name,) for r in job.recordings]
     assert_array_equal([fold.reasoned for fold in folds], z_k)
     assert all(np.isfinite(fold.tuned) for fold in folds)
@@ -224,7 +195,7 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
 
 
 def test_a_gain_without_effect_does_not_matter(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     """A decay of 0.02 1/s forgets 12 % of a deviation in 6 s; L42 is the loop of muDC."""
     job, space = problem

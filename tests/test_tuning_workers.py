@@ -3,8 +3,8 @@
 import errno
 import os
 import signal
-from collections.abc import Sequence
-from concurrent.futures import BrokenExecutor, Future
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,16 +13,30 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from workbench.errors import InputError
-from workbench.tuning import Job, Plan, Pool, ProcessPool, Search, SearchSpace, search, to_vector
+from workbench.pool import Pool
+from workbench.tuning import (
+    Candidate,
+    Evaluation,
+    Evaluator,
+    Job,
+    Plan,
+    Search,
+    SearchSpace,
+    Workers,
+    evaluate_all,
+    evaluators,
+    search,
+    to_vector,
+)
 from workbench.tuning.checkpoint import load
-from workbench.tuning.cost import Candidate, Verdict
 from workbench.tuning.search import identity
-from workbench.tuning.workers import judge_all
 
 SMALL = Plan(generations=4, population=1, seed=3)
 
 
-def run(pool: Pool, problem: tuple[Job, SearchSpace], path: Path, plan: Plan, **options) -> Search:
+def run(
+    pool: Workers, problem: tuple[Job, SearchSpace], path: Path, plan: Plan, **options
+) -> Search:
     job, space = problem
     found = search(pool, job, space, range(len(job.recordings)), plan, path, **options)
     assert found is not None
@@ -30,7 +44,7 @@ def run(pool: Pool, problem: tuple[Job, SearchSpace], path: Path, plan: Plan, **
 
 
 def test_economy_changes_nothing_but_the_work(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     plan = replace(SMALL, generations=8)
     thrifty = run(pool, problem, tmp_path / "a.json", plan)
@@ -39,9 +53,8 @@ def test_economy_changes_nothing_but_the_work(
     a, b = (load(tmp_path / name, mark) for name in ("a.json", "b.json"))
     assert a is not None
     assert b is not None
-    for name in ("members", "z", "z_k", "order"):
+    for name in ("members", "z", "z_k"):
         assert_array_equal(getattr(a.population, name), getattr(b.population, name))
-    assert a.rng == b.rng
     assert_array_equal(thrifty.best, full.best)
     assert sum(g.samples for g in thrifty.history) < 0.8 * sum(g.samples for g in full.history)
     assert thrifty.z < thrifty.history[0].z
@@ -51,49 +64,32 @@ def test_economy_changes_nothing_but_the_work(
 
 
 def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     """One process of two is killed while it works."""
     job, _ = problem
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
-    two = ProcessPool(job, 2, 60.0)
-    killed = []
+    killed: list[int] = []
+    with evaluators(job, 2) as two:
 
-    def kill_once(history: Sequence[object]) -> None:
-        if not killed:
-            killed.append(next(iter(two._executor._processes)))
-            os.kill(killed[0], signal.SIGKILL)
+        def kill_once(history: Sequence[object]) -> None:
+            if not killed:
+                killed.append(two.submit(pid).result())
+                os.kill(killed[0], signal.SIGKILL)
 
-    try:
         found = run(two, problem, tmp_path / "two.json", SMALL, report=kill_once)
-    finally:
-        two.close()
-    assert killed
+        assert killed[0] not in {two.submit(pid).result() for _ in range(100)}
     assert_array_equal(found.best, alone.best)
     assert_array_equal(found.z_k, alone.z_k)
+    assert [g.z for g in found.history] == [g.z for g in alone.history]
 
 
-def test_a_worker_that_is_killed_as_it_starts_is_started_again(
-    problem: tuple[Job, SearchSpace], pool: Pool
-) -> None:
-    """Before it has read its job, which takes seconds of imports and compilation."""
-    job, _ = problem
-    candidates = [Candidate(to_vector(job.gains), np.inf, (0, 1, 2))]
-    one = ProcessPool(job, 1, 60.0)
-    try:
-        first = one.submit(candidates)
-        os.kill(next(iter(one._executor._processes)), signal.SIGKILL)
-        with pytest.raises(BrokenExecutor):
-            first.result(timeout=60.0)
-        [verdict] = judge_all(one, candidates, 3)
-    finally:
-        one.close()
-    assert not verdict.crashed
-    assert verdict.z == judge_all(pool, candidates, 3)[0].z
+def pid(evaluator: Evaluator) -> int:
+    return os.getpid()
 
 
 def test_a_cluster_finds_the_same_gains(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     distributed = pytest.importorskip("distributed")
     from workbench.tuning.cluster import DaskPool
@@ -102,7 +98,7 @@ def test_a_cluster_finds_the_same_gains(
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
     options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
     with distributed.LocalCluster(processes=False, **options) as cluster:
-        remote = DaskPool(job, cluster.scheduler_address, 60.0)
+        remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
         try:
             found = run(remote, problem, tmp_path / "remote.json", SMALL)
         finally:
@@ -115,49 +111,44 @@ def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
 ) -> None:
     job, _ = problem
     endless = (0,) * 100_000  # at 1 ms a case, two minutes
-    hasty = ProcessPool(job, 1, 0.3)
-    try:
-        [verdict] = judge_all(hasty, [Candidate(to_vector(job.gains), np.inf, endless)], 3)
-    finally:
-        hasty.close()
-    assert verdict.crashed
-    assert verdict.z == np.inf
+    with evaluators(job, 1, limit=0.3) as hasty:
+        [evaluation] = evaluate_all(hasty, [Candidate(to_vector(job.gains), np.inf, endless)], 3)
+    assert evaluation.crashed
+    assert evaluation.z == np.inf
 
 
 class Deadly:
-    """A pool that loses the tasks which hold a certain candidate."""
+    """A pool whose workers die of a certain candidate."""
 
-    size = 1
-    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
-
-    def __init__(self, pool: Pool, candidate: float) -> None:
+    def __init__(self, pool: Pool[Evaluator], candidate: float) -> None:
         self._pool = pool
         self._candidate = candidate
-        self.submitted: list[list[float]] = []
 
-    def submit(self, candidates: Sequence[Candidate]) -> "Future[list[Verdict]]":
-        self.submitted.append([float(c.values[0]) for c in candidates])
-        if self._candidate not in self.submitted[-1]:
-            return self._pool.submit(candidates)
-        future: Future[list[Verdict]] = Future()
-        future.set_exception(BrokenExecutor("a worker died"))
-        return future
+    def submit(
+        self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate
+    ) -> "Future[Evaluation]":
+        if candidate.values[0] == self._candidate:
+            return self._pool.submit(die)
+        return self._pool.submit(function, candidate)
+
+
+def die(evaluator: Evaluator) -> Evaluation:
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError("it lives")
 
 
 def test_only_the_candidate_that_kills_workers_is_lost(
-    problem: tuple[Job, SearchSpace], pool: Pool
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator]
 ) -> None:
-    _, space = problem
-    values = [space.gains(np.clip(space.start + 0.001 * i, 0, 1)) for i in range(40)]
+    job, space = problem
+    values = [space.gains(np.clip(space.start + 0.001 * i, 0, 1)) for i in range(20)]
     candidates = [Candidate(v, np.inf, (0, 1, 2)) for v in values]
-    undisturbed = judge_all(pool, candidates, 3)
-    deadly = Deadly(pool, float(values[7][0]))
-    verdicts = judge_all(deadly, candidates, 3)
-    assert [v.crashed for v in verdicts] == [i == 7 for i in range(40)]
-    others = [i for i in range(40) if i != 7]
-    assert_array_equal([verdicts[i].z for i in others], [undisturbed[i].z for i in others])
-    # Its task had others in it, so it was judged again by itself.
-    assert [float(values[7][0])] in deadly.submitted
+    undisturbed = evaluate_all(pool, candidates, 3)
+    with evaluators(job, 2) as two:
+        found = evaluate_all(Deadly(two, float(values[7][0])), candidates, 3)
+    assert [one.crashed for one in found] == [i == 7 for i in range(20)]
+    others = [i for i in range(20) if i != 7]
+    assert_array_equal([found[i].z for i in others], [undisturbed[i].z for i in others])
 
 
 # --- checkpoints ---
@@ -165,7 +156,7 @@ def test_only_the_candidate_that_kills_workers_is_lost(
 
 def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
     problem: tuple[Job, SearchSpace],
-    pool: Pool,
+    pool: Pool[Evaluator],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -192,7 +183,7 @@ def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
 
 
 def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     whole = run(pool, problem, tmp_path / "whole.json", SMALL)
 
@@ -210,7 +201,7 @@ def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
 
 
 def test_another_search_does_not_go_on_from_a_checkpoint(
-    problem: tuple[Job, SearchSpace], pool: Pool, tmp_path: Path
+    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     path = tmp_path / "checkpoint.json"
     run(pool, problem, path, SMALL)

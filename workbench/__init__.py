@@ -2,3 +2,36 @@
 
 The flow: case -> FMU -> observer -> run -> score -> report, one module each, in this order.
 """
+
+import ast
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
+    from workbench.case import Case as Case
+    from workbench.case import read_case as read_case
+    from workbench.case import read_cases as read_cases
+    from workbench.cosim import Run as Run
+    from workbench.errors import FMUError as FMUError
+    from workbench.errors import InputError as InputError
+    from workbench.fmu import FMU as FMU
+
+_MODULES = {
+    name.name: node.module
+    for node in ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
+    if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("workbench.")
+    for name in node.names
+}
+__all__ = list(_MODULES)
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = getattr(import_module(_MODULES[name]), name)
+        return globals()[name]
+
+    def __dir__() -> list[str]:
+        return __all__

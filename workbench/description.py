@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import fmpy
 
 from workbench.errors import InputError, closest
+from workbench.resources import CHECKOUT
 
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
@@ -162,7 +163,8 @@ def read_description(path: Path) -> Description:
             where=str(path),
             found="no such file",
             expected="an FMU",
-            remedy="build the FMUs with 'make fmus' or give the path of one with --fmu",
+            remedy="give the path of one with --fmu"
+            + ("" if CHECKOUT is None else ", or build the project's with 'make fmus'"),
         )
     try:
         found = fmpy.read_model_description(str(path), validate=False)

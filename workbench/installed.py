@@ -5,7 +5,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-_LIBRARIES = Path(__file__).resolve().parents[1] / "modelica"
+from workbench import resources
+
 FILE = "system.toml"
 
 
@@ -22,5 +23,5 @@ def companions() -> list[str]:
 
 @cache
 def _contents() -> dict[Path, dict[str, Any]]:
-    paths = sorted(_LIBRARIES.glob(f"*/{FILE}"))
+    paths = sorted(resources.modelica().glob(f"*/{FILE}"))
     return {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in paths}

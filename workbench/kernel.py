@@ -6,14 +6,15 @@ also be called from ordinary Python.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-import numba
 import numpy as np
 import platformdirs
 from numba import njit, types
+from numba.core import caching
 from numba.core.types import WrapperAddressProtocol
 from numba.experimental import function_type as _first_class_functions  # noqa: F401  registers them
 from numpy.typing import NDArray
@@ -22,18 +23,56 @@ from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, Vector
 
 
-def _cache_folder() -> str:
-    """Folder of compiled code, one for each state of the sources.
+def _folder() -> Path:
+    """Folder of compiled code, one for each state of the sources that hold laws and loops.
 
     numba renews a compiled function when its own file changes, not when one that it calls does.
     """
-    here = Path(__file__).parent
-    sources = [Path(__file__), *sorted((here / "observers").glob("*.py"))]
-    digest = hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
-    return str(Path(platformdirs.user_cache_dir("wheelset-workbench")) / digest[:16])
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    sources = (file.read_bytes() for file in files)
+    compiled_ones = b"".join(source for source in sources if b"workbench.kernel import" in source)
+    state = hashlib.sha256(compiled_ones).hexdigest()[:16]
+    return Path(platformdirs.user_cache_dir("wheelset-workbench")) / state
 
 
-numba.config.CACHE_DIR = _cache_folder()
+_FOLDER = _folder()
+
+
+class _Locator(caching.UserWideCacheLocator):  # type: ignore[misc]
+    def __init__(self, function: Any, file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(_FOLDER / self.get_suitable_cache_subpath(file))
+
+
+class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes: ClassVar = [_Locator]
+
+
+class _Cache(caching.FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function in our folder; numba's own setting is left to the user."""
+
+    _impl_class = _CodeCache
+
+
+def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
+    """Make a decorator of laws and loops, whose compiled code is kept between runs.
+
+    Their arrays belong to the caller and they allocate none, so that references need not be
+    counted (`_nrt`), which took two thirds of a step.
+    """
+
+    def compile_(function: Callable[..., Any]) -> Any:
+        dispatcher = njit(error_model="numpy", _nrt=False, inline=inline)(function)
+        # Where nothing can be kept (no file, no writable folder) each process compiles anew.
+        with suppress(RuntimeError):
+            dispatcher._cache = _Cache(function)
+        return dispatcher
+
+    return compile_
+
+
+compiled = _compiler(inline="never")
+inlined = _compiler(inline="always")
 
 _WORD = types.intp
 _ARRAY_CALL = types.int32(_WORD, _WORD, _WORD)
@@ -42,11 +81,6 @@ _DIRECTIONAL_2 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
 _DIRECTIONAL_3 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
 
 OK, REFUSED, SINGULAR = 0, 1, 2
-
-# Decorators of laws and loops. Their arrays belong to the caller and they allocate none, so that
-# references need not be counted (`_nrt`), which took two thirds of a step.
-compiled = njit(cache=True, error_model="numpy", _nrt=False)
-inlined = njit(cache=True, error_model="numpy", _nrt=False, inline="always")
 
 
 class _Function(WrapperAddressProtocol):  # type: ignore[misc]

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.signal import butter, sosfiltfilt
 
 from workbench.case import Case
 from workbench.cosim import Ending, Run
 from workbench.fmu import Vector
+from workbench.kernel import compiled
 from workbench.system import Objective, System
 
 # Two equal poles at a corner are down by 3 dB at this share of it.
@@ -81,7 +81,7 @@ def corner(objective: Objective) -> float:
     return float(_CORNER * objective.bandwidth)
 
 
-@njit(cache=True)
+@compiled
 def integrate(z, memory, deviations, weights, steps, shares, corner):  # type: ignore[no-untyped-def]
     """Add a piece of recording to z_k, equation (12) of Schwarz et al. (2018).
 

@@ -429,7 +429,7 @@ class System:
     rolling: Rolling | None = None
     following: Following | None = None
     panels: tuple[Panel, ...] = ()
-    export: Export = Export({}, OperatingPoint({}, {}, {}))  # noqa: RUF009  frozen
+    export: Export = Export({}, OperatingPoint({}, {}, {}))
     companion: str = ""
     shortest: float = 0.0
     settles: float = 10.0

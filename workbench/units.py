@@ -108,6 +108,20 @@ def si_factor(unit: str, si: str, where: str) -> float:
     )
 
 
+def quotient(unit: str, divisor: str) -> str:
+    """Unit of a quantity over another one.
+
+    >>> quotient("1/s", "(rad/s).s")
+    '1/rad/s'
+    >>> quotient("rad/s", "rad/s")
+    '1'
+    """
+    registry = _units()
+    ratio = registry.Quantity(1.0, _spelled(unit)) / registry.Quantity(1.0, _spelled(divisor))
+    text = f"{ratio.to_reduced_units().units:~C}".replace("**", "")
+    return "1" if text in ("", "dimensionless") else text
+
+
 def _spelled(unit: str) -> str:
     """A unit as pint reads it."""
     if unit in _REVOLUTIONS_PER_MINUTE:

@@ -45,20 +45,20 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
   replaceable Quantities.Unchanged wheelRadius(nominal=rW, omega=omegaW)
-    constrainedby Quantities.PartialQuantity(nominal=rW, omega=omegaW) "Wheel radius";
+    constrainedby Quantities.PartialWheelRadius(nominal=rW, omega=omegaW) "Wheel radius";
   replaceable Quantities.Unchanged rollerRadius(nominal=rR, omega=omegaR)
-    constrainedby Quantities.PartialQuantity(nominal=rR, omega=omegaR) "Roller radius";
+    constrainedby Quantities.PartialRollerRadius(nominal=rR, omega=omegaR) "Roller radius";
   replaceable Quantities.Unchanged wheelLoad(nominal=Fz, omega=omegaW)
-    constrainedby Quantities.PartialQuantity(nominal=Fz, omega=omegaW) "Wheel load";
+    constrainedby Quantities.PartialWheelLoad(nominal=Fz, omega=omegaW) "Wheel load";
   replaceable Quantities.Unchanged creepStiffness(
     nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
-    constrainedby Quantities.PartialQuantity(
+    constrainedby Quantities.PartialCreepStiffness(
     nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
     "Creep force per creepage at zero slip";
   replaceable Quantities.Unchanged wheelInertia(nominal=JW, omega=omegaW)
-    constrainedby Quantities.PartialQuantity(nominal=JW, omega=omegaW) "Inertia of the wheelset";
+    constrainedby Quantities.PartialWheelInertia(nominal=JW, omega=omegaW) "Inertia of the wheelset";
   replaceable Quantities.Unchanged driveTorque(nominal=tauR, omega=omegaW)
-    constrainedby Quantities.PartialQuantity(nominal=tauR, omega=omegaW) "Torque of the drive";
+    constrainedby Quantities.PartialDriveTorque(nominal=tauR, omega=omegaW) "Torque of the drive";
   replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
     constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
   replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)

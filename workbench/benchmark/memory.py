@@ -39,7 +39,7 @@ def watch_command(command: Sequence[str]) -> list[int]:
     peaks: dict[int, int] = {}
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as master:
         while master.poll() is None:
-            for process in (master.pid, *_children(master.pid)):
+            for process in (master.pid, *_descendants(master.pid)):
                 try:
                     peaks[process] = peak_memory(process)
                 except ProcessLookupError:
@@ -50,12 +50,12 @@ def watch_command(command: Sequence[str]) -> list[int]:
     return list(peaks.values())
 
 
-def _children(process: int) -> list[int]:
-    """Processes that the threads of a process have started and that have not ended."""
+def _descendants(process: int) -> list[int]:
+    """Processes that the threads of a process, and those that it started, have started."""
     found: list[int] = []
     for children in Path(f"/proc/{process}/task").glob("*/children"):
         try:
             found += map(int, children.read_text().split())
         except OSError:  # the thread has ended
             continue
-    return found
+    return found + [one for child in found for one in _descendants(child)]

@@ -2,7 +2,6 @@
 
 import json
 import math
-import multiprocessing
 import os
 import statistics
 import subprocess
@@ -12,7 +11,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from multiprocessing.queues import Queue
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
 from workbench.case import Case
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimator, choose
+from workbench.pool import Pool
 from workbench.system import OBSERVER, System
 from workbench.systems import open_model
 
@@ -33,7 +32,6 @@ _FMPY_STEPS = 1500
 _PROCESSES = 2
 _PROCESS_REPEATS = 5
 _FULL = "full"  # role of a larger model
-_PATIENCE = 60.0  # s, for an answer of a worker; it takes less than one
 
 Samples = tuple[Vector, Matrix, Matrix]
 
@@ -160,9 +158,7 @@ def _time(case: Case, estimator: Estimator, loop: Loop | None, plain: Loop | Non
     )
 
 
-def _per_step(
-    runs: Sequence[Loop], samples: Samples, repeats: int = _REPEATS
-) -> list[float]:
+def _per_step(runs: Sequence[Loop], samples: Samples, repeats: int = _REPEATS) -> list[float]:
     """Median time per step [s] of each; in turns, so that they meet the same load."""
     spent: list[list[float]] = [[] for _ in runs]
     for _ in range(repeats):
@@ -200,49 +196,38 @@ def time_processes(cases: Sequence[Case], system: System) -> ProcessTimes:
 
 def _time_workers(workers: int, cases: Sequence[Case], system: System) -> tuple[float, int]:
     """Median time of all cases [s], and the largest memory of a worker [bytes]."""
-    context = multiprocessing.get_context("spawn")
-    tasks: Queue[int | None] = context.Queue()
-    answers: Queue[int] = context.Queue()
-    arguments = (list(cases), system, tasks, answers)
-    processes = [context.Process(target=_work, args=arguments, daemon=True) for _ in range(workers)]
-    for process in processes:
-        process.start()
-    _collect(answers, workers)
     # The longest first, so that no worker is left with a long one at the end.
     order = sorted(range(len(cases)), key=lambda k: -cases[k].time[-1])
-    spent = []
-    for _ in range(_PROCESS_REPEATS):
-        begin = time.perf_counter()
-        for k in order:
-            tasks.put(k)
-        _collect(answers, len(order))
-        spent.append(time.perf_counter() - begin)
-    for _ in processes:
-        tasks.put(None)
-    memory = max(_collect(answers, workers))
-    for process in processes:
-        process.join()
+    spent, memory = [], 0
+    with Pool(workers, _prepared, (list(cases), system), isolated=True) as pool:
+        pool.map(_run, order)  # until all workers are ready
+        for _ in range(_PROCESS_REPEATS):
+            begin = time.perf_counter()
+            memory = max(memory, *pool.map(_run, order))
+            spent.append(time.perf_counter() - begin)
     return statistics.median(spent), memory
 
 
-def _collect(answers: "Queue[int]", count: int) -> list[int]:
-    return [answers.get(timeout=_PATIENCE) for _ in range(count)]
+_Prepared = tuple[list[Estimator], list[Samples]]
 
 
-def _work(
-    cases: Sequence[Case], system: System, tasks: "Queue[int | None]", answers: "Queue[int]"
-) -> None:
-    """Run cases by number until None comes; answers once when ready, once a case, and memory."""
+@contextmanager
+def _prepared(given: tuple[Sequence[Case], System]) -> Iterator[_Prepared]:
+    """All observers, and the cases at 1 kHz."""
+    cases, system = given
     with opened(system, tuned_names(system)) as estimators:
         samples = [resample(case, _RATE) for case in cases]
         for estimator in estimators:
             estimator.run(*(part[:2] for part in samples[0]))
-        answers.put(0)
-        while (number := tasks.get()) is not None:
-            for estimator in estimators:
-                estimator.run(*samples[number])
-            answers.put(number)
-    answers.put(peak_memory())
+        yield estimators, samples
+
+
+def _run(prepared: _Prepared, number: int) -> int:
+    """Run all observers on a case; returns the peak memory of this process [bytes]."""
+    estimators, samples = prepared
+    for estimator in estimators:
+        estimator.run(*samples[number])
+    return peak_memory()
 
 
 def format_observers(

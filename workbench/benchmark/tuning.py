@@ -20,16 +20,18 @@ from workbench.fmu import FMU, Vector
 from workbench.objective import Weights
 from workbench.observers import DisturbanceObserver, Estimate, ParameterEstimator
 from workbench.tuning import (
+    LIMIT,
+    Candidate,
+    Evaluator,
     Job,
-    Pool,
-    ProcessPool,
+    Workers,
+    evaluate_all,
+    evaluators,
     from_vector,
     reasoned_gains,
     recording,
     to_vector,
 )
-from workbench.tuning.cost import Bench, Candidate
-from workbench.tuning.workers import judge_all
 
 WORKERS = 2
 CANDIDATES = 270  # a generation: 15 for each of 18 gains
@@ -37,7 +39,6 @@ _REPEATS = 3
 _EVALUATIONS = 15  # of ours, in each repeat of one by FMPy
 _VARIATION = 0.01  # of gains: candidates differ, and all of them are stable
 _SEED = 1
-_TIMEOUT = 60.0  # s for one candidate, which takes 0.1
 # Rounding, grown 1e4 times by an estimator, of signals a thousand times as large as their errors.
 _AGREEMENT = 1e-9
 
@@ -147,28 +148,30 @@ def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> Evaluati
     """
     values = to_vector(job.gains)
     ours, theirs = [], []
-    with closing(Bench(job)) as bench:
+    with Evaluator(job) as evaluator:
         for _ in range(_REPEATS):
             for _ in range(_EVALUATIONS):
                 begin = time.perf_counter()
-                verdict = bench.judge(Candidate(values, np.inf, (0,)))
+                evaluation = evaluator.evaluate(Candidate(values, np.inf, (0,)))
                 ours.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             z = by_fmpy(values)
             theirs.append(time.perf_counter() - begin)
-            if not abs(z - verdict.z) <= _AGREEMENT * verdict.z:
+            if not abs(z - evaluation.z) <= _AGREEMENT * evaluation.z:
                 raise ArithmeticError(
-                    f"{job.estimator}: z is {verdict.z} by the tuning and {z} by FMPy's methods, "
-                    "so their times are not those of the same evaluation"
+                    f"{job.estimator}: z is {evaluation.z} by the tuning and {z} by FMPy's "
+                    "methods, so their times are not those of the same evaluation"
                 )
     median = statistics.median
-    return EvaluationTimes(job.estimator, verdict.samples, median(ours), median(theirs), verdict.z)
+    return EvaluationTimes(
+        job.estimator, evaluation.samples, median(ours), median(theirs), evaluation.z
+    )
 
 
 def measure_workers(
     cases: Sequence[Case], minimal: Path, candidates: int = CANDIDATES
 ) -> WorkerRates:
-    """Judge the same candidates of the disturbance observer by one worker, by two, and with Dask.
+    """Evaluate candidates of the disturbance observer by one worker, by two, and with Dask.
 
     Raises
     ------
@@ -180,17 +183,14 @@ def measure_workers(
     reasoned, order = to_vector(job.gains), tuple(range(len(cases)))
     changed = reasoned * (1.0 + _VARIATION * rng.standard_normal((candidates, reasoned.size)))
     every = [Candidate(values, np.inf, order) for values in changed]
-    with (
-        closing(ProcessPool(job, 1, _TIMEOUT)) as alone,
-        closing(ProcessPool(job, WORKERS, _TIMEOUT)) as together,
-    ):
-        z = [_judge(pool, every) for pool in (alone, together)]
+    with evaluators(job, 1) as alone, evaluators(job, WORKERS) as together:
+        z = [_evaluate(pool, every) for pool in (alone, together)]
         one, two = _rates([alone, together], every)
     dask = None
     if find_spec("distributed"):
         # Not in turns with the others: a cluster that waits takes 4 % of two processors.
         with _cluster(job) as pool:
-            z.append(_judge(pool, every))
+            z.append(_evaluate(pool, every))
             [dask] = _rates([pool], every)
     if not np.isfinite(z).all() or any(other != z[0] for other in z):
         raise ArithmeticError("candidates failed, or workers disagree about their z")
@@ -198,7 +198,7 @@ def measure_workers(
 
 
 @contextmanager
-def _cluster(job: Job) -> Iterator[Pool]:
+def _cluster(job: Job) -> Iterator[Workers]:
     """A pool on a Dask cluster of this machine."""
     from distributed import LocalCluster
 
@@ -208,23 +208,23 @@ def _cluster(job: Job) -> Iterator[Pool]:
     size = {"n_workers": WORKERS, "threads_per_worker": 1, "memory_limit": 0}
     with (
         LocalCluster(**size, dashboard_address=None) as cluster,
-        closing(DaskPool(job, cluster.scheduler_address, _TIMEOUT)) as pool,
+        closing(DaskPool(cluster.scheduler_address, Evaluator, job, LIMIT)) as pool,
     ):
         yield pool
 
 
-def _judge(pool: Pool, candidates: Sequence[Candidate]) -> list[float]:
+def _evaluate(pool: Workers, candidates: Sequence[Candidate]) -> list[float]:
     """The z of candidates; the first time that a pool is asked, it starts its workers."""
-    return [verdict.z for verdict in judge_all(pool, candidates, len(candidates[0].order))]
+    return [one.z for one in evaluate_all(pool, candidates, len(candidates[0].order))]
 
 
-def _rates(pools: Sequence[Pool], candidates: Sequence[Candidate]) -> list[float]:
+def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[float]:
     """Candidates per second of each pool; in turns, so that they meet the same load."""
     spent: list[list[float]] = [[] for _ in pools]
     for _ in range(_REPEATS):
         for pool, times in zip(pools, spent, strict=True):
             begin = time.perf_counter()
-            _judge(pool, candidates)
+            _evaluate(pool, candidates)
             times.append(time.perf_counter() - begin)
     return [len(candidates) / statistics.median(times) for times in spent]
 

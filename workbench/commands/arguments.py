@@ -1,20 +1,29 @@
 """What the commands share."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from workbench.case import Case, check_names
 from workbench.errors import InputError
 from workbench.installed import system_files
+from workbench.resources import CHECKOUT, fmus, modelica
+from workbench.resources import cases as package_cases
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
-MINIMAL_OBSERVER = Path("fmus/fmi2/MinimalObserver.fmu")
-FULL_OBSERVER = Path("fmus/fmi2/FullObserver.fmu")
+MINIMAL_OBSERVER = fmus() / "fmi2" / "MinimalObserver.fmu"
+FULL_OBSERVER = fmus() / "fmi2" / "FullObserver.fmu"
+REFERENCE = fmus() / "fmi2" / "Reference.fmu"
+LIBRARY = modelica() / "WheelsetRig" / "package.mo"
+
+
+def nearby(path: Path) -> Path:
+    """Shorten a path to what people type for it: relative to the working directory, if inside."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def positive(text: str) -> int:
@@ -42,9 +51,9 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         "cases",
         nargs="*",
         type=Path,
-        default=[Path("cases")],
+        default=[nearby(package_cases())],
         metavar="CASE",
-        help="case folder, or folder of case folders (default: cases)",
+        help="case folder, or folder of case folders (default: the package's own)",
     )
     parser.add_argument(
         "--out",
@@ -64,7 +73,7 @@ def add_observer_models(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             option,
             type=Path,
-            default=default,
+            default=nearby(default),
             metavar="FILE",
             help=f"{name} observer model (default: %(default)s)",
         )
@@ -120,6 +129,13 @@ def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, 
     return check_names(names | given, "--map and [model.names]")
 
 
+def installing(extra: str) -> str:
+    """Say how an extra is installed: in a checkout with the versions that it pins."""
+    if CHECKOUT is None:
+        return f"pip install 'wheelset-workbench[{extra}]'"
+    return f"pip install -e '.[{extra}]' -c constraints.txt"
+
+
 def require_compiler() -> None:
     """Refuse to go on without the extra that holds the Modelica compiler.
 
@@ -133,11 +149,5 @@ def require_compiler() -> None:
             where="workbench.compiler",
             found=f"no package '{missing[0]}'",
             expected="the extra [compiler], which holds the Modelica compiler",
-            remedy="run 'make fmus', or: pip install -e '.[compiler]' -c constraints.txt",
+            remedy=installing("compiler"),
         )
-
-
-def write_json(content: dict[str, Any], path: Path) -> None:
-    """Write results, in folders made as needed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=2) + "\n")

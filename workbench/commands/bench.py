@@ -12,6 +12,7 @@ from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
 from workbench.files import write_json
+from workbench.resources import cases as own_cases
 from workbench.systems import load_system
 
 if TYPE_CHECKING:
@@ -38,9 +39,9 @@ def add(commands: Commands) -> None:
         "--cases",
         nargs="+",
         type=Path,
-        default=[Path("cases")],
+        default=[own_cases()],
         metavar="CASE",
-        help="recordings that observers and tuning are timed on (default: cases)",
+        help="recordings that observers and tuning are timed on (default: the package's own)",
     )
     bench.set_defaults(run=_run)
 

@@ -8,22 +8,24 @@ from pathlib import Path
 
 from workbench.case import read_cases
 from workbench.commands.arguments import (
+    LIBRARY,
     MINIMAL_OBSERVER,
     Commands,
     add_recordings,
+    nearby,
     positive,
     require_compiler,
 )
-from workbench.diagnosis import CATALOGUE, choose, diagnose
+from workbench.diagnosis import choose, diagnose, read_effects
 from workbench.fmu import FMU
+from workbench.modelica import read_library
 from workbench.report.diagnosis import (
     format_diagnosis,
     summarise_diagnosis,
     write_diagnosis,
 )
 
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
-
+_BASE = "MinimalObserver"
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
@@ -38,16 +40,15 @@ def add(commands: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench diagnose my_stops --out results/mine\n"
         "  python -m workbench diagnose my_stops --effects BrakeFade CylinderLag\n"
-        "  python -m workbench diagnose new_stops --model results/mine/model/Extended.fmu\n\n"
-        "effects of the catalogue:\n"
-        + "\n".join(f"  {effect.name:<29} {effect.text}" for effect in CATALOGUE),
+        "  python -m workbench diagnose new_stops --model results/mine/model/Extended.fmu\n"
+        "  python -m workbench diagnose --list",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/diagnose")
     parser.add_argument(
         "--model",
         type=Path,
-        default=MINIMAL_OBSERVER,
+        default=nearby(MINIMAL_OBSERVER),
         metavar="FMU",
         help="minimal observer model, or an extension of it (default: %(default)s)",
     )
@@ -56,14 +57,23 @@ def add(commands: Commands) -> None:
         nargs="+",
         default=[],
         metavar="NAME",
-        help="effects to consider (default: all of the catalogue)",
+        help="effects to consider (default: all of the library)",
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="list the effects of the library, and end"
     )
     parser.add_argument(
         "--library",
         type=Path,
-        default=_PACKAGE,
+        default=nearby(LIBRARY),
         metavar="FILE",
         help="package.mo of the Modelica library (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--platforms",
+        choices=("native", "all"),
+        default="native",
+        help="of the extended FMU: this machine's, or all (default: %(default)s)",
     )
     parser.add_argument(
         "--workers",
@@ -76,8 +86,12 @@ def add(commands: Commands) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> int:
+    library = read_library(options.library)
+    effects = choose(options.effects, read_effects(library, _BASE))
+    if options.list:
+        print("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
+        return 0
     require_compiler()
-    effects = choose(options.effects)
     cases = read_cases(options.cases)
     begin = time.perf_counter()
 
@@ -87,7 +101,15 @@ def _diagnose(options: argparse.Namespace) -> int:
     report(f"{len(cases)} stops")
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
-        cases, effects, options.library, options.model, options.out, options.workers, report
+        cases,
+        effects,
+        library,
+        _BASE,
+        options.model,
+        options.out,
+        options.workers,
+        report,
+        every_platform=options.platforms == "all",
     )
     with FMU(options.model) as model:
         provenance = {
@@ -96,7 +118,7 @@ def _diagnose(options: argparse.Namespace) -> int:
             "effects": [effect.name for effect in effects],
         }
     summary = summarise_diagnosis(outcome, cases, provenance)
-    page = write_diagnosis(outcome, cases, summary, options.out)
+    page = write_diagnosis(outcome, cases, summary, options.out, options.workers)
     report("done")
     print(format_diagnosis(summary))
     print(f"to read: {page}, data and figures beside it")

@@ -4,14 +4,21 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, positive, require_compiler, write_json
+from workbench.commands.arguments import (
+    LIBRARY,
+    MINIMAL_OBSERVER,
+    Commands,
+    nearby,
+    positive,
+    require_compiler,
+)
 from workbench.description import Description, read_description
 from workbench.errors import InputError
+from workbench.files import write_json
 from workbench.fitness import Finding, check, is_fit
+from workbench.resources import CHECKOUT, fmus
 
-_FMUS = Path("fmus")
 _OMC = Path("build/omc")
-_PACKAGE = Path("modelica/WheelsetRig/package.mo")
 
 
 def add(commands: Commands) -> None:
@@ -37,7 +44,11 @@ def _add_build(jobs: Commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     build.add_argument(
-        "package", nargs="?", type=Path, default=_PACKAGE, help="package.mo (default: %(default)s)"
+        "package",
+        nargs="?",
+        type=Path,
+        default=nearby(LIBRARY),
+        help="package.mo (default: %(default)s)",
     )
     build.add_argument("model", nargs="?", help="dotted name of the model")
     build.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
@@ -53,7 +64,7 @@ def _add_build(jobs: Commands) -> None:
         metavar="FILE",
         help="FMU to write (default: MODEL.fmu); with omc a folder (default: build/omc)",
     )
-    build.add_argument("--all", action="store_true", help="everything that fmus/ holds")
+    build.add_argument("--all", action="store_true", help="every model of the package, into fmus/")
     build.add_argument("--check", action="store_true", help="with --all: compare, write nothing")
     build.set_defaults(run=_build)
 
@@ -63,7 +74,7 @@ def _add_info(jobs: Commands) -> None:
         "info",
         help="say what an FMU is and offers",
         description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
-        epilog="example:\n  python -m workbench fmu info fmus/fmi2/MinimalObserver.fmu",
+        epilog=f"example:\n  python -m workbench fmu info {nearby(MINIMAL_OBSERVER)}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
@@ -101,11 +112,12 @@ def _build(options: argparse.Namespace) -> int:
     if options.compiler == "omc":
         return _build_with_omc(options)
     if options.all and options.check:
-        found = compiler.differences(options.package, _FMUS)
-        print("\n".join(found) or f"{_FMUS} matches its sources")
+        found = compiler.differences(options.package, fmus())
+        print("\n".join(found) or f"{nearby(fmus())} matches its sources")
         return 1 if found else 0
     if options.all:
-        for built in compiler.build_all(options.package, _FMUS):
+        _require_checkout()
+        for built in compiler.build_all(options.package, nearby(fmus())):
             print(f"{built.path}  {built.sha256}")
         return 0
     _require_model(options)
@@ -136,6 +148,16 @@ def _build_with_omc(options: argparse.Namespace) -> int:
     return 0
 
 
+def _require_checkout() -> None:
+    if CHECKOUT is None:
+        raise InputError(
+            where="--all",
+            found="a package that was installed from a wheel",
+            expected="a checkout of the sources, whose fmus/ it writes",
+            remedy="compare them with --all --check, or build one model with --out",
+        )
+
+
 def _require_model(options: argparse.Namespace) -> None:
     if options.model is None:
         raise InputError(
@@ -150,7 +172,7 @@ def _info(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
     print(_format_description(description))
     if options.json:
-        write_json(asdict(description) | {"path": description.path.name}, options.json)
+        write_json(options.json, asdict(description) | {"path": description.path.name})
     return 0
 
 
@@ -169,7 +191,7 @@ def _check(options: argparse.Namespace) -> int:
             "sha256": description.sha256,
         }
         listed = [asdict(finding) for finding in findings]
-        write_json({"fmu": identity, "fit": fit, "findings": listed}, options.json)
+        write_json(options.json, {"fmu": identity, "fit": fit, "findings": listed})
     return 0 if fit else 1
 
 

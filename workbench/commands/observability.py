@@ -4,7 +4,8 @@ import argparse
 import os
 import platform
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from workbench.commands.arguments import (
     Commands,
     add_observer_models,
     add_recordings,
+    nearby,
     positive,
 )
 from workbench.cosim import Outcome, observe
@@ -23,6 +25,7 @@ from workbench.fmu import FMU
 from workbench.objective import braking_window
 from workbench.observability import LinearTest, linear_test, window_test
 from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
+from workbench.pool import Pool
 from workbench.report.observability import (
     StopObservability,
     draw_observability,
@@ -30,10 +33,12 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
+from workbench.resources import cases
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     observability = commands.add_parser(
         "observability",
         description="Show what the measured speeds can tell: a linear test of both observer "
@@ -42,7 +47,7 @@ def add(commands: Commands) -> None:
         "and figures.",
         epilog="examples:\n"
         "  python -m workbench observability\n"
-        "  python -m workbench observability cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        f"  python -m workbench observability {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench observability my_cases --full-fmu my_full_model.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -79,11 +84,11 @@ def _observability(options: argparse.Namespace) -> int:
     stops: list[StopObservability] = []
     begin = time.perf_counter()
     interrupted = False
-    with ProcessPoolExecutor(min(options.workers, len(cases))) as pool:
-        tasks = [pool.submit(_run_case, c, models, linear, gains, options.out) for c in cases]
+    setup = _Setup(models, tuple(linear), gains, options.out)
+    with Pool(min(options.workers, len(cases)), nullcontext, setup) as pool:
         try:
-            for task in as_completed(tasks):
-                stops.append(task.result())
+            for _, stop in pool.completed(_run_case, cases):
+                stops.append(stop)
                 elapsed = time.perf_counter() - begin
                 left = elapsed / len(stops) * (len(cases) - len(stops))
                 print(
@@ -93,7 +98,7 @@ def _observability(options: argparse.Namespace) -> int:
                 )
         except KeyboardInterrupt:
             interrupted = True
-            pool.shutdown(cancel_futures=True)
+            pool.finish()
     stops.sort(key=lambda stop: stop.case.name)
     if stops:
         write_observability(linear, stops, provenance, options.out / "observability.json")
@@ -102,29 +107,39 @@ def _observability(options: argparse.Namespace) -> int:
     return 130 if interrupted else 0
 
 
-def _run_case(
-    case: Case,
-    models: tuple[Path, ...],
-    linear: list[LinearTest],
-    gains: DisturbanceGains,
-    out: Path,
-) -> StopObservability:
-    """Test all models on one case, in a process of its own; writes its CSV and figure.
+@dataclass(frozen=True)
+class _Setup:
+    """What runs on every case.
+
+    Attributes
+    ----------
+    models : FMUs; the first is that of the disturbance observer.
+    linear : test of each model.
+    """
+
+    models: tuple[Path, ...]
+    linear: tuple[LinearTest, ...]
+    gains: DisturbanceGains
+    out: Path
+
+
+def _run_case(setup: _Setup, case: Case) -> StopObservability:
+    """Test all models on one case; writes its CSV and figure.
 
     The trajectory is the estimate of the disturbance observer on the first model.
     """
-    with FMU(models[0]) as fmu:
-        run = observe(case, DisturbanceObserver(fmu, gains))
+    with FMU(setup.models[0]) as fmu:
+        run = observe(case, DisturbanceObserver(fmu, setup.gains))
         roller_radius = float(fmu.get(fmu.variables(["rR"]))[0])
     if run.outcome is not Outcome.OK:
         raise FMUError(f"{case.name}: {run.outcome.value} {run.message}".strip())
     tests = []
-    for path, test in zip(models, linear, strict=True):
+    for path, test in zip(setup.models, setup.linear, strict=True):
         with FMU(path) as fmu:
             tests.append(window_test(fmu, case, run, test.scale))
     window = braking_window(case, roller_radius)
     braking = np.isin(tests[0].time, case.time[window])
     stop = StopObservability(case, run, braking, tuple(tests))
-    write_windows(stop, out / f"{case.name}.csv")
-    draw_observability(stop, out / f"{case.name}.png")
+    write_windows(stop, setup.out / f"{case.name}.csv")
+    draw_observability(stop, setup.out / f"{case.name}.png")
     return stop

@@ -5,10 +5,10 @@ import os
 import platform
 import subprocess
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,9 +19,11 @@ from workbench.commands.arguments import (
     add_observer_models,
     add_recordings,
     model_names,
+    nearby,
     positive,
 )
 from workbench.cosim import observe
+from workbench.files import write_json
 from workbench.fmu import FMU
 from workbench.objective import Weights, score
 from workbench.observers import (
@@ -31,6 +33,7 @@ from workbench.observers import (
     make_estimators,
     reasoned_settings,
 )
+from workbench.pool import Pool
 from workbench.report import (
     CaseFigure,
     CaseResult,
@@ -41,22 +44,23 @@ from workbench.report import (
     summarise,
     write_estimates,
     write_page,
-    write_summary,
 )
+from workbench.resources import CHECKOUT, cases
 from workbench.tuning import default_settings, read_gains, with_tuned
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(cases())
     simulate = commands.add_parser(
         "simulate",
         description="Run all estimators on recorded brake stops; write a page to read "
         "(index.html), and beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"
         "  python -m workbench simulate\n"
-        "  python -m workbench simulate cases/09_wet_160_4.2_wsp --out /tmp/slide\n"
+        f"  python -m workbench simulate {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
         "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        "  python -m workbench simulate cases/03_dry_120_3.6 --live\n"
+        f"  python -m workbench simulate {own}/03_dry_120_3.6 --live\n"
         "  python -m workbench simulate --estimator disturbance_observer "
         "--estimator disturbance_observer_disc",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -159,22 +163,22 @@ def _simulate(options: argparse.Namespace) -> int:
     done: list[tuple[CaseResult, CaseFigure]] = []
     begin = time.perf_counter()
     interrupted = False
-    if window is None:
-        runs = _in_processes(cases, options.workers, plan)
-    else:
-        runs = (_run_case(case, plan, window) for case in cases)
-    try:
-        for result, figure in runs:
-            done.append((result, figure))
-            _show_progress(len(done), len(cases), figure.name, begin)
-    except KeyboardInterrupt:
-        interrupted = True
-        print("interrupted", flush=True)
+    # A window shows one run after the other, in this process.
+    workers = min(options.workers, len(cases)) if window is None else 1
+    with Pool(workers, nullcontext, plan) as pool:
+        try:
+            for _, (result, figure) in pool.completed(partial(_run_case, window=window), cases):
+                done.append((result, figure))
+                _show_progress(len(done), len(cases), figure.name, begin)
+        except KeyboardInterrupt:
+            interrupted = True
+            print("interrupted", flush=True)
+            pool.finish()
     if done:
         done.sort(key=lambda pair: pair[1].name)
         results = [result for result, _ in done]
         summary = summarise(results, weights, provenance)
-        write_summary(summary, options.out / "summary.json")
+        write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(summary, [figure for _, figure in done], len(cases), page)
         print(format_table(results))
@@ -184,21 +188,8 @@ def _simulate(options: argparse.Namespace) -> int:
     return 130 if interrupted else 0
 
 
-def _in_processes(
-    cases: Sequence[Case], workers: int, plan: _Plan
-) -> Iterator[tuple[CaseResult, CaseFigure]]:
-    """All cases, each in a process, in the order they end; an interruption drops the others."""
-    with ProcessPoolExecutor(min(workers, len(cases))) as pool:
-        tasks = [pool.submit(_run_case, case, plan) for case in cases]
-        try:
-            for task in as_completed(tasks):
-                yield task.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
 def _run_case(
-    case: Case, plan: _Plan, window: LiveWindow | None = None
+    plan: _Plan, case: Case, window: LiveWindow | None = None
 ) -> tuple[CaseResult, CaseFigure]:
     """All estimators on one case; writes its CSV and figures."""
     with ExitStack() as stack:
@@ -220,10 +211,9 @@ def _run_case(
 
 def _commit() -> str | None:
     """Commit of the checkout that this package is run from, "-dirty" if changed; None if none."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
+    if CHECKOUT is None or not (CHECKOUT / ".git").exists():
         return None
-    git = ["git", "--no-optional-locks", "-C", str(root)]
+    git = ["git", "--no-optional-locks", "-C", str(CHECKOUT)]
     describe = ["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         answer = subprocess.run([*git, *describe], capture_output=True, text=True, check=True)

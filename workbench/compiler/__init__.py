@@ -3,8 +3,6 @@
 This package needs the extra `[compiler]`; running FMUs does not.
 """
 
-import json
-import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +14,7 @@ from workbench.compiler.assembly import BuiltFMU, Law, assemble
 from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError
+from workbench.files import write_json, write_whole
 
 __all__ = [
     "PLATFORMS",
@@ -109,13 +108,9 @@ def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
                 for b in built
             },
         }
-        (Path(scratch) / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+        write_json(Path(scratch) / "manifest.json", manifest)
         for file in sorted(p for p in Path(scratch).rglob("*") if p.is_file()):
-            target = folder / file.relative_to(scratch)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            part = target.with_suffix(target.suffix + ".part")
-            shutil.copyfile(file, part)
-            part.replace(target)
+            write_whole(folder / file.relative_to(scratch), file.read_bytes())
     return [replace(b, path=folder / b.path.relative_to(scratch)) for b in built]
 
 

@@ -10,12 +10,12 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from workbench.errors import InputError
+from workbench.files import replacing
 
 RUNTIME = Path(__file__).parent / "runtime"
 
@@ -106,17 +106,9 @@ def compile_library(sources: Path, library: Path, fmi: int, target: str) -> None
 
 def pack(folder: Path, fmu: Path) -> None:
     """Zip `folder` to `fmu`, reproducibly, in one atomic step."""
-    fmu.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=fmu.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
-            for file in sorted(p for p in folder.rglob("*") if p.is_file()):
-                entry = zipfile.ZipInfo(file.relative_to(folder).as_posix())
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.external_attr = 0o644 << 16
-                archive.writestr(entry, file.read_bytes())
-        Path(name).chmod(0o644)
-        Path(name).replace(fmu)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with replacing(fmu) as stream, zipfile.ZipFile(stream, "w") as archive:
+        for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+            entry = zipfile.ZipInfo(file.relative_to(folder).as_posix())
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, file.read_bytes())

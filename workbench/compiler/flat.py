@@ -104,7 +104,7 @@ def flatten(package: Path, model: str) -> FlatModel:
             where=f"rumoca {rumoca.version()}",
             found=f"DAE schema {dae['schema_version']}",
             expected=f"schema {SCHEMA}",
-            remedy="install the rumoca release that constraints.txt pins",
+            remedy="install the rumoca release that the extra [compiler] pins",
         )
     return _Reader(dae, model).flat_model()
 

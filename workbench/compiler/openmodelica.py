@@ -15,6 +15,7 @@ from pathlib import Path
 
 from workbench.compiler.ccode import identifier
 from workbench.errors import InputError
+from workbench.files import write_whole
 
 _OPTIONS = ("--fmiFlags=s:cvode", "-d=-disableDirectionalDerivatives")
 _MESSAGE = re.compile(
@@ -131,7 +132,5 @@ def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
                 expected="Modelica that OpenModelica translates to an FMU",
                 remedy="correct the source; the workbench's own compiler may say more",
             )
-        folder.mkdir(parents=True, exist_ok=True)
-        part = folder / f"{name}.part"
-        shutil.copyfile(built, part)
-        return part.replace(folder / name)
+        write_whole(folder / name, built.read_bytes())
+    return folder / name

@@ -15,24 +15,23 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.cosim import observe
-from workbench.diagnosis.catalogue import CATALOGUE, Effect, choose
+from workbench.diagnosis.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Court
-from workbench.diagnosis.extension import BASE, LIBRARY, build, source, variables
+from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import TOLERANCES, Fit
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, judge
 from workbench.errors import InputError
+from workbench.files import write_whole
 from workbench.fmu import FMU
+from workbench.modelica import Library
 from workbench.objective import Weights, score
 from workbench.observers import DisturbanceObserver, ExtendedKalmanFilter
 from workbench.observers.disturbance import stationary_gains
 from workbench.observers.kalman import FilterNoise
 
 __all__ = [
-    "BASE",
-    "CATALOGUE",
-    "LIBRARY",
     "TOLERANCES",
     "Cause",
     "Dependence",
@@ -45,6 +44,7 @@ __all__ = [
     "Residuals",
     "choose",
     "diagnose",
+    "read_effects",
 ]
 
 EXTENDED = "Extended"
@@ -95,22 +95,26 @@ class Outcome:
 def diagnose(
     cases: Sequence[Case],
     effects: Sequence[Effect],
-    package: Path,
+    library: Library,
+    base: str,
     model: Path,
     out: Path,
     workers: int,
     report: Reporter,
+    *,
+    every_platform: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recorded stops; write the extended model.
 
     Parameters
     ----------
     cases : Fx is used if all of them have it.
-    effects : of the catalogue, that are considered.
-    package : `package.mo` of the Modelica library.
-    model : FMU of the minimal observer model, or of an extension of it: its values are kept.
+    effects : of the library, that are considered.
+    base : name of the model of the library whose slots they fill.
+    model : FMU of the base model, or of an extension of it: its values are kept.
     out : folder of the extended model.
     report : takes a line on what is being done.
+    every_platform : whether the extended FMU is for all platforms, or only for this machine's.
 
     Raises
     ------
@@ -130,15 +134,19 @@ def diagnose(
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / "AllEffects.fmu"
         report(f"compiling {len(effects)} effects")
-        text = source("AllEffects", effects, {}, {}, "Observer model with every effect, at zero")
-        build(package, "AllEffects", text, everything, every_platform=False)
-        given = _given(everything, model)
+        about = "Observer model with every effect, at zero"
+        text = source(library, base, "AllEffects", effects, {}, {}, about)
+        build(library, "AllEffects", text, everything, every_platform=False)
+        given = _given(everything, model, base)
         with Court(everything, given, cases, workers) as court:
             fit = Fit(court, effects)
             diagnosis = judge(fit, effects, report)
             best = diagnosis.best
             found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
-            extension = _extend(court, fit, diagnosis, effects, package, out, report)
+            extension = _extend(
+                *(court, fit, diagnosis, effects, library, base, out, report),
+                every_platform=every_platform,
+            )
             observers: dict[str, dict[str, tuple[float, float]]] = {}
             turning = any(effect.order_locked for effect in best.active)
             if extension is not None and cases[0].Fx is not None and not turning:
@@ -163,7 +171,7 @@ def diagnose(
             )
 
 
-def _given(everything: Path, model: Path) -> dict[str, float]:
+def _given(everything: Path, model: Path, base: str) -> dict[str, float]:
     """Parameters of the diagnosed model that differ from the library's defaults.
 
     Raises
@@ -171,18 +179,18 @@ def _given(everything: Path, model: Path) -> dict[str, float]:
     InputError
         If the model is no observer model of this library.
     """
-    with FMU(everything) as library, FMU(model) as diagnosed:
+    with FMU(everything) as extended, FMU(model) as diagnosed:
         if missing := [name for name in _ASKED if name not in diagnosed.defaults]:
             raise InputError(
                 where=str(model),
                 found=f"no parameter '{missing[0]}'",
-                expected=f"the FMU of {BASE}, or of a model that extends it",
+                expected=f"the FMU of {base}, or of a model that extends it",
                 remedy="give such an FMU with --model",
             )
         return {
             name: value
             for name, value in diagnosed.defaults.items()
-            if name in library.parameters and value != library.defaults[name]
+            if name in extended.parameters and value != extended.defaults[name]
         }
 
 
@@ -191,9 +199,12 @@ def _extend(
     fit: Fit,
     diagnosis: Diagnosis,
     effects: Sequence[Effect],
-    package: Path,
+    library: Library,
+    base: str,
     out: Path,
     report: Reporter,
+    *,
+    every_platform: bool,
 ) -> Extension | None:
     """Write the extended model, compile it, compare its predictions with those of the fit."""
     if not diagnosis.causes:
@@ -219,13 +230,13 @@ def _extend(
         for (name, surface), value in point.levels.items()
         if surface == "dry" and name == "muDC"
     }
-    about = f"{BASE} with {', '.join(effect.name for effect in present)}"
-    text = source(EXTENDED, present, values, own, about)
+    about = f"{base} with {', '.join(effect.name for effect in present)}"
+    text = source(library, base, EXTENDED, present, values, own, about)
     folder = out / "model"
     folder.mkdir(parents=True, exist_ok=True)
     modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
-    modelica.write_text(text)
-    build(package, EXTENDED, text, path, every_platform=True)
+    write_whole(modelica, text)
+    build(library, EXTENDED, text, path, every_platform=every_platform)
     bench = Bench(path, court.stops)
     difference = 0.0
     for k, evidence in enumerate(diagnosis.best.linearised.evidence):
@@ -234,7 +245,7 @@ def _extend(
             for name, value in fit.values(point)[k].items()
             if name in bench.parameters or name == FORCE_DELAY
         }
-        errors, _ = bench.errors(k, given)
+        errors = bench.at(k, given).errors
         difference = max(difference, float(np.abs(errors - evidence.errors).max()))
     bench.close()
     return Extension(modelica, path, difference)

@@ -1,25 +1,76 @@
-"""The physical effects that the workbench knows: one Modelica class each, and its entry here.
+"""The physical effects that a Modelica library holds, each a class that describes itself.
 
-Units, bounds and defaults of the parameters stand in the Modelica classes alone. What an entry
-adds is where the effect is plugged in and how large it must be to matter. Of effects that nothing
-in the data tells apart, the usual one stands first.
+An effect is a class with `annotation(__Workbench(effect(...)))`. It says there what neither its
+code nor its description does: how large it must be to matter, and where stops can show it. Units,
+bounds and defaults are those of its parameters; which slots it fills follows from the partial class
+that it extends.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError, closest
+from workbench.modelica import Class, Library
+
+_TURNING = ("cosine", "sine")
+
+
+@dataclass(frozen=True)
+class Where:
+    """An effect is only in stops whose conditions say so, if those of any stop do.
+
+    Attributes
+    ----------
+    condition : of the stops: a state, or several.
+    state : that the effect needs.
+    share : parameter that is the share of those which have this state; empty if there is none.
+    """
+
+    condition: str
+    state: str
+    share: str
+
+
+@dataclass(frozen=True)
+class Unless:
+    """An effect is not looked for if the conditions of any stop say something.
+
+    Attributes
+    ----------
+    condition, state : as of `Where`.
+    because : why, for people.
+    """
+
+    condition: str
+    state: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Falling:
+    """An effect shows only where an input falls, by more than a tenth of its greatest value.
+
+    Attributes
+    ----------
+    signal : input of the base model.
+    because : why the effect cannot be seen where it does not, for people.
+    """
+
+    signal: str
+    because: str
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One entry of the catalogue.
+    """One effect of the library.
 
     Attributes
     ----------
     name : of the Modelica class, also used in results.
-    package : of the library that holds the class.
-    slots : of the observer model that the class is plugged into.
+    model : dotted name of the class.
+    slots : of the base model that the class is plugged into.
     size : parameter that is zero in the nominal model; of an order-locked effect, which has the
         pair `cosine` and `sine`, "cosine".
     step : change of `size` that is small and clearly visible, in its SI unit.
@@ -29,10 +80,11 @@ class Effect:
     hidden : why recorded stops cannot show the effect; empty if they can.
     text : what it is, for people.
     separation : the experiment that tells it from its likely twins.
+    where, unless, falling : which stops can show it; None if all can.
     """
 
     name: str
-    package: str
+    model: str
     slots: tuple[str, ...]
     size: str
     step: float
@@ -41,16 +93,19 @@ class Effect:
     separation: str
     shapes: tuple[tuple[str, tuple[float, ...]], ...] = ()
     hidden: str = ""
+    where: Where | None = None
+    unless: Unless | None = None
+    falling: Falling | None = None
 
     @property
     def order_locked(self) -> bool:
-        """Whether the effect turns with the wheel, with a phase of its own in each stop."""
-        return self.size == "cosine"
+        """Whether the effect turns with a shaft, with a phase of its own in each stop."""
+        return self.size == _TURNING[0]
 
     @property
     def sizes(self) -> tuple[str, ...]:
         """Parameters that are zero in the nominal model."""
-        return ("cosine", "sine") if self.order_locked else (self.size,)
+        return _TURNING if self.order_locked else (self.size,)
 
     @property
     def label(self) -> str:
@@ -58,90 +113,54 @@ class Effect:
         return "amplitude" if self.order_locked else self.size
 
 
-_DRAG = "drag braking at constant roller speed, with a staircase of pressure up and down"
-_HOT = "stops repeated without cooling, then one after 20 minutes"
-_UNITS = "venting the brake units one by one"
-_COAST = "a long coast-down without brake, in both directions"
-_LIFTED = "a run-up with the wheelset lifted, and dead weights on the load cells"
-_LOAD = "a step of the vertical load by 10 %"
-_SLIP = "a slip sweep by the drive at constant speed, up and down"
-_RUNDOWN = "order tracking in a slow run-down, with and without brake"
-_STEP = "a step of the drive's torque, compared with steady braking"
-_SINE = "a sine on the pressure at constant speed"
+def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
+    """Effects of a library, in its order.
 
-_PADS, _CYLINDER, _FORCE = ("padFriction",), ("cylinder",), ("forceSensor",)
-_WHEEL, _ROLLER = ("speedSensorW",), ("speedSensorR",)
-_FILM = (("E0", (0.1e6, 0.3e6, 0.45e6, 1.0e6)),)
+    Of effects that nothing in the data tells apart the usual one stands first. Where the order of
+    `package.order` does not serve that, `after="Other"` puts an effect right behind the other one.
 
-CATALOGUE: tuple[Effect, ...] = (
-    Effect("SpeedDependentPadFriction", "Effects", _PADS, "slope", 0.02, 0.01,
-           "pad friction that falls with sliding speed", _DRAG),
-    Effect("PressureDependentPadFriction", "Effects", _PADS, "exponent", 0.005, 0.004,
-           "pad friction that falls with the normal force", _DRAG),
-    Effect("BrakeFade", "Effects", _PADS, "fade", 3e-5, 3e-5,
-           "pad friction that falls with the temperature of the disc", _HOT),
-    Effect("WaterFilm", "Effects", _PADS, "film", 0.03, 0.02,
-           "water on all discs, until their friction has dried it", _UNITS, _FILM),
-    Effect("SingleDiscWaterFilm", "Effects", _PADS, "film", 0.1, 0.05,
-           "water on one disc, until its friction has dried it", _UNITS, _FILM),
-    Effect("BeddingIn", "Effects", _PADS, "loss", 0.01, 0.01,
-           "pad friction that is low in the first seconds of contact", "dry stops from two "
-           "pressures: time against energy", (("tau", (0.7, 1.4, 2.0, 3.0)),)),
-    Effect("DiscThicknessVariation", "Effects", _PADS, "cosine", 0.002, 0.001,
-           "discs of uneven thickness", _RUNDOWN),
-    Effect("CylinderLag", "Effects", _CYLINDER, "lag", 0.005, 0.003,
-           "pads that lag behind the measured pressure", _SINE),
-    Effect("CaliperHysteresis", "Effects", _CYLINDER, "share", 0.01, 0.02,
-           "friction in the caliper", _DRAG),
-    Effect("ReturnSpringPressure", "Effects", _CYLINDER, "increase", 500.0, 500.0,
-           "a stiffer return spring", "the pressure of first contact, read at standstill"),
-    Effect("PressureSensorOffset", "Effects", _CYLINDER, "offset", 500.0, 500.0,
-           "a pressure sensor whose zero is wrong", "its reading on a vented cylinder"),
-    Effect("WheelRadius", "Effects", ("wheelRadius",), "delta", 1e-4, 5e-5,
-           "a wheel radius other than entered", "a tape measure on wheel and roller"),
-    Effect("OutOfRoundWheel", "Effects", ("wheelRadius",), "cosine", 2e-5, 1e-5,
-           "a wheel that is out of round", _RUNDOWN),
-    Effect("RollerRadius", "Effects", ("rollerRadius",), "delta", 2e-4, 1e-4,
-           "a roller radius other than entered", "a tape measure on wheel and roller"),
-    Effect("WheelLoad", "Effects", ("wheelLoad",), "gain", 0.01, 0.02,
-           "a wheel load other than nominal", _LOAD),
-    Effect("CreepStiffness", "Effects", ("creepStiffness",), "gain", 0.01, 0.02,
-           "a contact softer or stiffer than Kalker's theory", _LOAD),
-    Effect("WheelInertia", "Effects", ("wheelInertia",), "gain", 0.05, 0.2,
-           "an inertia of the wheelset other than nominal", "a lifted spin-down",
-           hidden="stops without slides show less of it than noise of the torque fakes"),
-    Effect("DriveTorqueGain", "Effects", ("driveTorque",), "gain", 0.002, 0.002,
-           "a torque measurement with a wrong gain", _LIFTED),
-    Effect("AdhesionRecovery", "Effects", ("adhesion",), "gain", 0.05, 0.05,
-           "a rail that slip cleans", _SLIP, (("Er", (0.1e6, 0.25e6, 0.5e6)),)),
-    Effect("WheelsetLosses", "Effects", ("wheelsetLoss",), "gain", 0.1, 0.15,
-           "losses of the wheelset other than nominal", _COAST),
-    Effect("RollerLosses", "Effects", ("rollerLoss",), "gain", 0.1, 0.1,
-           "losses of the roller other than nominal", _COAST),
-    Effect("FxGain", "Sensors", _FORCE, "gain", 0.002, 0.002,
-           "load cells with a wrong gain", _LIFTED),
-    Effect("FxOffset", "Sensors", _FORCE, "offset", 20.0, 20.0,
-           "load cells whose zero is wrong", "their reading with the wheelset lifted"),
-    Effect("ApexOffset", "Effects", _FORCE, "offset", 2e-4, 1.5e-4,
-           "a wheelset that stands beside the apex of the roller", _LOAD),
-    Effect("SpeedSignalDelay", "Sensors", _WHEEL, "delay", 1e-3, 1e-3,
-           "a speed sensor of the wheelset that reads late", _STEP),
-    Effect("PoleRingEccentricity", "Sensors", _WHEEL, "cosine", 1e-4, 5e-5,
-           "an eccentric pole ring of the wheelset's speed sensor", _RUNDOWN),
-    Effect("LoggerTimeSkew", "Sensors", (*_WHEEL, *_ROLLER), "skew", 1e-3, 1e-3,
-           "a logger of the speeds whose clock is late", _STEP),
-)  # fmt: skip
+    Parameters
+    ----------
+    base : name of the model whose slots they fill.
+
+    Raises
+    ------
+    InputError
+        If an effect fills no slot of the base model, lacks what it must say or says something else,
+        or is not nominal by default.
+    """
+    slots = read_slots(library, base)
+    effects: dict[str, Effect] = {}
+    after: dict[str, str] = {}
+    for one in library.classes.values():
+        said = _Said(f"{one.where}, __Workbench", one.vendor)
+        said.only("effect")
+        if "effect" not in one.vendor:
+            continue
+        entry = said.part("effect")
+        effect = _read(library, slots, one, entry)
+        if effect.name in effects:
+            raise InputError(
+                where=one.where,
+                found=f"a second effect {effect.name}",
+                expected=f"one, which is {effects[effect.name].model}",
+                remedy="rename one of the two",
+            )
+        effects[effect.name] = effect
+        if other := entry.text("after", ""):
+            after[effect.name] = other
+    return tuple(effects[name] for name in _ordered(library, list(effects), after))
 
 
-def choose(names: Sequence[str]) -> tuple[Effect, ...]:
-    """Effects by name, in the catalogue's order; all of them if none is named.
+def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects by name, in their order; all of them if none is named.
 
     Raises
     ------
     InputError
         If there is no effect of a name.
     """
-    known = {effect.name: effect for effect in CATALOGUE}
+    known = {effect.name: effect for effect in effects}
     for name in names:
         if name not in known:
             raise InputError(
@@ -150,4 +169,197 @@ def choose(names: Sequence[str]) -> tuple[Effect, ...]:
                 expected=f"some of {', '.join(known)}",
                 remedy="correct the name",
             )
-    return tuple(effect for effect in CATALOGUE if not names or effect.name in names)
+    return tuple(effect for effect in effects if not names or effect.name in names)
+
+
+@dataclass(frozen=True)
+class _Said:
+    """Part of an annotation, whose keys are asked for by type.
+
+    Attributes
+    ----------
+    where : it stands.
+    content : by key.
+    """
+
+    where: str
+    content: Mapping[str, Any]
+
+    def only(self, *known: str) -> None:
+        for key in self.content:
+            if key not in known:
+                raise InputError(
+                    where=self.where,
+                    found=f"'{key}'{closest(key, known)}",
+                    expected=f"some of {', '.join(known)}",
+                    remedy="correct or remove it",
+                )
+
+    def text(self, key: str, default: str | None = None) -> str:
+        return str(self._of(key, str, "a text in quotes", default))
+
+    def number(self, key: str) -> float:
+        value = float(self._of(key, float, "a number above 0", None))
+        if value <= 0.0:
+            raise self._wrong(key, "a number above 0")
+        return value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        return self._array(key, str, 'an array of texts, such as {"a", "b"}')
+
+    def numbers(self, key: str) -> tuple[float, ...]:
+        return self._array(key, float, "an array of numbers, such as {0.5, 1.0}")
+
+    def part(self, key: str) -> "_Said":
+        content = self._of(key, dict, f"{key}(...)", None)
+        return _Said(f"{self.where}({key})", content)
+
+    def _array(self, key: str, of: type, expected: str) -> tuple[Any, ...]:
+        values = tuple(self._of(key, tuple, expected, None))
+        if not all(isinstance(value, of) for value in values):
+            raise self._wrong(key, expected)
+        return values
+
+    def _of(self, key: str, kind: type, expected: str, default: Any) -> Any:
+        value = self.content.get(key, default)
+        if not isinstance(value, kind):
+            raise self._wrong(key, expected)
+        return value
+
+    def _wrong(self, key: str, expected: str) -> InputError:
+        value = self.content.get(key)
+        return InputError(
+            where=self.where,
+            found=f"no '{key}'" if value is None else f"{key} = {value!r}",
+            expected=expected,
+            remedy=f"give '{key}' in the annotation of the class",
+        )
+
+
+def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> Effect:
+    said.only(
+        *("size", "step", "matters", "shapes", "separation", "hidden", "slots", "after"),
+        *("where", "unless", "falling"),
+    )
+    size = said.content.get("size")
+    if isinstance(size, tuple) and sorted(size) == sorted(_TURNING):
+        size = _TURNING[0]
+    else:
+        size = said.text("size")
+    shapes = said.part("shapes") if "shapes" in said.content else _Said(said.where, {})
+    effect = Effect(
+        name=one.name.rpartition(".")[2],
+        model=one.name,
+        slots=_slots(library, slots, one, said),
+        size=size,
+        step=said.number("step"),
+        matters=said.number("matters"),
+        text=_within_sentence(one.description),
+        separation=said.text("separation"),
+        shapes=tuple((name, shapes.numbers(name)) for name in shapes.content),
+        hidden=said.text("hidden", ""),
+        where=_where(said),
+        unless=_unless(said),
+        falling=_falling(said),
+    )
+    _check_parameters(library, one, effect)
+    return effect
+
+
+def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> tuple[str, ...]:
+    extended = library.ancestors(one.name)
+    fitting = tuple(slot.name for slot in slots if slot.partial in extended)
+    if not fitting:
+        partials = dict.fromkeys(slot.partial for slot in slots)
+        raise InputError(
+            where=one.where,
+            found=f"effect {one.name}, which extends no slot of the base model",
+            expected=f"one that extends {' or '.join(partials) or 'a slot, but there is none'}",
+            remedy="let it extend the partial class of its slot, or remove its annotation",
+        )
+    asked = said.texts("slots") if "slots" in said.content else fitting
+    for name in asked:
+        if name not in fitting:
+            raise InputError(
+                where=said.where,
+                found=f"slot '{name}'{closest(name, fitting)}",
+                expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
+                remedy="correct the name",
+            )
+    return tuple(name for name in fitting if name in asked)
+
+
+def _where(said: _Said) -> Where | None:
+    if "where" not in said.content:
+        return None
+    part = said.part("where")
+    part.only("condition", "is", "share")
+    return Where(part.text("condition"), part.text("is"), part.text("share", ""))
+
+
+def _unless(said: _Said) -> Unless | None:
+    if "unless" not in said.content:
+        return None
+    part = said.part("unless")
+    part.only("condition", "is", "because")
+    return Unless(part.text("condition"), part.text("is"), part.text("because"))
+
+
+def _falling(said: _Said) -> Falling | None:
+    if "falling" not in said.content:
+        return None
+    part = said.part("falling")
+    part.only("signal", "because")
+    return Falling(part.text("signal"), part.text("because"))
+
+
+def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
+    """All that the annotation names is a parameter, and a size is zero by default."""
+    components = library.components(one.name)
+    parameters = {name: c for name, c in components.items() if "parameter" in c.prefixes}
+    shared = (effect.where.share,) if effect.where and effect.where.share else ()
+    for name in (*effect.sizes, *(name for name, _ in effect.shapes), *shared):
+        if name not in parameters:
+            raise InputError(
+                where=one.where,
+                found=f"effect {one.name} without a parameter '{name}'{closest(name, parameters)}",
+                expected=f"one of {', '.join(parameters) or 'its parameters, but it has none'}",
+                remedy="correct the annotation, or declare the parameter",
+            )
+    for name in effect.sizes:
+        value = parameters[name].modifier.value
+        if value not in ("0", "0.0"):
+            raise InputError(
+                where=parameters[name].where,
+                found=f"{name} = {value}" if value else f"{name} without a value",
+                expected=f"'= 0.0': by default, {one.name} is the nominal model exactly",
+                remedy="let the size of the effect be zero by default",
+            )
+
+
+def _ordered(library: Library, names: list[str], after: Mapping[str, str]) -> list[str]:
+    ordered = [name for name in names if name not in after]
+    waiting = [name for name in names if name in after]
+    while waiting:
+        ready = [name for name in waiting if after[name] in ordered]
+        if not ready:
+            raise InputError(
+                where=f"{library.file}, effect {waiting[0]}",
+                found=f'after="{after[waiting[0]]}"{closest(after[waiting[0]], ordered)}',
+                expected="another effect, which does not stand after this one",
+                remedy="correct the name",
+            )
+        ordered.insert(ordered.index(after[ready[0]]) + 1, ready[0])
+        waiting.remove(ready[0])
+    return ordered
+
+
+def _within_sentence(description: str) -> str:
+    """A description as it is read within a sentence.
+
+    >>> _within_sentence("Pads that lag"), _within_sentence("CO2 in the air")
+    ('pads that lag', 'CO2 in the air')
+    """
+    if description[1:2].isupper():
+        return description
+    return description[:1].lower() + description[1:]

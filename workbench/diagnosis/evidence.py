@@ -5,12 +5,18 @@ stops and confusability, is linear algebra on them.
 """
 
 import signal
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import (
+    CancelledError,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -19,10 +25,16 @@ from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.samples import Samples, prepare
 from workbench.fmu import FMU, Matrix, Vector
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
 REST = "pBRest"
 
 # Not of the FMU: by how much the load cell is late beyond the mode that it sits behind [s].
 FORCE_DELAY = "FxDelay"
+_DELAY_STEP = 1e-3  # [s] of the difference; errors are linear in the delay
+
+_CHUNK = 6  # columns of one task: few, so that no processor waits long for the last one
 
 
 @dataclass(frozen=True)
@@ -50,7 +62,7 @@ class Evidence:
     ----------
     errors : (b, m) whitened prediction errors of the blocks, in CHANNELS.
     rest : whitened error of the pressure at rest.
-    jacobian : (b*m + 1, p) derivatives of [errors, rest] by the columns, in SI units.
+    jacobian : (b*m + 1, p) derivatives of [errors, rest] in SI units, by FORCE_DELAY and columns.
     """
 
     errors: Matrix
@@ -81,39 +93,58 @@ class Bench:
         """Free the FMU."""
         self._fmu.close()
 
-    def errors(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
-        """Whitened prediction errors of one stop, (b, m), and that of the pressure at rest.
+    def at(self, number: int, values: Mapping[str, float]) -> Evidence:
+        """Errors of one stop at a point, and their derivative by FORCE_DELAY, which costs nothing.
 
         Parameters
         ----------
         values : of the FMU's variables and of FORCE_DELAY, SI.
         """
-        stop, nominal = self._stops[number], self._fmu.defaults
-        known = {name: value for name, value in values.items() if name != FORCE_DELAY}
-        errors = self._predictor.errors(stop, known)
-        if errors.shape[1] == 3:
-            read = stop.behind_structure(stop.y[:, 2] - errors[:, 2])
-            late = read - values[FORCE_DELAY] * np.gradient(read, stop.time)
-            errors[:, 2] = stop.y[:, 2] - late
-        means = stop.channels(errors, nominal["rW"], nominal["rR"])
-        rest = (stop.rest - float(self._fmu.get(self._rest)[0])) / stop.rest_noise
-        return np.einsum("bij,bj->bi", stop.whitening, means), rest
+        simulated, rest = self._simulated(number, values)
+        delay = values[FORCE_DELAY]
+        errors = self._whitened(number, simulated, delay)
+        late = self._whitened(number, simulated, delay + _DELAY_STEP)
+        by_delay = np.append((late - errors).ravel() / _DELAY_STEP, 0.0)
+        return Evidence(errors, rest, by_delay[:, None])
 
-    def evidence(
-        self, number: int, values: Mapping[str, float], columns: Sequence[Column]
-    ) -> Evidence:
-        """Errors and their derivatives by the columns."""
-        errors, rest = self.errors(number, values)
-        jacobian = np.zeros((errors.size + 1, len(columns)))
+    def derivatives(
+        self, number: int, values: Mapping[str, float], columns: Sequence[Column], about: Evidence
+    ) -> Matrix:
+        """Derivatives of one stop's [errors, rest] by the columns, (b*m + 1, p).
+
+        Parameters
+        ----------
+        about : errors at the point.
+        """
+        jacobian = np.zeros((about.errors.size + 1, len(columns)))
         for j, column in enumerate(columns):
             name = column.variables[0]
             start = values[name] if name in values else self._fmu.defaults[name]
             moved = {**values, **column.setting}
             moved |= dict.fromkeys(column.variables, start + column.step)
-            other, other_rest = self.errors(number, moved)
-            jacobian[:-1, j] = (other - errors).ravel() / column.step
-            jacobian[-1, j] = (other_rest - rest) / column.step
-        return Evidence(errors, rest, jacobian)
+            simulated, rest = self._simulated(number, moved)
+            errors = self._whitened(number, simulated, values[FORCE_DELAY])
+            jacobian[:-1, j] = (errors - about.errors).ravel() / column.step
+            jacobian[-1, j] = (rest - about.rest) / column.step
+        return jacobian
+
+    def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
+        """Prediction errors of all samples, and the whitened error of the pressure at rest."""
+        stop = self._stops[number]
+        known = {name: value for name, value in values.items() if name != FORCE_DELAY}
+        errors = self._predictor.errors(stop, known)
+        return errors, (stop.rest - float(self._fmu.get(self._rest)[0])) / stop.rest_noise
+
+    def _whitened(self, number: int, errors: Matrix, delay: float) -> Matrix:
+        """Whitened errors of the blocks, (b, m), with the load cell late by `delay` [s]."""
+        stop, nominal = self._stops[number], self._fmu.defaults
+        if errors.shape[1] == 3:
+            errors, force = errors.copy(), stop.y[:, 2]
+            read = stop.behind_structure(force - errors[:, 2])
+            errors[:, 2] = force - (read - delay * np.gradient(read, stop.time))
+        means = stop.channels(errors, nominal["rW"], nominal["rR"])
+        whitened: Matrix = np.einsum("bij,bj->bi", stop.whitening, means)
+        return whitened
 
 
 _bench: Bench | None = None
@@ -126,9 +157,9 @@ def _begin(path: Path, stops: Sequence[Samples]) -> None:
     _bench = Bench(path, stops)
 
 
-def _work(number: int, values: Mapping[str, float], columns: Sequence[Column]) -> Evidence:
+def _work(task: Callable[..., Any], *arguments: Any) -> Any:
     assert _bench is not None
-    return _bench.evidence(number, values, columns)
+    return task(_bench, *arguments)
 
 
 class Court:
@@ -164,6 +195,9 @@ class Court:
         workers = min(workers, len(cases))
         self._own = Bench(path, self.stops) if workers == 1 else None
         self._pool = ProcessPoolExecutor(workers, initializer=_begin, initargs=(path, self.stops))
+        # Long stops first: the last one to finish leaves the other processors idle.
+        self._order = sorted(range(len(cases)), key=lambda k: -self.stops[k].time.size)
+        self._interrupted = threading.Event()
 
     def __enter__(self) -> Self:
         return self
@@ -178,24 +212,66 @@ class Court:
         if self._own is not None:
             self._own.close()
 
-    def hear(
-        self, points: Sequence[Mapping[str, float]], columns: Sequence[Sequence[Column]]
-    ) -> list[Evidence]:
-        """Evidence of every stop at its own point.
+    def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
+        """Errors of every stop at its own point.
 
         Parameters
         ----------
-        points : values of the FMU's variables, one mapping for each stop.
-        columns : what is varied, one list for each stop.
+        points : values of the FMU's variables and of FORCE_DELAY, one mapping for each stop.
         """
+        found = self._gathered({k: (Bench.at, k, points[k]) for k in self._order})
+        return [found[k] for k in range(len(self.stops))]
+
+    def derivatives(
+        self,
+        points: Sequence[Mapping[str, float]],
+        columns: Sequence[Column],
+        about: Sequence[Evidence],
+    ) -> list[Matrix]:
+        """Derivatives of every stop's [errors, rest] by the columns, each (b*m + 1, p).
+
+        Parameters
+        ----------
+        about : errors of each stop at its point.
+        """
+        chunks = [columns[i : i + _CHUNK] for i in range(0, len(columns), _CHUNK)]
+        found = self._gathered(
+            {
+                (k, i): (Bench.derivatives, k, points[k], chunk, about[k])
+                for k in self._order
+                for i, chunk in enumerate(chunks)
+            }
+        )
+        return [
+            np.column_stack([found[k, i] for i in range(len(chunks))])
+            for k in range(len(self.stops))
+        ]
+
+    def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Results of a job that asks for evidence, by item; no processor waits for one of them."""
+        if self._own is not None or len(items) < 2:
+            return [job(item) for item in items]
+        with ThreadPoolExecutor(len(items)) as threads:
+            jobs = [threads.submit(job, item) for item in items]
+            try:
+                return [one.result() for one in jobs]
+            except BaseException:
+                # Others end with what they wait for.
+                self._interrupted.set()
+                wait(jobs)
+                self._interrupted.clear()
+                raise
+
+    def _gathered(self, tasks: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Any]:
+        """Results of tasks, by their names."""
         if self._own is not None:
-            return [self._own.evidence(k, points[k], columns[k]) for k in range(len(self.stops))]
-        # Long stops first: the last one to finish leaves the other processors idle.
-        order = np.argsort([-stop.time.size for stop in self.stops])
-        tasks = {int(k): self._pool.submit(_work, int(k), points[k], columns[k]) for k in order}
+            return {name: task(self._own, *rest) for name, (task, *rest) in tasks.items()}
+        if self._interrupted.is_set():
+            raise CancelledError
+        under_way = {name: self._pool.submit(_work, *task) for name, task in tasks.items()}
         try:
-            return [tasks[k].result() for k in range(len(self.stops))]
+            return {name: one.result() for name, one in under_way.items()}
         finally:
             # After Ctrl-C nobody waits for the others.
-            for task in tasks.values():
-                task.cancel()
+            for one in under_way.values():
+                one.cancel()

@@ -1,63 +1,38 @@
-"""Modelica source of an observer model with effects of the catalogue, and its FMU.
+"""Modelica source of a base model with effects of its library, and its FMU.
 
-An effect fills a slot: a value goes in, the value that acts comes out. Several effects of one slot
-stand in a row. Needs the extra `[compiler]` to build; sources can be written without it.
+Needs the extra `[compiler]` to build; sources can be written without it.
 """
 
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from workbench import shelf
 from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError
-
-LIBRARY = "WheelsetRig"
-BASE = "MinimalObserver"
+from workbench.modelica import Library
 
 
-@dataclass(frozen=True)
-class _Slot:
-    """Interface of a slot: its partial class, what is chained, and what else goes in."""
+def component(name: str) -> str:
+    """Name of a class's component within its slot.
 
-    partial: str
-    chain: tuple[tuple[str, str], ...]
-    others: tuple[str, ...]
-
-
-_QUANTITY = _Slot("Quantities.PartialQuantity", (("nominal", "actual"),), ("omega",))
-_LOSS = _Slot("Losses.PartialLoss", (("omega", "tau"),), ())
-_SPEED = _Slot("Sensors.PartialSpeedSensor", (("omega", "reading"),), ())
-_SLOTS = {
-    "padFriction": _Slot("Brakes.PartialPadFriction", (("level", "mu"),), ("Fperp", "v")),
-    "cylinder": _Slot("Brakes.PartialCylinder", (("pB", "p"), ("restBefore", "rest")), ()),
-    "adhesion": _Slot("Contact.PartialAdhesion", (("level", "mu0"),), ("w", "v", "Fx")),
-    "wheelsetLoss": _LOSS,
-    "rollerLoss": _LOSS,
-    "wheelRadius": _QUANTITY,
-    "rollerRadius": _QUANTITY,
-    "wheelLoad": _QUANTITY,
-    "creepStiffness": _QUANTITY,
-    "wheelInertia": _QUANTITY,
-    "driveTorque": _QUANTITY,
-    "speedSensorW": _SPEED,
-    "speedSensorR": _SPEED,
-    "forceSensor": _Slot("Sensors.PartialForceSensor", (("F", "reading"),), ()),
-}
-
-
-def component(effect: Effect) -> str:
-    """Name of an effect's component within its slot."""
-    return effect.name[0].lower() + effect.name[1:]
+    >>> component("WheelsetRig.Effects.BrakeFade")
+    'brakeFade'
+    """
+    short = name.rpartition(".")[2]
+    return short[0].lower() + short[1:]
 
 
 def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     """Names in the FMU of one parameter of an effect, one for each of its slots."""
-    return tuple(f"{slot}.{component(effect)}.{parameter}" for slot in effect.slots)
+    return tuple(f"{slot}.{component(effect.name)}.{parameter}" for slot in effect.slots)
 
 
 def source(
+    library: Library,
+    base: str,
     name: str,
     effects: Sequence[Effect],
     values: Mapping[str, Mapping[str, float]],
@@ -68,82 +43,143 @@ def source(
 
     Parameters
     ----------
-    name : of the model.
+    base : name of the model that is extended.
+    name : of the extended model.
     effects : to plug in, in this order within a slot.
     values : by effect and parameter, SI; parameters that are not named keep their defaults.
-    parameters : of the observer model itself, that differ from its defaults.
+    parameters : of the base model itself, that differ from its defaults.
     about : one line, for the documentation.
+
+    Raises
+    ------
+    InputError
+        If effects of one slot cannot stand together.
     """
     nested: list[str] = []
     redeclared = [f"    {parameter}={float(value)!r}" for parameter, value in parameters.items()]
-    for slot, interface in _SLOTS.items():
-        chained = [effect for effect in effects if slot in effect.slots]
-        if not chained:
+    for slot in read_slots(library, base):
+        inside = [effect for effect in effects if slot.name in effect.slots]
+        if not inside:
             continue
-        label = slot[0].upper() + slot[1:]
-        nested.append(_composed(label, interface, chained, values))
-        redeclared.append(f"    redeclare {label} {slot}")
+        label = slot.name[0].upper() + slot.name[1:]
+        if label == library.name:
+            label += "Slot"  # it would hide the library
+        if slot.chained or len(inside) == 1:
+            nested.append(_chain(label, slot, inside, values))
+        else:
+            nested.append(_sum(label, slot, inside, values))
+        redeclared.append(f"    redeclare {label} {slot.name}")
     modifiers = ",\n".join(redeclared)
     return (
         f'model {name} "{about}"\n'
-        + f"  extends {LIBRARY}.{BASE}(\n{modifiers});\n\n"
+        + f"  extends {library.find(base).name}(\n{modifiers});\n\n"
         + "\n".join(nested)
         + f"end {name};\n"
     )
 
 
-def _composed(
+def _chain(
     label: str,
-    slot: _Slot,
+    slot: Slot,
     effects: Sequence[Effect],
     values: Mapping[str, Mapping[str, float]],
 ) -> str:
-    lines = [
-        f'  model {label} "{", ".join(effect.name for effect in effects)}"',
-        f"    extends {LIBRARY}.{slot.partial};",
-    ]
-    before = {inlet: inlet for inlet, _ in slot.chain}
+    """Class whose effects hand on what goes in; of one effect, any outputs."""
+    lines = []
+    before = {inlet: inlet for inlet in slot.inputs}
+    outlets: Mapping[str, str] = {}
     for effect in effects:
-        bindings = [f"{inlet}={source}" for inlet, source in before.items()]
-        bindings += [f"{name}={name}" for name in slot.others]
-        given = values.get(effect.name, {})
-        bindings += [f"{parameter}={float(value)!r}" for parameter, value in given.items()]
-        instance = component(effect)
-        lines.append(
-            f"    {LIBRARY}.{effect.package}.{effect.name} {instance}({', '.join(bindings)});"
+        lines.append(_declaration(effect.model, before, values.get(effect.name, {})))
+        outlets = {outlet: f"{component(effect.name)}.{outlet}" for outlet in slot.outputs}
+        before |= dict(zip(slot.inputs, outlets.values(), strict=False))
+    return _class(label, slot, effects, lines, outlets)
+
+
+def _sum(
+    label: str,
+    slot: Slot,
+    effects: Sequence[Effect],
+    values: Mapping[str, Mapping[str, float]],
+) -> str:
+    """Class whose effects each change the nominal output, which changes add up."""
+    if not slot.settled:
+        raise InputError(
+            where=f"slot '{slot.name}'",
+            found=f"{' and '.join(effect.name for effect in effects)} beside a {slot.nominal} "
+            "that has parameters of its own in the base model",
+            expected="one effect in this slot, whose outputs are of another kind than its inputs",
+            remedy=f"choose one of them, or make {slot.nominal} with those parameters a class",
         )
-        before = {inlet: f"{instance}.{outlet}" for inlet, outlet in slot.chain}
-    lines.append("  equation")
-    lines += [f"    {outlet} = {before[inlet]};" for inlet, outlet in slot.chain]
-    lines.append(f"  end {label};\n")
-    return "\n".join(lines)
+    before = {inlet: inlet for inlet in slot.inputs}
+    lines = [_declaration(slot.nominal, before, {})]
+    lines += [_declaration(one.model, before, values.get(one.name, {})) for one in effects]
+    nominal = component(slot.nominal)
+    outlets = {
+        outlet: " + ".join(
+            [
+                f"{nominal}.{outlet}",
+                *(f"({component(e.name)}.{outlet} - {nominal}.{outlet})" for e in effects),
+            ]
+        )
+        for outlet in slot.outputs
+    }
+    return _class(label, slot, effects, lines, outlets)
 
 
-def build(package: Path, name: str, text: str, fmu: Path, *, every_platform: bool) -> None:
+def _declaration(model: str, inputs: Mapping[str, str], values: Mapping[str, float]) -> str:
+    bindings = [f"{name}={value}" for name, value in inputs.items()]
+    bindings += [f"{name}={float(value)!r}" for name, value in values.items()]
+    return f"    {model} {component(model)}({', '.join(bindings)});"
+
+
+def _class(
+    label: str,
+    slot: Slot,
+    effects: Sequence[Effect],
+    declarations: Sequence[str],
+    outlets: Mapping[str, str],
+) -> str:
+    return "\n".join(
+        [
+            f'  model {label} "{", ".join(effect.name for effect in effects)}"',
+            f"    extends {slot.partial};",
+            *declarations,
+            "  equation",
+            *(f"    {outlet} = {value};" for outlet, value in outlets.items()),
+            f"  end {label};\n",
+        ]
+    )
+
+
+def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: bool) -> None:
     """Compile the source of an extended model to an FMU; needs the extra [compiler].
+
+    An FMU that was built before, of the same sources, is taken from where it is kept.
 
     Parameters
     ----------
-    package : `package.mo` of the library that the source extends; it is left alone.
+    library : that the source extends; its files are left alone.
     every_platform : for all platforms, or only for this machine's.
 
     Raises
     ------
     InputError
-        If the library is not there, or the source has errors.
+        If the source has errors.
     """
-    from workbench import compiler  # an extra: everything else runs without it
 
-    if not package.is_file():
-        raise InputError(
-            where=str(package),
-            found="no such file",
-            expected=f"the package.mo of {LIBRARY}, which effects are taken from",
-            remedy="give its path with --library, or run this in the workbench's folder",
-        )
-    with tempfile.TemporaryDirectory() as scratch:
-        library = Path(scratch) / LIBRARY
-        shutil.copytree(package.parent, library)
-        (library / f"{name}.mo").write_text(f"within {LIBRARY};\n{text}")
-        platforms = compiler.PLATFORMS if every_platform else [compiler.native()]
-        compiler.build(library / "package.mo", f"{LIBRARY}.{name}", fmu, platforms=list(platforms))
+    def make(path: Path) -> None:
+        from workbench import compiler  # an extra: everything else runs without it
+
+        platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
+        with tempfile.TemporaryDirectory() as scratch:
+            copy = Path(scratch) / library.name
+            if library.file.name == "package.mo":
+                shutil.copytree(library.file.parent, copy)
+            else:
+                copy.mkdir()
+                shutil.copyfile(library.file, copy / library.file.name)
+            (copy / f"{name}.mo").write_text(f"within {library.name};\n{text}")
+            whole = f"{library.name}.{name}"
+            compiler.build(copy / library.file.name, whole, path, platforms=platforms)
+
+    shelf.fetch(shelf.key(library.file, name, text, f"{every_platform}"), fmu, make)

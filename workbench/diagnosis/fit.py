@@ -6,18 +6,19 @@ is left of a stop is a small quadratic form in the common unknowns, which sums a
 are made of.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from workbench.case import Case, Surface
-from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Evidence
+from workbench.diagnosis.catalogue import Effect, Unless, Where
+from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Item, Result
 from workbench.diagnosis.extension import variables
-from workbench.diagnosis.quadratic import Quadratic, add, minimum
-from workbench.fmu import Matrix, Vector
+from workbench.diagnosis.linearised import Linearised, Point, between, slowness
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
+from workbench.errors import InputError
+from workbench.fmu import Vector
 
 # Relative standard deviation from stop to stop, data sheet of the rig.
 TOLERANCES = {"muDC": 0.02, "muWR": 0.02, "JW": 0.01, "JR": 0.002, "Fz": 0.003}
@@ -29,91 +30,14 @@ _RAIL: Mapping[Surface, Mapping[str, float]] = {
 }
 _RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
 _FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
-_NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
 _WORSE = 1.0  # of deviance, which no step is worth
 _HALVED = 4  # times: after that a step is given up
-_SECOND = 20  # blocks
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 _FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
-_FILM, _SINGLE, _HYSTERESIS = "WaterFilm", "SingleDiscWaterFilm", "CaliperHysteresis"
-
-
-# (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
-Key = tuple[str, str]
 _STOP = ""
 _LATE: Key = (FORCE_DELAY, "load cell")
-
-
-@dataclass(frozen=True)
-class Point:
-    """Values of all unknowns.
-
-    Attributes
-    ----------
-    sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
-    levels : common level by quantity and surface, as ("muDC", "dry"), or sensor.
-    deviations : of each stop from the common values, in standard deviations, (K, 5).
-    phases : [rad] of order-locked effects, (K,) by effect.
-    """
-
-    sizes: Mapping[Key, float]
-    levels: Mapping[Key, float]
-    deviations: Matrix
-    phases: Mapping[str, Vector]
-
-
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """Evidence of all stops about a point.
-
-    Attributes
-    ----------
-    keys : of the columns of each jacobian: TOLERANCES, then (effect, parameter).
-    inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
-    away : chi-squared of levels and deviations against what tolerances say of them.
-    """
-
-    point: Point
-    keys: tuple[Key, ...]
-    evidence: tuple[Evidence, ...]
-    inflation: Vector
-    away: float
-
-    @property
-    def misfit(self) -> float:
-        """Chi-squared of all stops at the point, in units of the noise."""
-        return float(sum(one.residual @ one.residual for one in self.evidence))
-
-    @property
-    def _squares(self) -> tuple[int, Vector]:
-        """Number of blocks, and mean square of their errors by channel (m,)."""
-        errors = np.concatenate([one.errors for one in self.evidence])
-        return len(errors), np.square(errors).mean(axis=0)
-
-    @property
-    def deviance(self) -> float:
-        """What a fit makes least: minus twice the log likelihood, up to a constant.
-
-        Of a channel that is wrong, the variance is unknown, and errors that last count once in a
-        second: its logarithm counts. To spoil one channel for another is no gain then.
-        Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
-        """
-        count, mean = self._squares
-        noise = count * np.minimum(mean, _NOISE)
-        wrong = count / _SECOND * np.log(self.spread)
-        rest = sum(one.rest**2 for one in self.evidence)
-        return float((noise + wrong).sum()) + rest + self.away
-
-    @property
-    def spread(self) -> Vector:
-        """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        spread: Vector = 1.0 + _SECOND * np.maximum(0.0, self._squares[1] - _NOISE)
-        return spread
-
-    def weighed(self, inflation: Vector) -> float:
-        """Chi-squared, each channel in units of what is wrong with it, (m,)."""
-        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
+_DELAY: Key = (_STOP, FORCE_DELAY)
 
 
 class Fit:
@@ -128,8 +52,6 @@ class Fit:
     def __init__(self, court: Court, effects: Sequence[Effect]) -> None:
         self._court = court
         self._effects = {effect.name: effect for effect in effects}
-        self._soaked = any("wet" in case.conditions.discs for case in court.cases)
-        self._released = any(stop.released for stop in court.stops)
         self.count = len(court.cases)
 
     @property
@@ -157,20 +79,34 @@ class Fit:
         return Point({}, levels, np.zeros((self.count, len(TOLERANCES))), {})
 
     def present(self, effect: Effect, k: int) -> bool:
-        """Whether stop k can have an effect: water is where the conditions say, if they do."""
-        return effect.name != _FILM or not self._soaked or self._wet(k) > 0.0
+        """Whether stop k can have an effect: where the conditions say, if those of any stop do."""
+        where = effect.where
+        return where is None or not self._told(where) or self._share(where, k) > 0.0
 
-    def _wet(self, k: int) -> float:
-        """Share of the discs that are wet, by the conditions of stop k."""
-        discs = self._court.cases[k].conditions.discs
-        return discs.count("wet") / len(discs)
+    def _share(self, said: Where | Unless, k: int) -> float:
+        """Share of what a condition of stop k says that is one state."""
+        states = getattr(self._court.cases[k].conditions, said.condition, None)
+        if states is None:
+            raise InputError(
+                where=f"conditions of {self._court.cases[k].name}",
+                found=f"no '{said.condition}', which an effect of the library asks for",
+                expected="a condition that stops have",
+                remedy="correct the annotation of the effect",
+            )
+        entries = states if isinstance(states, tuple) else (states,)
+        return entries.count(said.state) / len(entries)
+
+    def _told(self, said: Where | Unless) -> bool:
+        """Whether the conditions of any stop say so."""
+        return any(self._share(said, k) > 0.0 for k in range(self.count))
 
     def unseen(self, effect: Effect) -> str:
         """Why these stops cannot show an effect; empty if they can."""
-        if self._soaked and effect.name == _SINGLE:
-            return "the conditions of the stops say which discs are wet"
-        if effect.name == _HYSTERESIS and not self._released:
-            return "brake pressure never falls in these stops"
+        unless, falling = effect.unless, effect.falling
+        if unless is not None and self._told(unless):
+            return unless.because
+        if falling is not None and not any(s.falls(falling.signal) for s in self._court.stops):
+            return falling.because
         return effect.hidden
 
     def values(self, point: Point) -> list[dict[str, float]]:
@@ -186,9 +122,10 @@ class Fit:
         for j, (name, tolerance) in enumerate(TOLERANCES.items()):
             common = self._common(point, name, case)
             values[name] = common * (1.0 + tolerance * point.deviations[k, j])
-        if self._soaked and _FILM in self._effects:
-            for name in variables(self._effects[_FILM], "wet"):
-                values[name] = self._wet(k)
+        for effect in self._effects.values():
+            where = effect.where
+            if where is not None and where.share and self._told(where):
+                values |= dict.fromkeys(variables(effect, where.share), self._share(where, k))
         for (name, parameter), size in point.sizes.items():
             effect = self._effects[name]
             if parameter == "amplitude":
@@ -211,25 +148,57 @@ class Fit:
             return point.levels[name, case.conditions.wheel_rail]
         return self._court.nominal[name]
 
+    def at(self, point: Point) -> Linearised:
+        """Gather errors at a point; of derivatives, only what costs no simulation."""
+        evidence = self._court.at(self.values(point))
+        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
+        return Linearised(point, (_DELAY,), tuple(evidence), slowness(evidence), away)
+
     def linearise(
         self,
-        point: Point,
+        lin: Linearised,
         active: Sequence[Effect],
         candidates: Sequence[tuple[Effect, Mapping[str, float]]] = (),
+        *,
+        tolerances: bool = True,
     ) -> Linearised:
-        """Gather evidence about a point.
+        """Add the derivatives that are not there yet.
 
         Parameters
         ----------
         active : effects that the point has.
         candidates : others, each with the shape it is tried with.
+        tolerances : whether those by the tolerances are asked for.
         """
-        columns = [
-            Column((name,), 0.5 * tolerance * self._court.nominal[name])
+        columns = self._tolerances() if tolerances else {}
+        columns |= self._present(lin.point, active)
+        for effect, shape in candidates:
+            setting = {
+                name: value
+                for parameter, value in shape.items()
+                for name in variables(effect, parameter)
+            }
+            for parameter in effect.sizes:
+                column = Column(variables(effect, parameter), effect.step, setting)
+                columns[variant(effect, shape), parameter] = column
+        missing = {key: column for key, column in columns.items() if key not in lin.keys}
+        if not missing:
+            return lin
+        values = self.values(lin.point)
+        return lin.extended(
+            missing, self._court.derivatives(values, list(missing.values()), lin.evidence)
+        )
+
+    def _tolerances(self) -> dict[Key, Column]:
+        """Columns of what differs from stop to stop."""
+        return {
+            (_STOP, name): Column((name,), 0.5 * tolerance * self._court.nominal[name])
             for name, tolerance in TOLERANCES.items()
-        ]
-        columns.append(Column((FORCE_DELAY,), _FORCE_DELAY))
-        keys: list[Key] = [(_STOP, name) for name in (*TOLERANCES, FORCE_DELAY)]
+        }
+
+    def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Column]:
+        """Columns of the effects that a point has."""
+        columns = {}
         for effect in active:
             for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
                 names = variables(effect, parameter)
@@ -238,22 +207,10 @@ class Fit:
                 high = self._court.bounds[names[0]][1]
                 if not is_shape and point.sizes[effect.name, effect.label] + step > high:
                     step = -step
-                columns.append(Column(names, step))
-                keys.append((effect.name, parameter))
-        for effect, shape in candidates:
-            setting = {
-                name: value
-                for parameter, value in shape.items()
-                for name in variables(effect, parameter)
-            }
-            for parameter in effect.sizes:
-                columns.append(Column(variables(effect, parameter), effect.step, setting))
-                keys.append((variant(effect, shape), parameter))
-        evidence = self._court.hear(self.values(point), [columns] * self.count)
-        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
-        return Linearised(point, tuple(keys), tuple(evidence), slowness(evidence), away)
+                columns[effect.name, parameter] = Column(names, step)
+        return columns
 
-    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> "Joint":
+    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.
 
         Parameters
@@ -266,7 +223,7 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
-    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> "StopSystem":
+    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> StopSystem:
         point, case = lin.point, self._court.cases[k]
         evidence = lin.evidence[k]
         b, m = evidence.errors.shape
@@ -275,7 +232,7 @@ class Fit:
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
             if key == _LATE:
-                J[:, j] = at[_STOP, FORCE_DELAY]
+                J[:, j] = at[_DELAY]
             elif key in point.levels:
                 name, surface = key
                 mine = _discs(case) if name == "muDC" else case.conditions.wheel_rail
@@ -321,39 +278,69 @@ class Fit:
         return middle, _RAIL_SPREAD * middle
 
     def refine(
-        self, point: Point, active: Sequence[Effect], rounds: int, spread: Vector | None = None
+        self,
+        best: Linearised,
+        active: Sequence[Effect],
+        rounds: int,
+        spread: Vector | None = None,
+        lender: Linearised | None = None,
     ) -> Linearised:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
+        What a tolerance does changes little with the size of an effect. So its derivatives are
+        taken from a point before, until that leads no further; then all are those of the point.
+
         Parameters
         ----------
-        point : where to begin.
-        rounds : most evaluations; a step that made things worse is halved, which costs one.
+        best : where to begin.
+        rounds : most steps; one that made things worse is halved, which counts, or if derivatives
+            were taken from elsewhere, tried again with those of the point.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
+        lender : of a point near by, whose derivatives by the tolerances serve to begin with.
 
         Returns
         -------
-        best : about the best point that was met.
+        best : the best point that was met; derivatives may be missing.
         """
-        best = self.linearise(point, active)
-        point, halved = self._stepped(best, best.spread if spread is None else spread), 0
-        for _ in range(rounds):
-            tried = self.linearise(point, active)
+        if lender is None:
+            best = lender = self.linearise(best, active)
+        else:
+            lender = self.linearise(lender, ())
+        best = self.linearise(best, active, tolerances=False)
+        point = self._stepped(best, lender, best.spread if spread is None else spread)
+        taken, halved = 0, 0
+        while taken < rounds:
+            tried, exact = self.at(point), lender is best
             fall = best.deviance - tried.deviance
+            taken += exact or fall >= _WORSE
             if fall > -_WORSE:
-                best, point, halved = tried, self._stepped(tried, tried.spread), 0
-            else:
-                point, halved = _between(best.point, point), halved + 1
-            if abs(fall) < _WORSE or halved > _HALVED:
+                best, halved = tried, 0
+            if exact and abs(fall) < _WORSE:
                 break
+            if exact and fall < 0.0:
+                point, halved = between(best.point, point), halved + 1
+                if halved > _HALVED:
+                    break
+                continue
+            if fall < _WORSE:
+                best = lender = self.linearise(best, active)
+            best = self.linearise(best, active, tolerances=False)
+            point = self._stepped(best, lender, best.spread)
         return best
 
-    def _stepped(self, lin: Linearised, spread: Vector) -> Point:
-        joint = self.quadratics(replace(lin, inflation=spread))
+    def _stepped(self, lin: Linearised, lender: Linearised, spread: Vector) -> Point:
+        lent = [key for key in self._tolerances() if key not in lin.keys]
+        at = [lender.keys.index(key) for key in lent]
+        full = lin.extended(lent, [one.jacobian[:, at] for one in lender.evidence])
+        joint = self.quadratics(replace(full, inflation=spread))
         return self._moved(lin.point, joint, joint.solve())
 
-    def _moved(self, point: Point, joint: "Joint", step: Vector) -> Point:
+    def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Results of a job that fits, by item."""
+        return self._court.together(job, items)
+
+    def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             if key in levels:
@@ -381,111 +368,6 @@ class Fit:
         if parameter not in effect.sizes:
             low, high = max(low, 0.5 * old), min(high, 2.0 * old)
         return float(np.clip(new, low, high))
-
-
-@dataclass(frozen=True, eq=False)
-class StopSystem:
-    """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
-
-    Attributes
-    ----------
-    r : (n,); J : (n, p); P : (n, q).
-    deviations : (5,) of the present point, of the first unknowns in l; phases are free.
-    """
-
-    r: Vector
-    J: Matrix
-    P: Matrix
-    deviations: Vector
-
-    def _local(self) -> tuple[Matrix, Matrix, Vector]:
-        """Normal matrix of l, its coupling to z, its gradient."""
-        count, q = self.deviations.size, self.P.shape[1]
-        prior = np.zeros(q)
-        prior[:count] = 1.0
-        normal = self.P.T @ self.P + np.diag(prior + 1e-9)
-        gradient = self.P.T @ self.r
-        gradient[:count] += self.deviations
-        return normal, self.P.T @ self.J, gradient
-
-    def eliminated(self) -> Quadratic:
-        """Chi-squared over z alone."""
-        normal, coupling, gradient = self._local()
-        both = np.column_stack([coupling, gradient])
-        solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
-        N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
-        g: Vector = self.J.T @ self.r - coupling.T @ solved[:, -1]
-        c = self.r @ self.r + self.deviations @ self.deviations - gradient @ solved[:, -1]
-        return Quadratic(N, g, float(c), self.r.size)
-
-    def local(self, z: Vector) -> Vector:
-        """Best l for a step z of the common unknowns."""
-        normal, coupling, gradient = self._local()
-        step: Vector = np.asarray(np.linalg.solve(normal, -coupling @ z - gradient), np.float64)
-        return step
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """All stops over the common unknowns.
-
-    Attributes
-    ----------
-    shared : names of the unknowns.
-    known : those that the point has; the others are candidates.
-    levels : those that differ by nature, in no need of a cause.
-    """
-
-    shared: tuple[Key, ...]
-    known: tuple[Key, ...]
-    levels: tuple[Key, ...]
-    systems: tuple[StopSystem, ...]
-    prior: Quadratic
-
-    def stops(self) -> list[Quadratic]:
-        """Chi-squared of each stop."""
-        return [system.eliminated() for system in self.systems]
-
-    def total(self) -> Quadratic:
-        """Chi-squared of all stops and the prior."""
-        return add([*self.stops(), self.prior])
-
-    def solve(self) -> Vector:
-        """Best step of the common unknowns."""
-        return minimum(self.total())
-
-
-def seconds(errors: Matrix) -> Matrix:
-    """Mean squares over seconds of whitened errors (b, m), times blocks, (s, m): noise leaves 1."""
-    count = len(errors) // _SECOND * _SECOND
-    means = errors[:count].reshape(-1, _SECOND, errors.shape[1]).mean(axis=1)
-    squares: Matrix = _SECOND * means**2
-    return squares
-
-
-def slowness(evidence: Sequence[Evidence]) -> Vector:
-    """Variance of errors that last a second over that of white noise, by channel, at least 1.
-
-    What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
-    against that, not against the noise.
-    """
-    lasting = np.concatenate([seconds(one.errors) for one in evidence])
-    slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
-    return slow
-
-
-def _between(one: Point, other: Point) -> Point:
-    """Half way; nothing that one of them lacks."""
-
-    def half(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> dict[Any, Any]:
-        return {key: 0.5 * (value + b[key]) for key, value in a.items()}
-
-    return Point(
-        half(one.sizes, other.sizes),
-        half(one.levels, other.levels),
-        0.5 * (one.deviations + other.deviations),
-        half(one.phases, other.phases),
-    )
 
 
 def _discs(case: Case) -> Surface:

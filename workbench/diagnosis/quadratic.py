@@ -7,6 +7,9 @@ import numpy as np
 
 from workbench.fmu import Matrix, Vector
 
+# (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
+Key = tuple[str, str]
+
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
@@ -63,3 +66,75 @@ def minimum(total: Quadratic) -> Vector:
     along = vectors[:, kept]
     step: Vector = -scale * (along @ ((along.T @ (scale * total.g)) / values[kept]))
     return step
+
+
+@dataclass(frozen=True, eq=False)
+class StopSystem:
+    """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
+
+    Attributes
+    ----------
+    r : (n,); J : (n, p); P : (n, q).
+    deviations : (5,) of the present point, of the first unknowns in l; phases are free.
+    """
+
+    r: Vector
+    J: Matrix
+    P: Matrix
+    deviations: Vector
+
+    def _local(self) -> tuple[Matrix, Matrix, Vector]:
+        """Normal matrix of l, its coupling to z, its gradient."""
+        count, q = self.deviations.size, self.P.shape[1]
+        prior = np.zeros(q)
+        prior[:count] = 1.0
+        normal = self.P.T @ self.P + np.diag(prior + 1e-9)
+        gradient = self.P.T @ self.r
+        gradient[:count] += self.deviations
+        return normal, self.P.T @ self.J, gradient
+
+    def eliminated(self) -> Quadratic:
+        """Chi-squared over z alone."""
+        normal, coupling, gradient = self._local()
+        both = np.column_stack([coupling, gradient])
+        solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
+        N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
+        g: Vector = self.J.T @ self.r - coupling.T @ solved[:, -1]
+        c = self.r @ self.r + self.deviations @ self.deviations - gradient @ solved[:, -1]
+        return Quadratic(N, g, float(c), self.r.size)
+
+    def local(self, z: Vector) -> Vector:
+        """Best l for a step z of the common unknowns."""
+        normal, coupling, gradient = self._local()
+        step: Vector = np.asarray(np.linalg.solve(normal, -coupling @ z - gradient), np.float64)
+        return step
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """All stops over the common unknowns.
+
+    Attributes
+    ----------
+    shared : names of the unknowns.
+    known : those that the point has; the others are candidates.
+    levels : those that differ by nature, in no need of a cause.
+    """
+
+    shared: tuple[Key, ...]
+    known: tuple[Key, ...]
+    levels: tuple[Key, ...]
+    systems: tuple[StopSystem, ...]
+    prior: Quadratic
+
+    def stops(self) -> list[Quadratic]:
+        """Chi-squared of each stop."""
+        return [system.eliminated() for system in self.systems]
+
+    def total(self) -> Quadratic:
+        """Chi-squared of all stops and the prior."""
+        return add([*self.stops(), self.prior])
+
+    def solve(self) -> Vector:
+        """Best step of the common unknowns."""
+        return minimum(self.total())

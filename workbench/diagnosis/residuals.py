@@ -13,7 +13,8 @@ from scipy.signal import savgol_filter
 
 from workbench.case import Case
 from workbench.diagnosis.evidence import Court
-from workbench.diagnosis.fit import Fit, Linearised
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.samples import CHANNELS, Samples
 from workbench.fmu import Matrix, Vector
 

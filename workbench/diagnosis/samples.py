@@ -6,6 +6,7 @@ enough to average most of the 20 Hz ringing of a load cell.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat it
 _MODE, _DAMPING = 21.6, 0.05  # [Hz], [1]
 
 CHANNELS = ("slip", "omegaR", "Fx")  # in m/s, rad/s, N
+_RECORDED = ("pB", "tauR")  # columns of u
 
 Mask = NDArray[np.bool_]
 
@@ -72,24 +74,44 @@ class Samples:
     speed: Vector
     set_aside: dict[str, int]
 
-    @property
-    def released(self) -> bool:
-        """Whether brake pressure falls, by more than its sensor's noise and a valve's overshoot."""
-        pB = np.concatenate([self.u[first:end, 0] for first, end in self.blocks])
-        return bool(np.max(np.maximum.accumulate(pB) - pB) > _RELEASED * pB.max())
+    def falls(self, signal: str) -> bool:
+        """Whether an input falls, by more than its sensor's noise and a valve's overshoot.
 
-    def behind_structure(self, force: Vector) -> Vector:
-        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
+        Raises
+        ------
+        InputError
+            If it is none of the recorded inputs.
+        """
+        if signal not in _RECORDED:
+            raise InputError(
+                where=f"stop {self.name}",
+                found=f"no recorded input '{signal}', which an effect of the library asks for",
+                expected=f"one of {', '.join(_RECORDED)}",
+                remedy="correct the annotation of the effect",
+            )
+        column = _RECORDED.index(signal)
+        u = np.concatenate([self.u[first:end, column] for first, end in self.blocks])
+        return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
+
+    @cached_property
+    def _structure(self) -> tuple[Vector, Vector] | None:
+        """Numerator and denominator of the mode before the load cell, as a digital filter."""
         h = float(np.median(np.diff(self.time)))
         omega = 2.0 * np.pi * _MODE
         if omega * h > 2.0:
-            return force  # sampled too slowly to show the mode
+            return None  # sampled too slowly to show the mode
         poles = omega * (-_DAMPING + 1j * np.sqrt(1.0 - _DAMPING**2)) * np.array([1.0, 1.0])
         poles[1] = np.conj(poles[0])
         z = np.exp(h * poles)
         denominator = np.real(np.poly(z))
         # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below 15 Hz.
-        numerator = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0
+        return np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+
+    def behind_structure(self, force: Vector) -> Vector:
+        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
+        if self._structure is None:
+            return force
+        numerator, denominator = self._structure
         begin = lfiltic(numerator, denominator, force[:1].repeat(2), force[:1].repeat(2))
         read: Vector = lfilter(numerator, denominator, force, zi=begin)[0]
         return read
@@ -100,8 +122,9 @@ class Samples:
         The error of the slip is free of what both speeds have in common.
         """
         slip = rR * errors[:, 1] - rW * errors[:, 0]
-        columns = np.column_stack([slip, errors[:, 1:]])
-        total = np.vstack([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
+        total = np.zeros((len(errors) + 1, errors.shape[1]))
+        np.cumsum(slip, out=total[1:, 0])
+        np.cumsum(errors[:, 1:], axis=0, out=total[1:, 1:])
         first, end = self.blocks.T
         means: Matrix = (total[end] - total[first]) / (end - first)[:, None]
         return means

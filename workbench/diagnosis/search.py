@@ -1,17 +1,18 @@
 """Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, Joint, Linearised, Point, variant
-from workbench.diagnosis.quadratic import Quadratic, add, covariance, minimum
-from workbench.fmu import Matrix, Vector
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Linearised, Point
+from workbench.diagnosis.trial import Candidate, Score, Trial, shapes, tried
+from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
-Candidate = tuple[Effect, Mapping[str, float]]
 
 _MOST = 4  # causes; more than that is not a diagnosis
 _SIGNIFICANT = 4.0  # standard deviations of a size
@@ -21,174 +22,11 @@ _HELD_OUT = 15.0  # fall of chi-squared on held-out stops
 _NEEDED = 60.0  # fall of chi-squared by an effect beside others, which may bend to its form
 _RIVALS = 5  # effects that are fitted in full before one is named
 _NEAR = 0.4  # share of the best score from which on an effect is a rival
-_IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
 _BEGUN = 3  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
 _BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 12  # of Gauss-Newton, most
 _TIED = 10.0  # of chi-squared: decides between nothing
-
-
-@dataclass(frozen=True, eq=False)
-class Score:
-    """What one effect would explain, linearised.
-
-    Attributes
-    ----------
-    effect, shape : the candidate, and the shape it was tried with.
-    size, sigma : estimate of its size and standard deviation.
-    units : of the size and of the parameters of the shape, by name.
-    gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
-    held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
-    phases : (K,) [rad] of an order-locked effect.
-    """
-
-    effect: Effect
-    shape: Mapping[str, float]
-    size: float
-    sigma: float
-    units: Mapping[str, str]
-    gain: float
-    held_out: Vector
-    phases: Vector
-
-
-def shapes(effect: Effect) -> list[dict[str, float]]:
-    """Shapes with which an effect is tried."""
-    tried: list[dict[str, float]] = [{}]
-    for name, values in effect.shapes:
-        tried = [{**one, name: value} for one in tried for value in values]
-    return tried
-
-
-def tried(fit: Fit, lin: Linearised, candidates: Sequence[Candidate]) -> "Trial":
-    """Put candidates to the trial about a point that is fitted."""
-    extra = [
-        (variant(effect, shape), parameter)
-        for effect, shape in candidates
-        for parameter in effect.sizes
-    ]
-    return Trial(fit, fit.quadratics(lin, extra), candidates)
-
-
-class Trial:
-    """All candidates about one point.
-
-    Each may be present at a size that does not matter, as part of the baseline: a candidate must
-    explain what all others together, too small to matter, do not. On held-out stops it is judged
-    alone, since what companions cost, by their size, shows only where they are fitted.
-    """
-
-    def __init__(
-        self,
-        fit: Fit,
-        joint: Joint,
-        candidates: Sequence[Candidate],
-    ) -> None:
-        self._fit, self.joint, self._candidates = fit, joint, candidates
-        self._stops = joint.stops()
-        self._known = list(range(len(joint.known)))
-        self.levels = joint.levels
-        middle: dict[str, tuple[int, float]] = {}
-        for effect, shape in candidates:
-            if not effect.order_locked:
-                at = joint.shared.index((variant(effect, shape), effect.size))
-                middle[effect.name] = (at, effect.matters)
-        self._immaterial = middle
-        self._without = _held_out(*self._select({}, alone=True))
-        base = self._select({})
-        total = add([*base[0], base[1]])
-        self._reference = total.at(minimum(total))
-
-    def _select(
-        self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
-    ) -> tuple[list[Quadratic], Quadratic]:
-        """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
-        others = [one for key, one in self._immaterial.items() if key != name and not alone]
-        columns = [*self._known, *(at for at, _ in others)]
-        count = len(columns) + bool(own)
-        transforms = []
-        for k in range(len(self._stops)):
-            transform = np.zeros((len(self.joint.shared), count))
-            transform[columns, range(len(columns))] = 1.0
-            for at, direction in own.items():
-                transform[at, -1] = direction[k]
-            transforms.append(transform)
-        stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
-        prior = self.joint.prior.columns(transforms[0])
-        for j, (_, matters) in enumerate(others, start=len(self._known)):
-            prior.N[j, j] += (_IMMATERIAL / matters) ** 2
-        return stops, prior
-
-    def covariance(self) -> Matrix:
-        """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
-        stops, prior = self._select({})
-        count = len(self._known)
-        known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
-        return known
-
-    def scores(self) -> list[Score]:
-        """All candidates, best first."""
-        found = [self._score(effect, shape) for effect, shape in self._candidates]
-        return sorted(found, key=lambda one: -one.held_out.sum())
-
-    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Score:
-        at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
-        phases = np.zeros(len(self._stops))
-        own = {at[0]: np.ones(len(self._stops))}
-        if effect.order_locked:
-            phases = np.array([_phase(stop, at) for stop in self._stops])
-            own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
-        low, high = self._fit.bounds(effect, effect.size)
-        stops, prior = self._select(own, effect.name)
-        total = add([*stops, prior])
-        best = minimum(total)
-        sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
-        size = float(best[-1])
-        if not low <= size <= high:
-            # What its bounds allow of it: the rest of the unknowns do their best beside that.
-            size = float(np.clip(size, low, high))
-            total = _fixed(total, size)
-            best = minimum(total)
-        alone, prior = self._select(own, alone=True)
-        single = float(minimum(add([*alone, prior]))[-1])
-        if not low <= single <= high:
-            single = float(np.clip(single, low, high))
-            alone, prior = [_fixed(stop, single) for stop in alone], _fixed(prior, single)
-        return Score(
-            effect=effect,
-            shape=shape,
-            size=size,
-            sigma=sigma,
-            units={name: self._fit.unit(effect, name) for name in (effect.size, *shape)},
-            gain=self._reference - total.at(best),
-            held_out=self._without - _held_out(alone, prior),
-            phases=phases,
-        )
-
-
-def _phase(stop: Quadratic, at: Sequence[int]) -> float:
-    """Phase of an order-locked effect in one stop [rad], everything else as it is."""
-    amplitude = -np.linalg.lstsq(stop.N[np.ix_(at, at)], stop.g[at], rcond=None)[0]
-    return float(np.arctan2(amplitude[1], amplitude[0]))
-
-
-def _fixed(one: Quadratic, last: float) -> Quadratic:
-    """Chi-squared over the other unknowns, the last one held."""
-    N = one.N[:-1, :-1]
-    g = one.g[:-1] + last * one.N[:-1, -1]
-    c = one.c + 2.0 * last * one.g[-1] + last**2 * one.N[-1, -1]
-    return Quadratic(N, g, float(c), one.rows)
-
-
-def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
-    """Chi-squared of each stop at the optimum of the others, (K,)."""
-    total = add([*stops, prior])
-    result = np.zeros(len(stops))
-    for k, stop in enumerate(stops):
-        others = Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0)
-        result[k] = stop.at(minimum(others))
-    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +78,7 @@ def search(
     steps: list[Step] = []
     try:
         while True:
-            trial = examine(fit, best, catalogue, report)
+            best, trial = examine(fit, best, catalogue, report)
             step = _step(fit, catalogue, best, trial, report)
             if step is None:
                 return best, steps, trial, False
@@ -250,7 +88,8 @@ def search(
         if not steps:
             raise
         report("interrupted: no more causes are sought, what was found is finished")
-        return best, steps, examine(fit, best, catalogue, report), True
+        best, trial = examine(fit, best, catalogue, report)
+        return best, steps, trial, True
 
 
 def _step(
@@ -287,15 +126,17 @@ def beyond(one: Fitted, other: Fitted) -> float:
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    begun = [one for one in (_begun(fit, best, rival) for rival in rivals) if _gains(best, one)]
+    begun = [one for one in fit.together(partial(_begun, fit, best), rivals) if _gains(best, one)]
     if not begun:
         return []
     misfits = _misfits(begun)
     near = misfits < _BEHIND * misfits.min()
-    every = [
-        fitted(fit, one.point, one.active) if worth else one
-        for one, worth in zip(begun, near, strict=True)
-    ]
+
+    def finished(one: Fitted) -> Fitted:
+        return fitted(fit, one.linearised, one.active, lender=best.linearised)
+
+    ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
+    every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
     return [every[i] for i in np.argsort(_misfits(every))]
 
 
@@ -307,19 +148,30 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
 
 def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
     """First rounds of a fit with one more effect, begun at half the size where it was too much."""
-    active, before = (*best.active, rival.effect), best.linearised
-    one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
-    for _ in range(_HALVINGS):
+    for halvings in range(_HALVINGS + 1):
+        # A law bends: half the contact's stiffness is twice the slip.
+        one = extended(fit, best, replace(rival, size=0.5**halvings * rival.size), _BEGUN)
         if _gains(best, one):
             break
-        # A law bends: half the contact's stiffness is twice the slip.
-        rival = replace(rival, size=0.5 * rival.size)
-        one = fitted(fit, joined(best.point, rival), active, _BEGUN, before.spread)
     return one
 
 
-def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter) -> Trial:
-    """Try every effect that the data can show and the point does not have."""
+def extended(fit: Fit, before: Fitted, rival: Score, rounds: int = _ROUNDS) -> Fitted:
+    """Fit with one more effect, begun where it was fitted without."""
+    start, spread = fit.at(joined(before.point, rival)), before.linearised.spread
+    return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
+
+
+def examine(
+    fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter
+) -> tuple[Fitted, Trial]:
+    """Try every effect that the data can show and the point does not have.
+
+    Returns
+    -------
+    best : with the derivatives by all of them.
+    trial : of all of them.
+    """
     candidates: list[Candidate] = [
         (effect, shape)
         for effect in catalogue
@@ -327,13 +179,24 @@ def examine(fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporte
         for shape in shapes(effect)
     ]
     report(f"signatures of {len(candidates)} candidates")
-    return tried(fit, fit.linearise(best.point, best.active, candidates), candidates)
+    lin = fit.linearise(best.linearised, best.active, candidates)
+    return replace(best, linearised=lin), tried(fit, lin, candidates)
 
 
 def pruned(
-    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: Fitted,
+    base: Fitted,
+    trial: Trial,
+    report: Reporter,
 ) -> tuple[Fitted, Trial]:
-    """Drop effects that, beside the others, do not matter or are not significant."""
+    """Drop effects that, beside the others, do not matter or are not significant.
+
+    Parameters
+    ----------
+    base : the nominal model, with all derivatives.
+    """
     while best.active:
         sigma = np.sqrt(np.diag(trial.covariance()))
         ratios = {}
@@ -342,22 +205,36 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
             ratios[effect] = min(clear, size / effect.matters)
-            if len(best.active) > 1:
-                needed = beyond(lesser(fit, best, effect), best)
-                ratios[effect] = min(ratios[effect], needed / _NEEDED)
+        less = lesser(fit, best, base)
+        if len(less) > 1:
+            for effect, one in less.items():
+                ratios[effect] = min(ratios[effect], beyond(one, best) / _NEEDED)
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
         report(f"dropping {weakest.name}")
-        best = lesser(fit, best, weakest)
-        trial = examine(fit, best, catalogue, report)
+        best, trial = examine(fit, less[weakest], catalogue, report)
     return best, trial
 
 
-def lesser(fit: Fit, one: Fitted, effect: Effect) -> Fitted:
-    """The best fit without one effect."""
-    kept = tuple(other for other in one.active if other is not effect)
-    return fitted(fit, without(one.point, effect), kept)
+def lesser(fit: Fit, best: Fitted, base: Fitted) -> dict[Effect, Fitted]:
+    """The best fit without each of the effects, with all derivatives.
+
+    Parameters
+    ----------
+    base : the nominal model, with all derivatives.
+    """
+
+    def refitted(effect: Effect) -> Fitted:
+        kept = tuple(other for other in best.active if other is not effect)
+        if not kept:
+            return base
+        start = fit.at(without(best.point, effect))
+        one = fitted(fit, start, kept, lender=best.linearised)
+        return replace(one, linearised=fit.linearise(one.linearised, kept))
+
+    fits = fit.together(refitted, best.active)
+    return dict(zip(best.active, fits, strict=True))
 
 
 def without(point: Point, effect: Effect) -> Point:
@@ -371,13 +248,14 @@ def without(point: Point, effect: Effect) -> Point:
 
 def fitted(
     fit: Fit,
-    point: Point,
+    start: Linearised,
     active: tuple[Effect, ...],
     rounds: int = _ROUNDS,
     spread: Vector | None = None,
+    lender: Linearised | None = None,
 ) -> Fitted:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""
-    lin = fit.refine(point, active, rounds, spread)
+    lin = fit.refine(start, active, rounds, spread, lender)
     return Fitted(active, lin.point, lin, lin.misfit)
 
 

@@ -2,29 +2,30 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
+from scipy.stats import bootstrap
 
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, seconds, variant
+from workbench.diagnosis.fit import Fit, variant
+from workbench.diagnosis.linearised import seconds
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
     WRONG,
     Fitted,
     Reporter,
-    Score,
     Step,
-    Trial,
     beyond,
     examine,
+    extended,
     fitted,
-    joined,
     lesser,
     pruned,
     search,
-    shapes,
 )
+from workbench.diagnosis.trial import Score, Trial, shapes
 from workbench.fmu import Matrix, Vector
 
 Verdict = Literal["nothing", "found", "unexplained"]
@@ -124,16 +125,17 @@ class Diagnosis:
 def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of stops."""
     report("nominal model, levels calibrated")
-    base = fitted(fit, fit.start(), ())
-    best, steps, trial, interrupted = search(fit, catalogue, base, report)
-    best, trial = pruned(fit, catalogue, best, trial, report)
-    less = _less(fit, best)
+    nominal = fitted(fit, fit.at(fit.start()), ())
+    best, steps, trial, interrupted = search(fit, catalogue, nominal, report)
+    base = steps[0].before if steps else best
+    best, trial = pruned(fit, catalogue, best, base, trial, report)
+    less = lesser(fit, best, base)
     while (idle := _idle(fit, best, less)) is not None:
         report(f"dropping {idle.name}")
         # Beside fewer others, one that mattered may do so no longer.
-        alone = examine(fit, less[idle], catalogue, report)
-        best, trial = pruned(fit, catalogue, less[idle], alone, report)
-        less = _less(fit, best)
+        best, trial = examine(fit, less[idle], catalogue, report)
+        best, trial = pruned(fit, catalogue, best, base, trial, report)
+        less = lesser(fit, best, base)
     clean = float(best.linearised.inflation.max()) < WRONG
     verdict: Verdict = "found" if best.active else "nothing"
     if not clean and not (best.active and (interrupted or _share(base, best) > _EXPLAINED)):
@@ -161,11 +163,6 @@ def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
         cosines=cosines,
         not_visible={one.name: reason for one in catalogue if (reason := fit.unseen(one))},
     )
-
-
-def _less(fit: Fit, best: Fitted) -> dict[Effect, Fitted]:
-    """The best fit without each of the effects."""
-    return {effect: lesser(fit, best, effect) for effect in best.active}
 
 
 def _idle(fit: Fit, best: Fitted, less: Mapping[Effect, Fitted]) -> Effect | None:
@@ -199,7 +196,7 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
     ----------
     fast : of means over 50 ms instead of a second.
     """
-    joint = fit.quadratics(one.linearised)
+    joint = fit.quadratics(fit.linearise(one.linearised, one.active))
     stops = joint.stops()
     total = add([*stops, joint.prior])
     result = np.zeros(len(stops))
@@ -213,8 +210,13 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
 
 
 def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
-    draws = np.random.default_rng(0).integers(0, len(after), (_DRAWS, len(after)))
-    low, high = np.percentile(np.sqrt(after[draws].mean(axis=1)), [2.5, 97.5])
+    low, high = bootstrap(
+        (after,),
+        lambda squares, axis: np.sqrt(squares.mean(axis=axis)),
+        n_resamples=_DRAWS,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
     return Gain(
         before=float(np.sqrt(before.mean())),
         after=float(np.sqrt(after.mean())),
@@ -299,14 +301,12 @@ def _twins(
             judged |= set(rivals)
         elif effect.name in rivals:
             alike |= set(rivals)
+    others: dict[str, Score] = {}
     for score in (score for step in steps for score in step.scores):
-        name = score.effect.name
-        if name in alike and name not in judged:
-            judged.add(name)
-            point, effects = joined(less.point, score), (*less.active, score.effect)
-            one = fitted(fit, point, effects, spread=less.linearised.spread)
-            if _close(less, one, best):
-                found.append(name)
+        if score.effect.name in alike - judged:
+            others.setdefault(score.effect.name, score)
+    fits = fit.together(partial(extended, fit, less), list(others.values()))
+    found += [name for name, one in zip(others, fits, strict=True) if _close(less, one, best)]
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
 

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 
 from workbench.errors import FMUError
 from workbench.fitness.finding import Finding
+from workbench.pool import start
 
 # A check yields findings, and numbers that say how far it is.
 Task = Callable[[], Iterator[int | Finding]]
@@ -28,18 +29,9 @@ def isolated(task: Task, questions: Sequence[Finding], timeout: float) -> list[F
     questions : what it answers, in this order.
     timeout : time without a report after which it is stopped [s].
     """
-    # A fork of a server that has imported everything starts in milliseconds; Windows has none.
-    server = "forkserver" in multiprocessing.get_all_start_methods()
-    context: multiprocessing.context.ForkServerContext | multiprocessing.context.SpawnContext
-    if server:
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["__main__", "workbench.fitness"])
-    else:
-        context = multiprocessing.get_context("spawn")
-    reports, to_parent = context.Pipe(duplex=False)
+    reports, to_parent = multiprocessing.Pipe(duplex=False)
     with tempfile.TemporaryDirectory(prefix="fmu-check-") as scratch:
-        process = context.Process(target=_work, args=(task, to_parent, scratch), daemon=True)
-        process.start()
+        process = start(_work, (task, to_parent, scratch))
         to_parent.close()
         found, reached, reason = _listen(reports, timeout)
         process.join(1.0 if reason else timeout)

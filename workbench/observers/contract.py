@@ -80,6 +80,7 @@ class Estimator(ABC):
     rank : place in tables.
     standard : whether it runs unless others are asked for.
     tunable : whether it has gains.
+    adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
     sticks : whether a follower rolls where a step would reverse its slip close to standstill.
@@ -96,6 +97,7 @@ class Estimator(ABC):
     rank: ClassVar[int] = 50
     standard: ClassVar[bool] = True
     tunable: ClassVar[bool] = True
+    adapts: ClassVar[bool] = False
     meaning: ClassVar[str] = ""
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
@@ -131,6 +133,16 @@ class Estimator(ABC):
         slowest, fastest : angular frequencies that recordings show [rad/s].
         """
         raise NotImplementedError(f"{cls.name} has no gains")
+
+    @classmethod
+    def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:
+        """States of the model that the gains act on, or act through."""
+        return fmu.states
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """What each gain does, and its unit."""
+        return {}
 
     @classmethod
     def error_dynamics(
@@ -297,12 +309,33 @@ def output(model, layout, j):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slope(model, layout, j, row):  # type: ignore[no-untyped-def]
-    """Derivative of output j by state or correction `row`, after `linearise` of all columns."""
+def add_slope(model, layout, j, factor, places, row):  # type: ignore[no-untyped-def]
+    """Add a multiple of output j's derivatives to a row, after `linearise` of all columns.
+
+    Parameters
+    ----------
+    places : (n + q,) where in the row a state or correction stands, -1: nowhere.
+    """
     at = layout.seen[j]
     if at >= 0:
-        return 1.0 if at == row else 0.0
-    return model.jacobian[row, model.x.size - 1 - at]
+        row[places[at]] += factor
+    else:
+        for k in range(places.size):
+            if places[k] >= 0:
+                row[places[k]] += factor * model.jacobian[k, model.x.size - 1 - at]
+
+
+@inlined
+def explained(model, layout, j, places, change):  # type: ignore[no-untyped-def]
+    """Change of output j, to first order, by changes of unknowns, (p, 1); see `add_slope`."""
+    at = layout.seen[j]
+    if at >= 0:
+        return change[places[at], 0]
+    total = 0.0
+    for k in range(places.size):
+        if places[k] >= 0:
+            total += model.jacobian[k, model.x.size - 1 - at] * change[places[k], 0]
+    return total
 
 
 @inlined

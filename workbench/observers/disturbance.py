@@ -22,19 +22,26 @@ from workbench.kernel import compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import (
     Estimator,
     Layout,
+    add_slope,
     authority,
     clip,
     correct,
+    explained,
     fading,
     measure,
     output,
     report,
     slipping,
-    slope,
     stick,
     width,
 )
-from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
 from workbench.observers.operating import (
     Linearised,
     corrected_states,
@@ -43,6 +50,7 @@ from workbench.observers.operating import (
     walks,
 )
 from workbench.system import System
+from workbench.units import quotient
 
 
 class Settings(NamedTuple):
@@ -52,6 +60,7 @@ class Settings(NamedTuple):
     ----------
     layout : see Layout.
     states : (s,) indices of the corrected states.
+    places : (n + q,) index of states and corrections among the unknowns, -1 for other states.
     L : (s + q, 2 l) gains.
     decay : (q,) rates at which deviations decay [1/s], negative.
     effect : (q,) d(rate)/d(quantity) from which on a quantity has full authority.
@@ -59,6 +68,7 @@ class Settings(NamedTuple):
 
     layout: Layout
     states: NDArray[np.intp]
+    places: NDArray[np.intp]
     L: Matrix
     decay: Vector
     effect: Vector
@@ -113,10 +123,7 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
                 direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
                 gain = direct + h * integrated
                 change[i, 0] += h * (gain * innovation[j] + integrated * memory.integral[j])
-                for k in range(s):
-                    system[i, k] += h * gain * slope(model, layout, j, states[k])
-                for k in range(q):
-                    system[i, s + k] += h * gain * slope(model, layout, j, n + k)
+                add_slope(model, layout, j, h * gain, settings.places, system[i])
             if i < s:
                 for k in range(s):
                     system[i, k] -= h * model.jacobian[states[k], states[i]]
@@ -127,18 +134,11 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         if status:
             return status
         for j in range(outputs):
-            left = innovation[j]
-            for k in range(s):
-                left -= slope(model, layout, j, states[k]) * change[k, 0]
-            for k in range(q):
-                left -= slope(model, layout, j, n + k) * change[s + k, 0]
+            left = innovation[j] - explained(model, layout, j, settings.places, change)
             memory.integral[j] += h * left
         before = slipping(layout, model.x)
         for i in range(n):
-            corrected = False
-            for k in range(s):
-                corrected = corrected or states[k] == i
-            if not corrected:
+            if settings.places[i] < 0:
                 model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
         for i in range(s):
             model.x[states[i]] += change[i, 0]
@@ -195,6 +195,13 @@ class DisturbanceObserver(Estimator):
         self._settings = Settings(
             layout=self._layout,
             states=np.array([fmu.states.index(name) for name in names], np.intp),
+            places=np.array(
+                [
+                    *(names.index(name) if name in names else -1 for name in fmu.states),
+                    *range(s, s + q),
+                ],
+                np.intp,
+            ),
             L=np.ascontiguousarray(L),
             decay=np.ascontiguousarray(gains.values[-q:]),
             effect=np.ascontiguousarray(gains.design["effect"]),
@@ -218,6 +225,25 @@ class DisturbanceObserver(Estimator):
         for values in (memory.z, memory.integral, memory.target, memory.drift):
             values[:] = 0.0
         self._model.x[:] = self.fmu.get_states()
+
+    @classmethod
+    def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:
+        """See Estimator."""
+        return corrected_states(fmu, system)
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        states = corrected_states(fmu, system)
+        rows = {name: fmu.units.get(name, "1") for name in states}
+        rows |= {one.correction: one.unit for one in system.estimated}
+        rates = {f"rate of {name}": quotient(unit, "s") for name, unit in rows.items()}
+        told = feedback_meanings(rates, {one.name: one.unit for one in system.outputs})
+        decays = {
+            f"T_{one.name}": (f"rate at which {one.correction} decays", "1/s")
+            for one in system.estimated
+        }
+        return told | decays
 
     @classmethod
     def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.fmu import Matrix, Vector
+from workbench.units import quotient
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,27 @@ def matrix_names(name: str, rows: int, columns: int) -> tuple[str, ...]:
     # From ten rows or columns on, L111 could be read in two ways.
     mark = "_" if max(rows, columns) > 9 else ""
     return tuple(f"{name}{i + 1}{mark}{j + 1}" for i in range(rows) for j in range(columns))
+
+
+def feedback_meanings(
+    rows: Mapping[str, str], columns: Mapping[str, str]
+) -> dict[str, tuple[str, str]]:
+    """What entries of L do, by their names, and their units.
+
+    Parameters
+    ----------
+    rows : what is corrected, with units.
+    columns : outputs that correct it, with units; those of their integrals follow.
+    """
+    corrections = [(f"{name}", unit) for name, unit in columns.items()]
+    integrals = [(f"∫ {name}", f"({unit}).s") for name, unit in columns.items()]
+    names = matrix_names("L", len(rows), 2 * len(columns))
+    told = [
+        (f"{row} by {column}", quotient(own, unit))
+        for row, own in rows.items()
+        for column, unit in (*corrections, *integrals)
+    ]
+    return dict(zip(names, told, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

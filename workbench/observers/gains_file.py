@@ -52,23 +52,16 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
 
 
 def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:
-    """The text of `gains.toml`; numbers have all their digits.
-
-    Parameters
-    ----------
-    meaning : of the gains, for whoever reads the file.
-    """
-    values = dict(zip(gains.names, gains.values.tolist(), strict=True))
-    design = {name: constants.tolist() for name, constants in gains.design.items()}
-    return "\n".join(
-        [
-            tomli_w.dumps({"estimator": gains.estimator}),
-            *([f"# {meaning}"] if meaning else []),
-            tomli_w.dumps({"gains": values}),
-            *([tomli_w.dumps({"design": design})] if design else []),
-            tomli_w.dumps({"provenance": provenance}),
-        ]
-    )
+    """The text of a file of gains; numbers have all their digits."""
+    values = map(float, gains.values)
+    parts = [
+        tomli_w.dumps({"estimator": gains.estimator}),
+        f"# {meaning}\n" + tomli_w.dumps({"gains": dict(zip(gains.names, values, strict=True))}),
+    ]
+    if gains.design:
+        design = {name: constants.tolist() for name, constants in gains.design.items()}
+        parts.append("# constants of the design\n" + tomli_w.dumps({"design": design}))
+    return "\n".join([*parts, tomli_w.dumps({"provenance": provenance})])
 
 
 def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
@@ -86,12 +79,12 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     return read_gains(path, {name: reasoned}) if tuned_on == fmu.name else reasoned
 
 
-def tuned_file(system: System, estimator: str) -> Path | None:
+def tuned_file(system: System, name: str) -> Path | None:
     """The file of tuned gains that a system's companion brings for an estimator, if it does."""
     if not system.companion:
         return None
     (folder,) = import_module(system.companion).__path__
-    path = Path(folder) / "gains" / f"{estimator}.toml"
+    path = Path(folder) / "gains" / f"{name}.toml"
     return path if path.exists() else None
 
 

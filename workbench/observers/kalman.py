@@ -21,7 +21,6 @@ from workbench.observers.contract import (
     output,
     report,
     slipping,
-    slope,
     stick,
     width,
 )
@@ -185,13 +184,14 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                 innovation -= model.jacobian[i, n - 1 - at] * memory.change[i, 0]
         noise = variance(settings, fade, y, j)
         total += noise
-        row[row.size - 1] += innovation * innovation / total
-        for i in range(size):
-            memory.change[i, 0] += v[i] * innovation / total
+        inverse = 1.0 / total
+        row[row.size - 1] += innovation * innovation * inverse
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
         for i in range(size):
+            gain = v[i] * inverse
+            memory.change[i, 0] += gain * innovation
             for k in range(i + 1):
-                P[i, k] -= v[i] * v[k] / total
+                P[i, k] -= gain * v[k]
                 P[k, i] = P[i, k]
     for i in range(size):
         z[i] += memory.change[i, 0]
@@ -251,6 +251,7 @@ class ExtendedKalmanFilter(Estimator):
     name = "ekf"
     label = "EKF"
     rank = 40
+    adapts = True
     meaning = "standard deviations of samples, and random walks"
     sticks = True
     _law = staticmethod(ekf_law)
@@ -282,6 +283,20 @@ class ExtendedKalmanFilter(Estimator):
         memory.z[:] = 0.0
         memory.z[: len(self.fmu.states)] = self.fmu.get_states()
         memory.P[:] = np.diag(self._settings.spread**2)
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        told = {
+            "model": ("random walk of every state, over what the system says", "1"),
+            "initial": ("what is known of quantities at the start, over what it says", "1"),
+        }
+        for output in system.outputs:
+            told[output.name] = f"scatter of {output.name}", output.unit
+            told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
+        for one in system.estimated:
+            told[one.name] = f"random walk of {one.name}", f"{one.unit}/sqrt(s)"
+        return {name: told[name] for name in gains.names}
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:

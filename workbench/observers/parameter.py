@@ -7,24 +7,32 @@ dy]: a PI controller that drives the model onto the measurement. The states are 
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, linearise, solve
 from workbench.observers.contract import (
     Estimator,
     Layout,
+    add_slope,
     authority,
     clip,
     correct,
+    explained,
     fading,
     measure,
     output,
     report,
-    slope,
     width,
 )
 from workbench.observers.disturbance import effects
-from workbench.observers.gains import Gains, SearchSpace, feedback_space, matrix_names
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
 from workbench.observers.operating import linearised, loops
 from workbench.system import System
 
@@ -33,6 +41,7 @@ _SLOWEST = 2.0**-40  # of the fastest integral action, at which a design is give
 
 class _Settings(NamedTuple):
     layout: Layout
+    places: NDArray[np.intp]  # (n + q,) of states among the unknowns; corrections are none
     L: Matrix
     effect: Vector
 
@@ -77,8 +86,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
                 wanted += gain * innovation[j]
                 for i in range(n):
                     effect = h * model.jacobian[n + k, i] * gain
-                    for a in range(n):
-                        system[i, a] += effect * slope(model, layout, j, a)
+                    add_slope(model, layout, j, effect, settings.places, system[i])
             for i in range(n):
                 change[i, 0] += h * model.jacobian[n + k, i] * wanted
         status = status or solve(system, change)
@@ -87,8 +95,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         for i in range(n):
             model.x[i] += change[i, 0]
         for j in range(outputs):
-            for a in range(n):
-                innovation[j] -= slope(model, layout, j, a) * change[a, 0]
+            innovation[j] -= explained(model, layout, j, settings.places, change)
         for k in range(q):
             direct = 0.0
             for j in range(outputs):
@@ -136,6 +143,7 @@ class ParameterEstimator(Estimator):
         n, q, outputs = len(fmu.states), len(system.estimated), len(system.outputs)
         self._settings = _Settings(
             layout=self._layout,
+            places=np.append(np.arange(n), np.full(q, -1)),
             L=np.ascontiguousarray(gains.values.reshape(q, 2 * outputs)),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
@@ -155,6 +163,12 @@ class ParameterEstimator(Estimator):
         self._model.x[:] = self.fmu.get_states()
         self._memory.integral[:] = 0.0
         self._memory.z[:] = 0.0
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        rows = {one.correction: one.unit for one in system.estimated}
+        return feedback_meanings(rows, {one.name: one.unit for one in system.outputs})
 
     @classmethod
     def of(cls, L: Matrix, effect: Vector, source: str = "") -> Gains:

@@ -35,7 +35,9 @@ def build_everything(system: System, effects: Sequence[Effect], path: Path) -> N
         If the library has errors.
     """
     library, base = read_library(system.library), system.model(OBSERVER).name
-    text = source(library, base, _NAME, effects, {}, {}, "Observer model with every effect, at zero")
+    text = source(
+        library, base, _NAME, effects, {}, {}, "Observer model with every effect, at zero"
+    )
     build(library, _NAME, text, path, every_platform=False)
 
 

@@ -85,9 +85,7 @@ def diagnosed(
     )
 
 
-def _clearness(
-    planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire
-) -> float | None:
+def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire) -> float | None:
     if len(planting.gains) != 1:
         return None
     ((name, gain),) = planting.gains.items()

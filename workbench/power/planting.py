@@ -12,24 +12,23 @@ Kind = Literal["clean", "single", "pair", "outside"]
 
 
 class Findable(Protocol):
-    """What is asked of an effect of the library, which the diagnosis may find.
-
-    Attributes
-    ----------
-    name : of the effect.
-    label : of its size in results.
-    matters : least size that is worth a finding, SI.
-    hidden : why recordings cannot show it; empty if they can.
-    """
+    """What is asked of an effect of the library, which the diagnosis may find."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Of the effect."""
+
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """Of its size in results."""
+
     @property
-    def matters(self) -> float: ...
+    def matters(self) -> float:
+        """Least size that is worth a finding, SI."""
+
     @property
-    def hidden(self) -> str: ...
+    def hidden(self) -> str:
+        """Why recordings cannot show it; empty if they can."""
 
 
 @dataclass(frozen=True)

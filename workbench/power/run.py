@@ -1,23 +1,19 @@
 """Sets of recordings, made by a virtual rig and diagnosed, in worker processes."""
 
 import hashlib
-import multiprocessing
-import os
-import signal
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, as_completed
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from workbench import diagnosis
 from workbench.case import read_cases
 from workbench.diagnosis import Effect
+from workbench.pool import Pool, WorkerError
 from workbench.power.diagnosing import build_everything, diagnose_set
 from workbench.power.journal import Diagnosed, Journal, diagnosed
 from workbench.power.planting import Group, Repertoire
@@ -95,7 +91,7 @@ def diagnose_sets(
         journal = Journal(out / _JOURNAL, identity, resume=resume)
         known = {one.planting.options for one in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
-        interrupted = _run([one for one in left if one], setup, workers, scratch, journal, report)
+        interrupted = _run([one for one in left if one], setup, workers, journal, report)
         return journal.results, interrupted
 
 
@@ -103,64 +99,47 @@ def _run(
     groups: Sequence[Group],
     setup: Setup,
     workers: int,
-    scratch: str,
     journal: Journal,
     report: Callable[[str], None],
 ) -> bool:
     """Diagnose all groups; returns whether the run was interrupted."""
     total = sum(map(len, groups))
     begin, done = time.perf_counter(), 0
-    waiting = list(reversed(groups))
-    running: set[Future[list[Diagnosed]]] = set()
 
-    def collect() -> None:
+    def collect(task: Future[list[Diagnosed]]) -> None:
         nonlocal done
-        finished = wait(running, return_when=FIRST_COMPLETED).done
-        for future in finished:
-            running.discard(future)
-            for result in future.result():
-                journal.append(result)
-                done += 1
-                left = (time.perf_counter() - begin) / done * (total - done)
-                name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
-                said = ", ".join(one.effect for one in result.causes) or result.verdict
-                report(f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left")
+        for result in _results(task, open_tasks.pop(task)):
+            journal.append(result)
+            done += 1
+            left = (time.perf_counter() - begin) / done * (total - done)
+            name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
+            said = ", ".join(one.effect for one in result.causes) or result.verdict
+            report(f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left")
 
-    # Not forked: a fork of a process with threads may lock up.
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, spawn, _begin, (scratch,)) as pool:
+    # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
+    with Pool(workers, nullcontext, setup, isolated=True) as pool:
+        open_tasks = {pool.submit(_evaluate, group): group for group in groups}
         try:
-            while waiting or running:
-                # No more than can be worked on at once: Ctrl-C waits for what is under way.
-                while waiting and len(running) < workers:
-                    running.add(pool.submit(_evaluate, waiting.pop(), setup))
-                collect()
+            for task in as_completed(list(open_tasks)):
+                collect(task)
         except KeyboardInterrupt:
             report("interrupted, finishing the sets that are under way")
-            while running:
-                collect()
+            pool.finish()
+            for task in [one for one in open_tasks if not one.cancelled()]:
+                collect(task)
             return True
     return False
 
 
-def _begin(scratch: str) -> None:
-    """Prepare a process: it leaves Ctrl-C to the master and does not outlive it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_master, daemon=True).start()
-    tempfile.tempdir = scratch
-    # Matrices are small: with a pool of BLAS threads each, processes wait for one another.
-    threadpool_limits(1)
+def _results(task: "Future[list[Diagnosed]]", group: Group) -> list[Diagnosed]:
+    """What became of a group; a crash must not end a run of hours, and is counted."""
+    try:
+        return task.result()
+    except WorkerError as error:
+        return [Diagnosed(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
 
 
-def _end_with_master() -> None:
-    if (master := multiprocessing.parent_process()) is not None:
-        master.join()
-        for child in multiprocessing.active_children():
-            child.kill()
-        os._exit(1)
-
-
-def _evaluate(group: Group, setup: Setup) -> list[Diagnosed]:
+def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
     """Simulate once, then record and diagnose each set of a group, in a process of its own."""
     results: list[Diagnosed] = []
     simulated: Any = None

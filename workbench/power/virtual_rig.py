@@ -17,20 +17,19 @@ class VirtualRig(Protocol):
     A companion has one in its module `planting`, which it opens by
     `virtual_rig(names, model) -> VirtualRig`: the recordings that a set is made of, the usual ones
     if none is named, and the FMU that makes them. Wrong names or files it refuses there.
-
-    Attributes
-    ----------
-    plantables : what can be planted.
-    recordings : names of the recordings of a set.
-    identity : all that recordings depend on besides a seed and what is planted, for JSON.
     """
 
     @property
-    def plantables(self) -> tuple[Plantable, ...]: ...
+    def plantables(self) -> tuple[Plantable, ...]:
+        """What can be planted."""
+
     @property
-    def recordings(self) -> tuple[str, ...]: ...
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings of a set."""
+
     @property
-    def identity(self) -> Mapping[str, Any]: ...
+    def identity(self) -> Mapping[str, Any]:
+        """All that recordings depend on besides a seed and what is planted, for JSON."""
 
     def simulate(self, seed: int, gains: Mapping[str, float]) -> Any:
         """What happens in the recordings of a set; effects that are sensed may change after it."""
@@ -58,7 +57,7 @@ def open_virtual_rig(system: System, names: Sequence[str], model: Path) -> Virtu
             where=str(system.source),
             found="no companion that can plant effects",
             expected="a Python package with a module 'planting', which makes recordings",
-            remedy="name it as companion = \"...\", or choose a system that has one",
+            remedy='name it as companion = "...", or choose a system that has one',
         )
     found: VirtualRig = import_module(module).virtual_rig(names, model)
     return found

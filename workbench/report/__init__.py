@@ -8,7 +8,6 @@ from workbench.report.results import (
     format_table,
     summarise,
     write_estimates,
-    write_summary,
 )
 
 __all__ = [
@@ -21,5 +20,4 @@ __all__ = [
     "summarise",
     "write_estimates",
     "write_page",
-    "write_summary",
 ]

@@ -1,7 +1,9 @@
 """Results of a diagnosis: summary.json, the text for the terminal, data and figures, the page."""
 
 import json
+import signal
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from workbench.case import Case
 from workbench.diagnosis import Cause, Outcome, Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import CHANNELS
+from workbench.files import write_json, write_whole
 from workbench.report.diagnosis_figures import (
     FAST,
     LASTING,
@@ -24,7 +27,6 @@ from workbench.report.diagnosis_figures import (
 )
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import draw_case
-from workbench.report.results import write_summary, write_text
 
 _MEASURE = (
     "root mean square of prediction errors, in means over {span}, on stops that were held out, "
@@ -213,7 +215,7 @@ def format_diagnosis(summary: Mapping[str, Any]) -> str:
 
 
 def write_diagnosis(
-    outcome: Outcome, cases: Sequence[Case], summary: Mapping[str, Any], out: Path
+    outcome: Outcome, cases: Sequence[Case], summary: Mapping[str, Any], out: Path, workers: int
 ) -> Path:
     """Write summary.json, data and figures, and the page that shows them; returns the page.
 
@@ -221,27 +223,36 @@ def write_diagnosis(
     ----------
     cases : as diagnosed, in the order of the outcome's residuals.
     summary : of this outcome.
+    workers : processes that draw.
     """
-    write_summary(summary, out / "summary.json")
+    write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
     added = effects or summary["partial"]
     extension = f"with {', '.join(added)}" if added else ""
     span = FAST if _turns(outcome) else LASTING
     pairs = list(zip(outcome.residuals, cases, strict=True))
     pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(effects)))
-    figures = []
-    for one, case in pairs:
-        figure = stop_figure(one, case, extension, span)
-        draw_case(figure, _pictures(out, one.name))
-        _write_stop(one, out / f"{one.name}.csv")
-        figures.append(figure)
-    _write_tables(summary, out)
-    draw_dependences(summary["dependences"], _pictures(out, "dependences"))
-    names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
-    draw_confusability(names, cosines, effects, _pictures(out, "confusability"))
-    if summary["gain"] is not None:
-        draw_gain(summary["gain"], _pictures(out, "gain"))
-    return write_diagnosis_page(summary, figures, out)
+    figures = [stop_figure(one, case, extension, span) for one, case in pairs]
+    # Ctrl-C is this process's affair.
+    ignored = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
+        drawn = [pool.submit(draw_case, figure, _pictures(out, figure.name)) for figure in figures]
+        names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
+        drawn += [
+            pool.submit(
+                draw_confusability, names, cosines, effects, _pictures(out, "confusability")
+            ),
+            pool.submit(draw_dependences, summary["dependences"], _pictures(out, "dependences")),
+        ]
+        if summary["gain"] is not None:
+            drawn.append(pool.submit(draw_gain, summary["gain"], _pictures(out, "gain")))
+        for one, _ in pairs:
+            _write_stop(one, out / f"{one.name}.csv")
+        _write_tables(summary, out)
+        page = write_diagnosis_page(summary, figures, out)
+        for picture in drawn:
+            picture.result()
+    return page
 
 
 def _clearness(one: Residuals, span: int, found: bool) -> float:
@@ -268,22 +279,22 @@ def _write_stop(one: Residuals, path: Path) -> None:
             columns[f"lasting_sigma.{channel} [{unit}]"] = means.sigma[:, c]
     for name, values in at_blocks(one).items():
         columns[f"residual.{name} [{RESIDUALS[name]}]"] = values
-    write_text(path, _csv(pd.DataFrame(columns)))
+    write_whole(path, _csv(pd.DataFrame(columns)))
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
     """Data of the figures that show all stops."""
     nested = ("shape", "shape_units")
     rows = [{**one, **{k: json.dumps(one[k]) for k in nested}} for one in summary["candidates"]]
-    write_text(out / "candidates.csv", _csv(pd.DataFrame(rows)))
-    write_text(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
+    write_whole(out / "candidates.csv", _csv(pd.DataFrame(rows)))
+    write_whole(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
-    write_text(out / "confusability.csv", _csv(pd.DataFrame(cells)))
+    write_whole(out / "confusability.csv", _csv(pd.DataFrame(cells)))
     if (gain := summary["gain"]) is not None:
         rows = [{"stop": name, **one} for name, one in gain["stops"].items()]
         total = {key: gain[key] for key in ("before", "after", "low", "high")}
-        write_text(out / "gain.csv", _csv(pd.DataFrame([*rows, {"stop": "all stops", **total}])))
+        write_whole(out / "gain.csv", _csv(pd.DataFrame([*rows, {"stop": "all stops", **total}])))
 
 
 def _csv(table: pd.DataFrame) -> str:

@@ -16,7 +16,7 @@ from workbench.diagnosis import Residuals
 from workbench.diagnosis.residuals import RESIDUALS
 from workbench.diagnosis.samples import BLOCK, CHANNELS
 from workbench.fmu import Matrix, Vector
-from workbench.report.figures import LIGHT, STYLE, CaseFigure, Curve, Panel
+from workbench.report.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
 
 NOMINAL, EXTENDED, NOISE = "0", "2", "raw"  # styles of curves
 LASTING = 10  # blocks of 50 ms: half a second, as the residuals are smoothed
@@ -250,10 +250,3 @@ def draw_heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> 
     for (row, column), value in np.ndenumerate(percents):
         if value >= least:
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7)
-
-
-def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
-    """Write one figure in each format, without the date, so that equal figures are equal files."""
-    for path in paths:
-        stamp = "Date" if path.suffix == ".svg" else "Software"
-        sheet.savefig(path, dpi=110, metadata={stamp: None})

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from workbench.files import write_whole
 from workbench.report.diagnosis_figures import EXTENDED, NOMINAL
 from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
-from workbench.report.results import write_text
 from workbench.report.templates import environment
 
 _BLOCKS = 900  # of a curve, two points each; errors have one value in 50 ms
@@ -61,7 +61,7 @@ def write_diagnosis_page(
         )
     )
     path = folder / "index.html"
-    write_text(path, text)
+    write_whole(path, text)
     return path
 
 

@@ -57,6 +57,8 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.0,
     "svg.hashsalt": "workbench",
 }
+_SHEET = (9.0, 11.0)  # [inch]
+_ENTRIES = 3  # of a legend side by side
 
 
 @dataclass(frozen=True)
@@ -187,15 +189,15 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
     """Draw a case with matplotlib, once, to each path (PNG or SVG by suffix)."""
     style = STYLE | {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
     with mpl.rc_context(style):
-        sheet = Figure(figsize=(9.0, 11.0), layout="constrained")
+        sheet = Figure(figsize=_SHEET)
         rows = sheet.subplots(
             len(figure.panels),
             1,
             sharex=True,
             squeeze=False,
-            height_ratios=[panel.height for panel in figure.panels],
+            gridspec_kw=_placed([panel.height for panel in figure.panels], len(figure.legend)),
         )[:, 0]
-        sheet.suptitle(f"{figure.name}: {figure.title}", fontsize=10)
+        sheet.suptitle(f"{figure.name}: {figure.title}", fontsize=10, y=1.0 - 0.1 / _SHEET[1])
         for axes, panel in zip(rows, figure.panels, strict=True):
             for curve in panel.curves:
                 colour = LIGHT[curve.style]
@@ -214,14 +216,39 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
         sheet.legend(
             [Line2D([], [], color=LIGHT[style]) for style, _ in figure.legend],
             [text for _, text in figure.legend],
-            loc="outside lower center",
-            ncols=3,
+            loc="lower center",
+            ncols=_ENTRIES,
             fontsize=8,
             frameon=False,
         )
-        for path in paths:
-            stamp = "Date" if path.suffix == ".svg" else "Software"
-            sheet.savefig(path, dpi=110, metadata={stamp: None})
+        save_figure(sheet, paths)
+
+
+def _placed(heights: Sequence[float], entries: int) -> dict[str, Any]:
+    """Where panels stand on a sheet above a legend; to have it found takes longer than to draw."""
+    width, height = _SHEET
+    bottom, top = 0.6 + 0.17 * -(-entries // _ENTRIES), height - 0.5  # [inch]
+    gap = 0.36
+    panel = (top - bottom - gap * (len(heights) - 1)) / len(heights)
+    return {
+        "left": 0.8 / width,
+        "right": 1.0 - 0.1 / width,
+        "bottom": bottom / height,
+        "top": top / height,
+        "hspace": gap / panel,
+        "height_ratios": heights,
+    }
+
+
+def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
+    """Write one figure in each format, without the date, so that equal figures are equal files."""
+    if layout := sheet.get_layout_engine():
+        # To place the parts takes as long as to draw them, and is the same in each format.
+        layout.execute(sheet)
+        sheet.set_layout_engine(None)
+    for path in paths:
+        stamp = "Date" if path.suffix == ".svg" else "Software"
+        sheet.savefig(path, dpi=110, metadata={stamp: None})
 
 
 def _force(result: CaseResult, styles: dict[str, str]) -> tuple[list[Curve], tuple[float, float]]:

@@ -1,6 +1,5 @@
 """Observability of states and frictions: figure, files and table."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from workbench.case import Case
 from workbench.cosim import Run
+from workbench.files import write_json, write_whole
 from workbench.observability import (
     FRICTION_PRIOR,
     FRICTIONS,
@@ -25,8 +25,7 @@ from workbench.observability import (
     SensorNoise,
     WindowTest,
 )
-from workbench.report.figures import STYLE
-from workbench.report.results import write_text
+from workbench.report.figures import STYLE, save_figure
 
 _COLOURS = ("#0072B2", "#D55E00")
 _LINES = ("-", "--")
@@ -94,7 +93,7 @@ def draw_observability(stop: StopObservability, path: Path) -> None:
             axes.legend(loc="upper center", ncols=4, fontsize=7)
         rows[-1].set_xlabel("time [s]")
         figure.align_ylabels()
-        figure.savefig(path, dpi=110, metadata={"Software": None})
+        save_figure(figure, [path])
 
 
 def write_windows(stop: StopObservability, path: Path) -> None:
@@ -114,7 +113,7 @@ def write_windows(stop: StopObservability, path: Path) -> None:
             columns[f"{test.model}.bound_{name} [1]"] = test.bound[:, j]
         for j, name in enumerate(test.states):
             columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
-    write_text(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
+    write_whole(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
 
 
 def write_observability(
@@ -143,7 +142,7 @@ def write_observability(
             for stop in stops
         },
     }
-    write_text(path, json.dumps(summary, indent=2) + "\n")
+    write_json(path, summary)
 
 
 def _linear(test: LinearTest) -> dict[str, Any]:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from workbench.files import write_whole
 from workbench.objective import BANDWIDTH, FIRST_PRESSURE, LOWEST_SPEED
 from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
-from workbench.report.results import write_text
 from workbench.report.templates import environment
 
 _SIZE = 4.5e6  # [byte] that all curves may take, so that a page opens at once
@@ -111,4 +111,4 @@ def write_page(
             lowest_speed=LOWEST_SPEED,
         )
     )
-    write_text(path, text)
+    write_whole(path, text)

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from workbench.files import write_json
 from workbench.power import CLEAR, VISIBLE, Findable
-from workbench.report.diagnosis_figures import draw_heat, save_figure
-from workbench.report.figures import LIGHT, STYLE
+from workbench.report.diagnosis_figures import draw_heat
+from workbench.report.figures import LIGHT, STYLE, save_figure
 
 _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]

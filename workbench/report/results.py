@@ -1,8 +1,5 @@
 """Machine-readable results, and the table on the terminal."""
 
-import json
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +10,7 @@ import pandas as pd
 
 from workbench.case import Case
 from workbench.cosim import Run
+from workbench.files import write_whole
 from workbench.fmu import Vector
 from workbench.objective import Score, Weights, low_pass
 from workbench.observers import ESTIMATE
@@ -73,7 +71,7 @@ def write_estimates(result: CaseResult, path: Path) -> None:
         if error is not None:
             columns[f"{name}.Fx_error [N]"] = error
     text = pd.DataFrame(columns).to_csv(index=False, float_format="%.7g")
-    write_text(path, text)
+    write_whole(path, text)
 
 
 def summarise(
@@ -100,11 +98,6 @@ def summarise(
     return {"provenance": provenance, "weights": asdict(weights), "cases": cases}
 
 
-def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Write summary.json."""
-    write_text(path, json.dumps(summary, indent=2) + "\n")
-
-
 def label(name: str) -> str:
     """Name of an estimator for people.
 
@@ -122,15 +115,6 @@ def percent(share: float) -> str:
     '1.12 %'
     """
     return f"{100 * share:.2f} %"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "w") as stream:
-        stream.write(text)
-    Path(name).chmod(0o644)
-    Path(name).replace(path)
 
 
 def format_table(results: Sequence[CaseResult]) -> str:

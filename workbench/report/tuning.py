@@ -10,53 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from workbench.objective import BANDWIDTH
+from workbench.files import write_whole
 from workbench.report.drawing import ticks_within
-from workbench.report.results import label, write_text
 from workbench.report.templates import environment
-from workbench.tuning.settling import SETTLED
 from workbench.tuning.validation import NEGLIGIBLE, STEP
 
 _REASONED, _TUNED = "0", "2"  # styles of curves
 _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of the cases [px]
 _CURVE = {"left": 58, "width": 850, "height": 220, "top": 16}  # of the convergence [px]
-
-_COLUMNS = ("omegaW", "omegaR", "∫ omegaW", "∫ omegaR")  # deviations that correct, integrals
-# What a row of L corrects, and the unit of a gain of a deviation, and of its integral.
-_ROWS = {
-    "disturbance_observer": (
-        *((f"rate of {speed}", "1/s", "1/s2") for speed in ("omegaW", "omegaR")),
-        *((f"rate of {friction}", "1/rad", "1/(rad.s)") for friction in ("dmuWR", "dmuDC")),
-    ),
-    "parameter_estimator": tuple((friction, "s/rad", "1/rad") for friction in ("dmuWR", "dmuDC")),
-}
-_RATES = {f"T_{at}": (f"rate at which dmu{at} decays", "1/s") for at in ("WR", "DC")}
-_NOISE = {
-    "omegaW_relative": ("scatter of omegaW, as a share of it", "1"),
-    "omegaW": ("scatter of omegaW", "rad/s"),
-    "omegaR": ("scatter of omegaR", "rad/s"),
-    "model": ("random walk of every state", "unit of the state/sqrt(s)"),
-    "muWR": ("random walk of muWR", "1/sqrt(s)"),
-    "muDC": ("random walk of muDC", "1/sqrt(s)"),
-    "initial_friction": ("what is known of frictions at the start", "1"),
-}
-
-
-def meanings(estimator: str) -> dict[str, tuple[str, str]]:
-    """What each gain of an estimator does, and its unit.
-
-    >>> meanings("parameter_estimator")["L23"]
-    ('dmuDC by ∫ omegaW', '1/rad')
-    """
-    if estimator not in _ROWS:
-        return _NOISE
-    entries = {
-        f"L{i}{j}": (f"{row} by {column}", units[j > 2])
-        for i, (row, *units) in enumerate(_ROWS[estimator], 1)
-        for j, column in enumerate(_COLUMNS, 1)
-    }
-    return entries | (_RATES if estimator == "disturbance_observer" else {})
-
 
 def sentence(summary: Mapping[str, Any]) -> str:
     """The result in one sentence."""
@@ -109,8 +70,8 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
     for name, one in summary.get("beside", {}).items():
         if one["z"] is not None and one["z"] < summary["z"]:
             news.append(
-                f"Better without any tuning: {label(name)}, z = {one['z']:.4g}. It makes its gains "
-                "anew at every sample, where these are the same at every speed and pressure."
+                f"Better without any tuning: {one['label']}, z = {one['z']:.4g}. It makes its gains "
+                "anew at every sample, where these are the same at every one."
             )
     falls = {name: fall for name, e in summary["sensitivity"].items() if (fall := _fall(e))}
     if falls:
@@ -145,14 +106,14 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
             curve=_convergence(summary),
             styles={"reasoned": _REASONED, "tuned": _TUNED},
             gains_path=shlex.quote(str(folder / "gains.toml")),
-            bandwidth=BANDWIDTH,
-            settled=SETTLED,
+            bandwidth=summary["bandwidth"],
+            follows=summary["follows"],
             negligible=NEGLIGIBLE,
             step=STEP,
         )
     )
     path = folder / "index.html"
-    write_text(path, text)
+    write_whole(path, text)
     return path
 
 
@@ -164,10 +125,8 @@ def _worst_first(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _gains(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Gains with what they do, and what z does when they change; None after an interruption."""
-    told = meanings(summary["estimator"])
     rows = []
     for name, gain in summary["gains"].items():
-        meaning, unit = told[name]
         effect = summary["sensitivity"].get(name)
         remarks = ["⚠ at bound"] if gain["at_bound"] else []
         if effect is not None and not effect["matters"]:
@@ -175,7 +134,7 @@ def _gains(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         if effect is not None and _fall(effect):
             remarks.append("not converged")
         rows.append(
-            {**gain, "name": name, "meaning": meaning, "unit": unit, "effect": effect}
+            {**gain, "name": name, "effect": effect}
             | {"remark": ", ".join(remarks)}
         )
     return rows
@@ -204,7 +163,7 @@ def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
     if not summary.get("beside"):
         return []
-    name, cases = label(summary["estimator"]), summary["cases"]
+    name, cases = summary["label"], summary["cases"]
     rows = [
         {
             "name": f"{name}, {how}",
@@ -214,7 +173,7 @@ def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         for how, z, z_k in (("tuned", "z", "z_k"), ("reasoned", "z_reasoned", "z_k_reasoned"))
     ]
     rows[0]["found"] = True
-    rows += [{"name": label(name), **one} for name, one in summary["beside"].items()]
+    rows += [{"name": one["label"], **one} for one in summary["beside"].values()]
     return sorted(rows, key=lambda row: np.inf if row["z"] is None else row["z"])
 
 
@@ -283,3 +242,37 @@ def _convergence(summary: Mapping[str, Any]) -> dict[str, Any]:
         "bottom": top + height,
         "total": left + width + 40,
     }
+
+
+def format_tuned(summary: Mapping[str, Any]) -> str:
+    """Table for the terminal: cases, and what is to be said of gains and folds."""
+    cases = summary["cases"]
+    width = max(map(len, cases))
+    lines = [f"{'case':<{width}} {'reasoned':>9} {'tuned':>9}  z_k, worst first"]
+    for name, case in sorted(cases.items(), key=lambda item: -item[1]["z_k"]):
+        lines.append(f"{name:<{width}} {case['z_k_reasoned']:>9.4f} {case['z_k']:>9.4f}")
+    work = summary["work"]
+    lines.append(
+        f"z = {summary['z']:.5f} after {work['generations']} generations, {work['candidates']} "
+        f"candidates, {work['saved']:.0%} of the work saved, {work['seconds']:.0f} s"
+    )
+    if bound := [name for name, gain in summary["gains"].items() if gain["at_bound"]]:
+        lines.append(f"at a bound of the search: {', '.join(bound)}")
+    if effects := summary["sensitivity"]:
+        idle = [name for name, effect in effects.items() if not effect["matters"]]
+        lines.append(f"gains that do not matter (z within 1 %): {', '.join(idle) or 'none'}")
+    for name, one in summary["beside"].items():
+        z = "diverges" if one["z"] is None else f"z = {one['z']:.5f}"
+        lines.append(f"{name}, not tuned: {z}, worst {one['worst']}")
+    for fold in summary["folds"]:
+        tuned, reasoned, error, untuned = (
+            np.inf if fold[name] is None else fold[name]
+            for name in ("tuned", "reasoned", "error", "error_reasoned")
+        )
+        verdict = "better" if tuned < reasoned else "not better"
+        lines.append(
+            f"not seen: {', '.join(fold['cases'])}: z {tuned:.4f}, {verdict} than reasoned "
+            f"{reasoned:.4f}; seen: {fold['z']:.4f}; error of {summary['judged']} {error:.2%}, reasoned "
+            f"{untuned:.2%}"
+        )
+    return "\n".join(lines)

@@ -3,67 +3,51 @@
 Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential evolution.
 """
 
-from workbench.tuning.checkpoint import Generation, write_whole
-from workbench.tuning.cost import Job, recording, recordings
+from workbench.tuning.checkpoint import Generation
+from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
-from workbench.tuning.gains import (
-    DEFAULTS,
-    default_settings,
-    format_gains,
-    read_gains,
-    with_tuned,
-)
+from workbench.tuning.recipe import Problem, Progress, Tuned, prepare, tunable, tune
 from workbench.tuning.search import Plan, Search, search
-from workbench.tuning.space import (
-    TUNABLE,
-    Gains,
-    SearchSpace,
-    from_vector,
-    gain_names,
-    reasoned_gains,
-    search_space,
-    to_vector,
-)
+from workbench.tuning.summary import summarise, tuned_gains
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
     cross_validate,
-    judge_gains,
+    evaluate_gains,
     sensitivities,
-    untuned_filter,
+    untuned_filters,
 )
-from workbench.tuning.workers import Pool, ProcessPool
+from workbench.tuning.workers import LIMIT, Workers, evaluate_all, evaluators
 
 __all__ = [
-    "DEFAULTS",
-    "TUNABLE",
+    "LIMIT",
+    "Candidate",
+    "Evaluation",
+    "Evaluator",
     "Fold",
-    "Gains",
     "Generation",
     "Job",
     "Plan",
-    "Pool",
-    "ProcessPool",
+    "Problem",
+    "Progress",
     "Search",
-    "SearchSpace",
     "Sensitivity",
+    "Tuned",
+    "Workers",
     "cross_validate",
-    "default_settings",
     "draw_cases",
     "draw_convergence",
-    "format_gains",
-    "from_vector",
-    "gain_names",
-    "judge_gains",
-    "read_gains",
-    "reasoned_gains",
+    "evaluate_all",
+    "evaluate_gains",
+    "evaluators",
+    "prepare",
     "recording",
     "recordings",
     "search",
-    "search_space",
     "sensitivities",
-    "to_vector",
-    "untuned_filter",
-    "with_tuned",
-    "write_whole",
+    "summarise",
+    "tunable",
+    "tune",
+    "tuned_gains",
+    "untuned_filters",
 ]

@@ -1,14 +1,14 @@
 """The state of a search after a generation, in one file that is whole at any moment."""
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.tuning.evolution import Population
+from workbench.files import write_whole
+from workbench.fmu import Matrix, Vector
 
 
 @dataclass(frozen=True)
@@ -20,10 +20,10 @@ class Generation:
     z : objective of the best candidate.
     worst, second : cases that decide it: the worst, and the next one.
     margin : by how much the worst exceeds the next, as a share of z.
-    candidates : judged in this generation.
+    candidates : evaluated in this generation.
     samples : evaluated for them; `of` would have been needed for the full evaluation.
     unstable : candidates that diverged or failed, by case.
-    crashed : candidates that killed their worker twice.
+    crashed : candidates that killed their workers or took too long.
     seconds : wall time.
     """
 
@@ -45,6 +45,22 @@ class Generation:
 
 
 @dataclass(frozen=True, eq=False)
+class Population:
+    """Candidates of one generation; the best is the first.
+
+    Attributes
+    ----------
+    members : (s, n) coordinates in 0..1.
+    z : (s,) objective of each.
+    z_k : (s, k) objective of each in each case.
+    """
+
+    members: Matrix
+    z: Vector
+    z_k: Matrix
+
+
+@dataclass(frozen=True, eq=False)
 class Checkpoint:
     """Everything that the next generation depends on.
 
@@ -52,28 +68,14 @@ class Checkpoint:
     ----------
     identity : hash of what is tuned and how; only the same search may go on from here.
     population : after the last generation of `history`.
-    rng : state of the random numbers, as the bit generator gives it.
+    converged : whether more generations gain nothing.
     history : of all generations, the initial one included.
     """
 
     identity: str
     population: Population
-    rng: dict[str, object]
+    converged: bool
     history: tuple[Generation, ...]
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is either as before or complete, whatever happens."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def save(checkpoint: Checkpoint, path: Path) -> None:
@@ -84,12 +86,11 @@ def save(checkpoint: Checkpoint, path: Path) -> None:
         "members": population.members.tolist(),
         "z": population.z.tolist(),
         "z_k": population.z_k.tolist(),
-        "order": population.order.tolist(),
-        "rng": checkpoint.rng,
+        "converged": checkpoint.converged,
         "history": [vars(generation) for generation in checkpoint.history],
     }
     # JSON writes the shortest digits that read back to the same bits.
-    write_whole(path, json.dumps(content).encode())
+    write_whole(path, json.dumps(content))
 
 
 def load(path: Path, identity: str) -> Checkpoint | None:
@@ -103,12 +104,8 @@ def load(path: Path, identity: str) -> Checkpoint | None:
     try:
         content = json.loads(path.read_text())
         found = content["identity"]
-        population = Population(
-            np.array(content["members"]),
-            np.array(content["z"]),
-            np.array(content["z_k"]),
-            np.array(content["order"], np.intp),
-        )
+        population = Population(*(np.array(content[name]) for name in ("members", "z", "z_k")))
+        converged = bool(content["converged"])
         history = tuple(Generation(**generation) for generation in content["history"])
     except FileNotFoundError:
         return None
@@ -126,4 +123,4 @@ def load(path: Path, identity: str) -> Checkpoint | None:
             expected="the same FMU, cases, seed, population and weights",
             remedy="repeat the command of that search, or run without --resume",
         )
-    return Checkpoint(found, population, content["rng"], history)
+    return Checkpoint(found, population, converged, history)

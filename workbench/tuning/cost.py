@@ -5,21 +5,21 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from types import TracebackType
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from workbench.case import Case
 from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.objective import Weights, integrate, samples
-from workbench.observers import ESTIMATE, Estimator
-from workbench.tuning.settling import SETTLED, Settling
-from workbench.tuning.space import Gains, build, from_vector
+from workbench.objective import corner, integrate, samples, weights
+from workbench.observers import Estimator, Gains, estimators
+from workbench.system import System
+from workbench.tuning.settling import Settling
 
 PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
-DIVERGED = 1e3  # z of a mean error of 1000 rad/s or 1 MN: no estimate of a brake stop
-_JUDGED = [list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx")]
+DIVERGED = 1e3  # z of mean deviations that weigh a thousand times one: no estimate
 
 
 class Recording(NamedTuple):
@@ -30,8 +30,8 @@ class Recording(NamedTuple):
     name : of the case, and how it differs from what was recorded.
     stop : name of the case.
     steps : (n,) from the sample before [s].
-    u, y : (n, 2) measured inputs and outputs.
-    judged : (n, 3) measured omegaW, omegaR [rad/s] and creep force [N].
+    u, y : (n, m) and (n, l) measured inputs and outputs.
+    judged : (n, w) measured signals that the objective weighs.
     shares : (n,) weight of each sample in the time average (trapezoidal rule) [1].
     """
 
@@ -44,71 +44,73 @@ class Recording(NamedTuple):
     shares: Vector
 
 
-def recordings(cases: Sequence[Case], radius_error: float) -> tuple[Recording, ...]:
-    """Prepare cases, each as it is and with a wheel that is not quite as large as the model's.
+def recordings(
+    cases: Sequence[Case], system: System, scale_errors: Mapping[str, float]
+) -> tuple[Recording, ...]:
+    """Prepare cases, each as it is and with outputs whose scale is not quite as in the model.
 
-    Without the latter gains come to trust the difference of two speeds to the last digit, and fail
-    on a rig whose radii are not known as well: 0.3 % of radius made 6 % of force.
+    Without the latter gains come to trust the difference of two outputs to the last digit, and fail
+    on a machine that is not known as well.
 
     Parameters
     ----------
-    radius_error : relative [1], alternately too small and too large; 0 for none.
+    scale_errors : by output, relative [1]; alternately too small and too large.
 
     Raises
     ------
     InputError
-        If a case has no measured force to judge by.
+        If a case lacks a measured signal to judge by.
     """
-    as_recorded = tuple(map(recording, cases))
-    if radius_error == 0.0:
-        return as_recorded
-    signs = (radius_error if i % 2 == 0 else -radius_error for i in range(len(cases)))
-    return (*as_recorded, *map(_with_wheel, as_recorded, signs))
+    found = [recording(case, system) for case in cases]
+    for output, error in scale_errors.items():
+        signs = (error if i % 2 == 0 else -error for i in range(len(cases)))
+        found += [
+            _scaled(one, case, output, sign, system)
+            for one, case, sign in zip(found, cases, signs, strict=False)
+        ]
+    return tuple(found)
 
 
-def recording(case: Case) -> Recording:
+def recording(case: Case, system: System) -> Recording:
     """Prepare a case; see `recordings`."""
-    if case.Fx is None:
+    names = list(system.objective.weights)
+    if missing := [name for name in names if name not in case]:
         raise InputError(
             where=str(case.source),
-            found="no column 'Fx'",
-            expected="the measured force, by which gains are judged",
+            found=f"no column '{missing[0]}'",
+            expected="all measured signals by which gains are judged",
             remedy="leave this case out of the tuning with --cases",
         )
     steps, shares = samples(case.time)
-    judged = np.column_stack([case.y, case.Fx])
+    judged = np.column_stack([case[name] for name in names])
     return Recording(case.name, case.name, steps, case.u.copy(), case.y.copy(), judged, shares)
 
 
-def _with_wheel(one: Recording, error: float) -> Recording:
-    """The recording of a wheel whose radius is too small by a share, so that it turns faster."""
-    y, judged = one.y.copy(), one.judged.copy()
-    y[:, 0] *= 1.0 + error
-    judged[:, 0] *= 1.0 + error
-    return one._replace(name=f"{one.stop}, omegaW {error:+.2%}", y=y, judged=judged)
+def _scaled(one: Recording, case: Case, output: str, error: float, system: System) -> Recording:
+    """The recording of a sensor whose scale is wrong by a share."""
+    scaled = recording(case.with_signals({output: case[output] * (1.0 + error)}), system)
+    return scaled._replace(name=f"{one.stop}, {output} {error:+.2%}")
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """All that a worker needs to judge candidates, on any machine.
+    """All that a worker needs to evaluate candidates, on any machine.
 
     Attributes
     ----------
     estimator : its name.
-    fmu : the file's bytes.
-    names : our names of variables to those in the FMU.
+    system : whose signals are judged, as its objective says.
+    fmu : the model file's bytes.
     gains : reasoned gains; what is not tuned is taken from them.
-    friction_left : share of a step of muDC from which on an observer finds friction too slowly [1],
-        infinite to ask for no friction.
+    follows : whether gains must find a step of a quantity in time, as the system says.
     """
 
     estimator: str
+    system: System
     fmu: bytes
-    names: Mapping[str, str]
     gains: Gains
     recordings: tuple[Recording, ...]
-    weights: Weights
-    friction_left: float = SETTLED
+    follows: bool = True
 
 
 def load_model(job: Job) -> FMU:
@@ -116,17 +118,22 @@ def load_model(job: Job) -> FMU:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "model.fmu"
         path.write_bytes(job.fmu)
-        return FMU(path, job.names)
+        return FMU(path, job.system.names, job.system.given)
+
+
+def build(job: Job, fmu: FMU, gains: Gains) -> Estimator:
+    """The estimator of a job with some gains."""
+    return estimators(job.system)[job.estimator](fmu, job.system, gains)
 
 
 class Candidate(NamedTuple):
-    """Gains to be judged.
+    """Gains to be evaluated.
 
     Attributes
     ----------
     values : (n,) gains.
     limit : z beyond which the candidate has lost.
-    order : cases to be judged by, the one that decides most often first.
+    order : cases to be evaluated on, the one that decides most often first.
     """
 
     values: Vector
@@ -134,16 +141,16 @@ class Candidate(NamedTuple):
     order: tuple[int, ...]
 
 
-class Verdict(NamedTuple):
-    """Judgement of one candidate.
+class Evaluation(NamedTuple):
+    """What became of one candidate.
 
     Attributes
     ----------
-    z : worst of z_k; infinite if the candidate has lost, failed or finds friction too slowly.
+    z : worst of z_k; infinite if the candidate has lost, failed or finds a quantity too slowly.
     z_k : (k,) of all cases of the job; infinite where not known.
     samples : how many were evaluated.
     unstable : case in which the estimate diverged or the FMU failed; -1 if none.
-    crashed : whether it killed its worker.
+    crashed : whether it killed its worker, or took too long.
     """
 
     z: float
@@ -153,51 +160,64 @@ class Verdict(NamedTuple):
     crashed: bool = False
 
 
-class Bench:
-    """A model and its recordings, ready to judge one candidate after the other."""
+class Evaluator:
+    """A model and its recordings, ready for one candidate after the other."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self._fmu = load_model(job)
-        self._settling = Settling(self._fmu) if np.isfinite(job.friction_left) else None
+        kind, names = estimators(job.system)[job.estimator], list(job.system.columns)
+        self._settling = Settling(self._fmu, job.system, kind) if job.follows else None
+        self._judged = [names.index(name) for name in job.system.objective.weights]
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))
-        self._judge_case(build(job.estimator, self._fmu, job.gains), start, np.inf)
+        self._evaluate_case(build(job, self._fmu, job.gains), start, np.inf)
 
-    def close(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Free the model."""
         self._fmu.close()
 
-    def judge(self, candidate: Candidate) -> Verdict:
-        """Judge a candidate until it has lost, or to the end; none that finds no friction.
+    def evaluate(self, candidate: Candidate) -> Evaluation:
+        """Evaluate a candidate until it has lost, or to the end, and then how fast it follows.
 
         The integral of equation (12) only grows, piece by piece and in floating point too, so what
         is dropped has lost for certain.
         """
         job = self._job
-        gains = from_vector(job.gains, candidate.values)
+        gains = job.gains.with_values(candidate.values)
         z_k = np.full(len(job.recordings), np.inf)
-        estimator = build(job.estimator, self._fmu, gains)
+        estimator = build(job, self._fmu, gains)
         samples = 0
         limit = min(candidate.limit, DIVERGED)
         for k in candidate.order:
-            z, done = self._judge_case(estimator, job.recordings[k], limit)
+            z, done = self._evaluate_case(estimator, job.recordings[k], limit)
             samples += done
             if not z <= limit:
                 nothing = np.full(z_k.size, np.inf)
-                return Verdict(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
+                return Evaluation(np.inf, nothing, samples, -1 if z <= DIVERGED else k)
             z_k[k] = z
         # Last, because few candidates come this far.
-        slow = self._settling is not None and not self._settling.left(gains) < job.friction_left
-        if slow:
-            return Verdict(np.inf, np.full(z_k.size, np.inf), samples, -1)
-        return Verdict(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
+        if self._settling is not None and not self._settling.follows(gains):
+            return Evaluation(np.inf, np.full(z_k.size, np.inf), samples, -1)
+        return Evaluation(float(z_k[list(candidate.order)].max()), z_k, samples, -1)
 
-    def _judge_case(self, estimator: Estimator, case: Recording, limit: float) -> tuple[float, int]:
+    def _evaluate_case(
+        self, estimator: Estimator, case: Recording, limit: float
+    ) -> tuple[float, int]:
         """The z of one case, or the part of it that is beyond the limit, and samples evaluated."""
         z, size = 0.0, case.steps.size
         edges = [size * i // PIECES for i in range(PIECES + 1)]
-        weights, low_pass = self._job.weights.vector, np.zeros((2, 3))
+        objective = self._job.system.objective
+        shares = weights(objective)
+        low_pass, pole = np.zeros((2, shares.size)), corner(objective)
         end = 0
         try:
             estimator.start(case.u[0], case.y[0])
@@ -205,8 +225,10 @@ class Bench:
                 part = slice(begin, end)
                 steps, y = case.steps[part], case.y[part]
                 estimate = estimator.advance(steps, case.u[part], y)
-                deviations = estimate.values[:, _JUDGED] - case.judged[part]
-                z = integrate(z, low_pass, deviations, weights, steps, case.shares[part])
+                deviations = estimate.values[:, self._judged] - case.judged[part]
+                z = integrate(
+                    z, low_pass, deviations, shares, steps, case.shares[part], pole
+                )
                 if not z <= limit:
                     break
         except FMUError:

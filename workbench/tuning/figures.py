@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from workbench.files import replacing
 from workbench.tuning.checkpoint import Generation
 
 
@@ -23,20 +24,23 @@ def draw_convergence(history: Sequence[Generation], path: Path) -> None:
     bottom.legend()
     for axes in (top, bottom):
         axes.grid(alpha=0.3)
-    figure.savefig(path, format="png", dpi=120)
+    with replacing(path) as stream:
+        figure.savefig(stream, format="png", dpi=120)
 
 
-def draw_cases(before: Mapping[str, float], after: Mapping[str, float], path: Path) -> None:
-    """z_k of each case with reasoned and with tuned gains."""
-    names = list(after)
+def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """z_k of each case of a summary with reasoned and with tuned gains."""
+    names = list(cases)
+    before, after = ([one[z] for one in cases.values()] for z in ("z_k_reasoned", "z_k"))
     figure = Figure(figsize=(8, 1.2 + 0.32 * len(names)), layout="constrained")
     axes = figure.subplots()
     rows = np.arange(len(names))
-    axes.barh(rows - 0.2, [before[name] for name in names], 0.4, label="reasoned", color="0.7")
-    axes.barh(rows + 0.2, [after[name] for name in names], 0.4, label="tuned")
-    axes.axvline(max(after.values()), color="0.3", linestyle=":", label="z, tuned")
+    axes.barh(rows - 0.2, before, 0.4, label="reasoned", color="0.7")
+    axes.barh(rows + 0.2, after, 0.4, label="tuned")
+    axes.axvline(max(after), color="0.3", linestyle=":", label="z, tuned")
     axes.set_yticks(rows, names)
     axes.invert_yaxis()
     axes.set_xlabel("z_k [1]")
     axes.legend()
-    figure.savefig(path, format="png", dpi=120)
+    with replacing(path) as stream:
+        figure.savefig(stream, format="png", dpi=120)

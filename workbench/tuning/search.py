@@ -1,4 +1,10 @@
-"""The search: generation after generation of candidates, judged by the workers."""
+"""The search: SciPy's differential evolution, a call for each generation.
+
+Between two calls the state is a population and a number, so that a search can be stopped, stored
+and resumed to the same gains, on any number of workers.
+Source: R. Storn, K. Price (1997), Differential Evolution, J. Global Optimization 11, in SciPy's
+form: best1bin, dither, deferred updating.
+"""
 
 import hashlib
 import json
@@ -8,20 +14,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import Bounds, differential_evolution
+from scipy.stats.qmc import LatinHypercube
 
+from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
-from workbench.tuning.checkpoint import Checkpoint, Generation, load, save
-from workbench.tuning.cost import Candidate, Job, Verdict
-from workbench.tuning.evolution import (
-    Population,
-    first,
-    has_converged,
-    latin_hypercube,
-    propose,
-    select,
-)
-from workbench.tuning.space import SearchSpace, to_vector
-from workbench.tuning.workers import Pool, judge_all
+from workbench.observers import SearchSpace
+from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
+from workbench.tuning.cost import Candidate, Evaluation, Job
+from workbench.tuning.workers import Workers, evaluate_all
 
 SPREAD = 0.1  # of the first candidates about the reasoned gains, as a share of the search space
 TOLERANCE = 1e-3  # spread of z in the population below which more generations gain nothing
@@ -72,19 +73,19 @@ class Search:
 def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> str:
     """Hash of everything that a search depends on, but for its length."""
     digest = hashlib.sha256(job.fmu)
-    what = [job.estimator, dict(job.names), vars(job.weights), job.friction_left, list(cases)]
-    digest.update(json.dumps([*what, plan.population, plan.seed]).encode())
+    what = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
+    digest.update(json.dumps(what).encode())
     for recording in job.recordings:
         digest.update(recording.name.encode())
         for values in recording[2:]:
             digest.update(np.ascontiguousarray(values).tobytes())
-    for values in (to_vector(job.gains), *vars(space).values()):
+    for values in (job.gains.values, *vars(space).values()):
         digest.update(values.tobytes())
     return digest.hexdigest()
 
 
 def search(
-    pool: Pool,
+    pool: Workers,
     job: Job,
     space: SearchSpace,
     cases: Sequence[int],
@@ -99,7 +100,7 @@ def search(
 
     Parameters
     ----------
-    pool : workers equipped with the job.
+    pool : workers prepared with the job.
     cases : numbers of the cases to search on.
     checkpoint : file that is written after every generation.
     resume : go on from it, if it is there.
@@ -111,96 +112,151 @@ def search(
     Search, or None if it was interrupted before there was anything to return.
     """
     mark = identity(job, space, cases, plan)
-    rng = np.random.default_rng(plan.seed)
-    history: list[Generation] = []
-    population: Population | None = None
-    if resume and (before := load(checkpoint, mark)) is not None:
-        population, history = before.population, list(before.history)
-        rng.bit_generator.state = before.rng
+    state = load(checkpoint, mark) if resume else None
     interrupted = False
     try:
-        while population is None or not _is_done(population, history, plan):
+        while state is None or not (state.converged or len(state.history) > plan.generations):
             begin = time.perf_counter()
-            if population is None:
-                size = max(5, plan.population * space.start.size)
-                near = [np.clip(space.start + side * SPREAD, 0.0, 1.0) for side in (-1, 1)]
-                trials = latin_hypercube(size, near[0], near[1], rng)
-                trials[0] = space.start
-                verdicts = _judge(pool, job, space, trials, np.full(size, np.inf), list(cases))
-                population = first(trials, *_values(verdicts))
-            else:
-                trials, order = propose(population, rng)
-                limits = population.z if plan.economy else np.full(len(trials), np.inf)
-                # The case that decides about the best decides about most.
-                hardest = sorted(cases, key=population.z_k[0].__getitem__, reverse=True)
-                verdicts = _judge(pool, job, space, trials, limits, hardest)
-                population = select(population, trials, *_values(verdicts), order)
-            history.append(_generation(job, cases, population, verdicts, begin))
-            state = Checkpoint(mark, population, dict(rng.bit_generator.state), tuple(history))
+            history, population = ((), None) if state is None else (state.history, state.population)
+            objective = _Objective(pool, job, space, cases, plan, population)
+            population, converged = _evolve(objective, space, plan, len(history))
+            history = (*history, _generation(job, cases, population, objective.evaluations, begin))
+            state = Checkpoint(mark, population, converged, history)
             try:
                 save(state, checkpoint)
-            except OSError as error:
-                warn(f"{checkpoint} not written, the one before is kept: {error.strerror}")
+            except InputError as error:
+                warn(f"the checkpoint before is kept: {error}")
             report(history)
     except KeyboardInterrupt:
         interrupted = True
-    if population is None:
+    if state is None:
         return None
+    best = state.population
     return Search(
-        best=space.gains(population.members[0]),
-        coordinates=population.members[0],
-        z=float(population.z[0]),
-        z_k=population.z_k[0][list(cases)],
+        best=space.gains(best.members[0]),
+        coordinates=best.members[0],
+        z=float(best.z[0]),
+        z_k=best.z_k[0][list(cases)],
         cases=tuple(cases),
-        history=tuple(history),
+        history=state.history,
         interrupted=interrupted,
     )
 
 
-def _is_done(population: Population, history: Sequence[Generation], plan: Plan) -> bool:
-    return len(history) > plan.generations or has_converged(population, TOLERANCE)
+class _Objective:
+    """z of all candidates of a generation, called by SciPy in place of `map`.
+
+    It is asked first for the population before, whose z is known, then for a trial beside each
+    member. With deferred updating trial i competes with member i and no other, so that a trial has
+    lost where its z exceeds that of the member.
+
+    Attributes
+    ----------
+    evaluations : of the candidates that were not known.
+    """
+
+    def __init__(
+        self,
+        pool: Workers,
+        job: Job,
+        space: SearchSpace,
+        cases: Sequence[int],
+        plan: Plan,
+        before: Population | None,
+    ) -> None:
+        self._pool, self._job, self._space = pool, job, space
+        self._known: dict[bytes, tuple[float, Vector]] = {}
+        self._limits: Vector | None = None
+        self._order = tuple(cases)
+        self.before = before
+        self.evaluations: list[Evaluation] = []
+        if before is not None:
+            for member, z, z_k in zip(before.members, before.z, before.z_k, strict=True):
+                self._known[member.tobytes()] = float(z), z_k
+            # The case that decides about the best decides about most.
+            self._order = tuple(sorted(cases, key=before.z_k[0].__getitem__, reverse=True))
+            if plan.economy:
+                self._limits = before.z
+
+    def __call__(self, function: object, candidates: Matrix) -> Vector:
+        """Z of candidates (s, n); infinite of those that have lost."""
+        limits = np.full(len(candidates), np.inf) if self._limits is None else self._limits
+        known = [self._known.get(one.tobytes()) for one in candidates]
+        new = [i for i, one in enumerate(known) if one is None]
+        asked = [
+            Candidate(self._space.gains(candidates[i]), float(limits[i]), self._order) for i in new
+        ]
+        found = evaluate_all(self._pool, asked, len(self._job.recordings))
+        self.evaluations += found
+        z = np.array([np.inf if one is None else one[0] for one in known])
+        for i, evaluation in zip(new, found, strict=True):
+            z[i] = evaluation.z
+            # Of equal candidates one may have lost, against a better member.
+            if np.isfinite(evaluation.z):
+                self._known[candidates[i].tobytes()] = evaluation.z, evaluation.z_k
+        return z
+
+    def z_k(self, members: Matrix) -> Matrix:
+        """Objective of members (s, n) in each case, (s, k); infinite of those that failed."""
+        failed = np.inf, np.full(len(self._job.recordings), np.inf)
+        return np.array([self._known.get(one.tobytes(), failed)[1] for one in members])
 
 
-def _judge(
-    pool: Pool,
-    job: Job,
-    space: SearchSpace,
-    trials: Matrix,
-    limits: Vector,
-    order: Sequence[int],
-) -> list[Verdict]:
-    candidates = [
-        Candidate(space.gains(trial), float(limit), tuple(order))
-        for trial, limit in zip(trials, limits, strict=True)
-    ]
-    return judge_all(pool, candidates, len(job.recordings))
+def _evolve(
+    objective: _Objective, space: SearchSpace, plan: Plan, number: int
+) -> tuple[Population, bool]:
+    """Generation `number` from the one before, and whether the search has converged."""
+    rng = np.random.default_rng([plan.seed, number])
+    if objective.before is None:
+        size = max(5, plan.population * space.start.size)  # SciPy's least is 5
+        low, high = (np.clip(space.start + side * SPREAD, 0.0, 1.0) for side in (-1, 1))
+        members = low + LatinHypercube(space.start.size, rng=rng).random(size) * (high - low)
+        members[0] = space.start
+    else:
+        members = objective.before.members
+    found = differential_evolution(
+        _alone,
+        Bounds(np.zeros(space.start.size), np.ones(space.start.size)),
+        init=members,
+        maxiter=min(number, 1),
+        tol=TOLERANCE,
+        rng=rng,
+        polish=False,
+        updating="deferred",
+        workers=objective,  # type: ignore[arg-type]  # it is a map of one function
+    )
+    population = Population(
+        found.population, found.population_energies, objective.z_k(found.population)
+    )
+    return population, bool(found.success)
 
 
-def _values(verdicts: Sequence[Verdict]) -> tuple[Vector, Matrix]:
-    return np.array([v.z for v in verdicts]), np.array([v.z_k for v in verdicts])
+def _alone(candidate: Vector) -> float:
+    """Stand for the objective of one candidate; `_Objective` evaluates a generation at once."""
+    raise NotImplementedError
 
 
 def _generation(
     job: Job,
     cases: Sequence[int],
     population: Population,
-    verdicts: Sequence[Verdict],
+    evaluations: Sequence[Evaluation],
     begin: float,
 ) -> Generation:
     names = [recording.name for recording in job.recordings]
     z_k = population.z_k[0]
     hardest = sorted(cases, key=z_k.__getitem__, reverse=True)
     worst, second = hardest[0], hardest[min(1, len(hardest) - 1)]
-    unstable = [v.unstable for v in verdicts]
+    unstable = [one.unstable for one in evaluations]
     return Generation(
         z=float(population.z[0]),
         worst=names[worst],
         second=names[second],
         margin=float(1.0 - z_k[second] / z_k[worst]) if np.isfinite(z_k[worst]) else 0.0,
-        candidates=len(verdicts),
-        samples=sum(v.samples for v in verdicts),
-        of=len(verdicts) * sum(job.recordings[k].steps.size for k in cases),
+        candidates=len(evaluations),
+        samples=sum(one.samples for one in evaluations),
+        of=len(evaluations) * sum(job.recordings[k].steps.size for k in cases),
         unstable={names[k]: unstable.count(k) for k in cases if k in unstable},
-        crashed=sum(v.crashed for v in verdicts),
+        crashed=sum(one.crashed for one in evaluations),
         seconds=time.perf_counter() - begin,
     )

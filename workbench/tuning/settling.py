@@ -1,76 +1,50 @@
-"""How fast a tuned observer finds the friction of the pads, by its linearisation.
+"""How fast a tuned observer finds a quantity, by its linearisation.
 
-z judges speeds and force. An observer may have them right by correcting its speeds directly, while
-its friction drifts behind, and friction is what it is asked for. Such candidates are refused.
+z judges what is measured. An observer may have that right by correcting its states directly, while
+its quantities drift behind, and they are what it is asked for. Such candidates are refused.
 """
 
 import numpy as np
 from scipy.linalg import expm
 
-from workbench.fmu import FMU, Matrix
-from workbench.observers import DisturbanceGains, FilterNoise, OperatingPoint, ParameterGains
-from workbench.observers.disturbance import hold_in_equilibrium
-from workbench.tuning.space import Gains
+from workbench.fmu import FMU
+from workbench.observers import Estimator, Gains
+from workbench.observers.operating import linearised
+from workbench.system import System
 
-SETTLED = 0.05  # share of a step of friction that may be left
-HALF_SECOND = 0.5  # [s] within which a force is to be followed
-LATER = 4  # half seconds, when what a leak takes shows
+LATER = 4  # times the time that is allowed, when what a leak takes shows
 
 
 class Settling:
-    """Error of muDC after a step of it, from the model linearised at light service braking.
+    """Error of a quantity after a step of it, from the model linearised at the design point.
 
     Parameters
     ----------
     fmu : the estimator's model; its state is left at the operating point.
+    kind : of estimator.
     """
 
-    def __init__(self, fmu: FMU) -> None:
-        hold_in_equilibrium(fmu, OperatingPoint())
-        self._speeds = [fmu.states.index(name) for name in ("omegaW", "omegaR")]
-        self._A = fmu.state_jacobian()
-        self._B = fmu.input_jacobian(fmu.variables(["dmuWR", "dmuDC"]))
+    def __init__(self, fmu: FMU, system: System, kind: type[Estimator]) -> None:
+        self._model = linearised(fmu, system).of(kind.acts_on(fmu, system))
+        self._kind, self._asked = kind, system.following
+        self._names = [one.name for one in system.estimated]
 
     def left(self, gains: Gains) -> float:
-        """Share of the step that is not found after half a second or two, the larger [1].
+        """Share of the step that is not found after the time allowed or later, the larger [1].
 
-        A Kalman filter makes its gains as it goes and is not judged.
+        A method that makes its gains as it goes is not judged.
         """
-        match gains:
-            case DisturbanceGains():
-                dynamics, error = self._disturbance_observer(gains)
-            case ParameterGains():
-                dynamics, error = self._parameter_estimator(gains)
-            case FilterNoise():
-                return 0.0
-        transition = expm(dynamics * HALF_SECOND)
+        model, asked = self._model, self._asked
+        found = self._kind.error_dynamics(model.A, model.B, model.C, gains)
+        if found is None or asked is None:
+            return 0.0
+        dynamics, error = found
+        quantity = self._names.index(asked.quantity)
+        transition = expm(dynamics * asked.within)
         later = np.linalg.matrix_power(transition, LATER)
-        return max(abs(float(error @ after[:, -1])) for after in (transition, later))
+        column = quantity - len(self._names)
+        return max(abs(float(error[quantity] @ one[:, column])) for one in (transition, later))
 
-    def _disturbance_observer(self, gains: DisturbanceGains) -> tuple[Matrix, Matrix]:
-        """Errors of speeds, estimated frictions, integrals of dy, true frictions: d/dt of all."""
-        order = np.ix_(self._speeds, self._speeds)
-        A, B, zero = self._A[order], self._B[self._speeds], np.zeros((2, 2))
-        L, T = gains.L, np.diag([gains.T_WR, gains.T_DC])
-        dynamics = np.block(
-            [
-                [A - L[:2, :2], -B, -L[:2, 2:], B],
-                [L[2:, :2], T, L[2:, 2:], zero],
-                [np.eye(2), zero, zero, zero],
-                [zero, zero, zero, zero],
-            ]
-        )
-        return dynamics, np.array([0, 0, 0, -1.0, 0, 0, 0, 1.0])
-
-    def _parameter_estimator(self, gains: ParameterGains) -> tuple[Matrix, Matrix]:
-        """Errors of states, integrals of dy, true frictions; the estimate is L [dy, integral]."""
-        n = len(self._A)
-        C = np.zeros((2, n))
-        C[[0, 1], self._speeds] = 1.0
-        estimate = np.hstack([gains.L[:, :2] @ C, gains.L[:, 2:], np.zeros((2, 2))])
-        truth = np.hstack([np.zeros((2, n + 2)), np.eye(2)])
-        dynamics = np.zeros((n + 4, n + 4))
-        dynamics[:n, :n] = self._A
-        dynamics[:n] += self._B @ (truth - estimate)
-        dynamics[n : n + 2, :n] = C
-        return dynamics, (truth - estimate)[1]
+    def follows(self, gains: Gains) -> bool:
+        """Whether a step is found in time, as the system asks."""
+        return self._asked is None or self.left(gains) < self._asked.left

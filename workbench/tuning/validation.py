@@ -1,20 +1,18 @@
 """What tuned gains are worth: on cases they have not seen, and each gain by itself."""
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from workbench.case import Case
-from workbench.cosim import observe
+from workbench.cosim import replay
 from workbench.fmu import Matrix, Vector
 from workbench.objective import score
-from workbench.observers import ExtendedKalmanFilter, FilterNoise
-from workbench.tuning.cost import DIVERGED, Bench, Candidate, Job, load_model
+from workbench.observers import SearchSpace, estimators
+from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, build, load_model
 from workbench.tuning.search import Search
-from workbench.tuning.space import SearchSpace, build, from_vector, gain_names, to_vector
-from workbench.tuning.workers import Pool, judge_all
+from workbench.tuning.workers import Workers, evaluate_all
 
 STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
 NEGLIGIBLE = 0.01  # relative change of z that does not matter
@@ -31,8 +29,8 @@ class Fold:
     tuned : worst z_k over them with gains tuned on the others.
     reasoned : the same with untuned gains.
     z : worst z_k over the cases that were tuned on.
-    force, force_reasoned : worst error of the creep force over the cases left out, rms over mean
-        below 5 Hz [1], with tuned and with untuned gains; nan where it cannot be judged.
+    error, error_reasoned : worst error of the judged signal over the cases left out, rms over mean
+        [1], with tuned and with untuned gains; nan where it cannot be judged.
     """
 
     cases: tuple[str, ...]
@@ -40,8 +38,8 @@ class Fold:
     tuned: float
     reasoned: float
     z: float
-    force: float
-    force_reasoned: float
+    error: float
+    error_reasoned: float
 
 
 @dataclass(frozen=True)
@@ -66,35 +64,44 @@ class Sensitivity:
         return max(abs(self.less), abs(self.more), abs(self.without)) > NEGLIGIBLE
 
 
-def judge_gains(pool: Pool, job: Job, gains: Sequence[Vector]) -> Matrix:
+def evaluate_gains(pool: Workers, job: Job, gains: Sequence[Vector]) -> Matrix:
     """z_k of gains in all cases, (g, k); infinite in all where an estimate diverges."""
     order = tuple(range(len(job.recordings)))
     candidates = [Candidate(values, np.inf, order) for values in gains]
-    return np.array([verdict.z_k for verdict in judge_all(pool, candidates, len(order))])
+    return np.array([one.z_k for one in evaluate_all(pool, candidates, len(order))])
 
 
-def untuned_filter(job: Job) -> Vector:
-    """z_k of an EKF with the noise levels of the sensors, which nobody tuned, (k,)."""
-    kalman = replace(
-        job, estimator=ExtendedKalmanFilter.name, gains=FilterNoise(), friction_left=np.inf
-    )
+def untuned_filters(job: Job) -> dict[str, Vector]:
+    """z_k, (k,), of the simplest method that makes its gains as it goes, which nobody tuned.
+
+    It is left out where such a method is what is tuned.
+    """
+    known, system = estimators(job.system), job.system
+    with load_model(job) as fmu:
+        makes = {
+            name: kind.reasoned(fmu, system)
+            for name, kind in known.items()
+            if kind.tunable and kind.adapts
+        }
+    if not makes or job.estimator in makes:
+        return {}
+    name, gains = next(iter(makes.items()))
     order = tuple(range(len(job.recordings)))
-    with closing(Bench(kalman)) as bench:
-        return bench.judge(Candidate(to_vector(FilterNoise()), np.inf, order)).z_k
+    with Evaluator(replace(job, estimator=name, gains=gains, follows=False)) as evaluator:
+        return {name: evaluator.evaluate(Candidate(gains.values, np.inf, order)).z_k}
 
 
-def force_errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
-    """Error of the creep force by gains in each case, (g, k), as `Score.Fx_nrmse` [1].
+def errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
+    """Error of the judged signal by gains in each case, (g, k), as `Score.nrmse` [1].
 
     nan where a run failed or a case cannot be judged.
     """
     with load_model(job) as fmu:
-        radius = fmu.defaults["rR"]
-        errors = [
-            [score(case, observe(case, one), radius, job.weights).Fx_nrmse for case in cases]
-            for one in (build(job.estimator, fmu, from_vector(job.gains, g)) for g in gains)
+        found = [
+            [score(case, replay(case, one), job.system).nrmse for case in cases]
+            for one in (build(job, fmu, job.gains.with_values(g)) for g in gains)
         ]
-    return np.array(errors, dtype=float)
+    return np.array(found, dtype=float)
 
 
 def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
@@ -109,7 +116,7 @@ def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
 
 
 def cross_validate(
-    pool: Pool,
+    pool: Workers,
     job: Job,
     cases: Sequence[Case],
     reasoned: Vector,
@@ -131,10 +138,10 @@ def cross_validate(
         found = tune(number, [k for k in everything if k not in held_out])
         if found is None or found.interrupted:
             break
-        tuned, untuned = judge_gains(pool, job, [found.best, reasoned])
+        tuned, untuned = evaluate_gains(pool, job, [found.best, reasoned])
         names = tuple(dict.fromkeys(job.recordings[k].stop for k in held_out))
         left_out = [case for case in cases if case.name in names]
-        force, force_untuned = force_errors(job, left_out, [found.best, reasoned]).max(axis=1)
+        error, error_untuned = errors(job, left_out, [found.best, reasoned]).max(axis=1)
         worst = max(held_out, key=lambda k: float(tuned[k]))
         results.append(
             Fold(
@@ -143,16 +150,16 @@ def cross_validate(
                 tuned=float(tuned[worst]),
                 reasoned=float(untuned[list(held_out)].max()),
                 z=found.z,
-                force=float(force),
-                force_reasoned=float(force_untuned),
+                error=float(error),
+                error_reasoned=float(error_untuned),
             )
         )
     return results
 
 
-def sensitivities(pool: Pool, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
+def sensitivities(pool: Workers, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
     """Change one gain after the other."""
-    names = gain_names(job.gains)
+    names = job.gains.names
     changed: list[Vector] = []
     for i in range(len(names)):
         for step in (-STEP, STEP):
@@ -162,7 +169,7 @@ def sensitivities(pool: Pool, job: Job, space: SearchSpace, found: Search) -> li
         without = found.best.copy()
         without[i] = 0.0
         changed.append(without)
-    z = judge_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
+    z = evaluate_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
     change = np.where(z < DIVERGED, z / found.z - 1.0, np.inf).reshape(-1, 3)
     return [
         Sensitivity(name, float(less), float(more), float(without))

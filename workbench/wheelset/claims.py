@@ -9,12 +9,11 @@ muWR on dry rails only.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, instance, place, read
+from workbench.kernel import checked, compiled, instance, place, read
 from workbench.system import System
 
 # From here on 0.01 in muWR changes the force of a wheel by some 100 N, the noise of a load cell.
@@ -24,7 +23,7 @@ _FASTEST = 100.0  # [m/s]
 _CREEPAGES = np.geomspace(1e-4, 1.0, 80)  # from elastic creep to a locked wheel
 
 
-@njit(cache=True)
+@compiled
 def _scan(model, order, radii, nominal, grid, peaks):  # type: ignore[no-untyped-def]
     """Force and slip at the peak into peaks, (speeds, frictions, 2); returns a status."""
     speeds, frictions, creepages = grid

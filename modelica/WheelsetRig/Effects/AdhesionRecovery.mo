@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model AdhesionRecovery "Contact that sliding cleans"
+model AdhesionRecovery "A rail that slip cleans"
   extends Contact.PartialAdhesion;
   parameter Real gain(unit="1", min=-0.5, max=3.0) = 0.0 "Relative change when clean";
   parameter Units.Energy Er(min=50e3, max=1e6) = 250e3 "Energy of slip that leaves 1/e of the dirt";
@@ -7,7 +7,12 @@ model AdhesionRecovery "Contact that sliding cleans"
 equation
   mu0 = level*(1.0 + gain*kappa);
   der(kappa) = (1.0 - kappa)*abs(Fx*w)/Er;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="gain", step=0.05, matters=0.05,
+      shapes(Er={0.1e6, 0.25e6, 0.5e6}),
+      separation="a slip sweep by the drive at constant speed, up and down")),
+    Documentation(info="<html>
 <p><code>mu0 = level*(1 + gain*kappa)</code>, <code>der(kappa) = (1 - kappa)*|Fx*w|/Er</code>: the
 energy of slip of one wheel cleans the contact, so a second slide bears more. Er is 50 to 500
 kJ.</p>

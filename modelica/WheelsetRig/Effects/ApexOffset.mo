@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model ApexOffset "Wheelset that does not stand on the apex of the roller"
+model ApexOffset "A wheelset that stands beside the apex of the roller"
   extends Sensors.PartialForceSensor;
   parameter Units.Length offset(min=-0.005, max=0.005) = 0.0 "Of the contact along x";
   parameter Units.Force Q0(min=1000.0) = 80000.0 "Wheel load";
@@ -7,7 +7,11 @@ model ApexOffset "Wheelset that does not stand on the apex of the roller"
   parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
 equation
   reading = F + 2.0*Q0/(rW + rR)*offset;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="offset", step=2e-4, matters=1.5e-4, after="FxOffset",
+      separation="a step of the vertical load by 10 %")),
+    Documentation(info="<html>
 <p><code>reading = F + 2*Q0*offset/(rW + rR)</code>: both wheels lean on a slope, 138 N per mm on
 the load cells, at any speed and in either direction.</p>
 <h4>Limits</h4>

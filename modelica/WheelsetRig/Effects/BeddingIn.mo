@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model BeddingIn "Pad friction that grows during the first seconds of contact"
+model BeddingIn "Pad friction that is low in the first seconds of contact"
   extends Brakes.PartialPadFriction;
   parameter Real loss(unit="1", min=-0.2, max=0.4) = 0.0 "Share of friction lost at first contact";
   parameter Real tau(unit="s", min=0.5, max=4.0) = 2.0 "Time constant";
@@ -8,7 +8,12 @@ model BeddingIn "Pad friction that grows during the first seconds of contact"
 equation
   mu = level*(1.0 - loss*exp(-contact/tau));
   der(contact) = tanh(Fperp/F0);
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="loss", step=0.01, matters=0.01,
+      shapes(tau={0.7, 1.4, 2.0, 3.0}),
+      separation="dry stops from two pressures: time against energy")),
+    Documentation(info="<html>
 <p><code>mu = level*(1 - loss*exp(-t/tau))</code>, t the time of contact; loss -0.1 to 0.2, tau 0.5
 to 4 s. It repeats in dry stops and follows time, where a film of water follows energy.</p>
 <h4>Limits</h4>

@@ -16,7 +16,11 @@ equation
   // (v^2 + 0.1^2)^0.4 for |v|^0.8: its slope stays finite at standstill.
   cooling = 20.0 + 5.0*((circumferential*v)^2 + 0.01)^0.4;
   C*der(T) = share*mu*Fperp*abs(v) - cooling*(T - TAmbient);
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="fade", step=3e-5, matters=3e-5,
+      separation="stops repeated without cooling, then one after 20 minutes")),
+    Documentation(info="<html>
 <p><code>mu = level*(1 - fade*(T - TRef))</code>, fade 0 to 1e-3 per kelvin. The disc is one lump of
 steel of 1 m2, heated by its own friction, <code>C*der(T) = share*mu*Fperp*|v| - h(v)*(T -
 TAmbient)</code>, with <code>h = 20 + 5*v^0.8</code> W/m2/K at the circumferential speed of the

@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model CaliperHysteresis "Caliper whose friction opposes the motion of the pads"
+model CaliperHysteresis "Friction in the caliper"
   extends Brakes.PartialCylinder;
   parameter Real share(unit="1", min=0.0, max=0.15) = 0.0
     "Share of force lost after a rise of pressure, gained after a fall";
@@ -20,7 +20,12 @@ equation
   side = noEvent(max(-1.0, min(1.0, (felt - centre)/play)));
   p = pB - share*side*noEvent(max(0.0, pB - p0));
   rest = restBefore;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="share", step=0.01, matters=0.02,
+      falling(signal="pB", because="brake pressure never falls in these stops"),
+      separation="drag braking at constant roller speed, with a staircase of pressure up and down")),
+    Documentation(info="<html>
 <p><code>p - p0 = (pB - p0)*(1 - share*side)</code>. <code>side</code> is the place within a play of
 width <code>2*play</code>: 1 after a rise, -1 after a fall, kept while the pressure holds. Noise of
 a measured pressure would push the play along, a little with each peak: it is averaged over

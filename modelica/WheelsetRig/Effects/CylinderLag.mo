@@ -11,7 +11,11 @@ equation
   T*der(past) = pB - past;
   p = pB - lag*der(past);
   rest = restBefore;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="lag", step=0.005, matters=0.003,
+      separation="a sine on the pressure at constant speed")),
+    Documentation(info="<html>
 <p><code>p = pB - lag*der(past)</code>, <code>T*der(past) = pB - past</code>, <code>T^2 = lag^2 +
 window^2</code>: a lag of first order where <code>lag</code> is well above <code>window</code>,
 exactly nothing at zero. On a ramp the pads are late by <code>lag</code> at any size; on a step the

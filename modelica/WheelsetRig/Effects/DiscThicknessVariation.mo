@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model DiscThicknessVariation "Pad friction that varies with the angle of the disc"
+model DiscThicknessVariation "Discs of uneven thickness"
   extends Brakes.PartialPadFriction;
   parameter Real cosine(unit="1", min=-0.1, max=0.1) = 0.0 "Relative amplitude, part of cos";
   parameter Real sine(unit="1", min=-0.1, max=0.1) = 0.0 "Relative amplitude, part of sin";
@@ -9,7 +9,11 @@ model DiscThicknessVariation "Pad friction that varies with the angle of the dis
 equation
   mu = level*(1.0 + cosine*cos(order*phi) + sine*sin(order*phi));
   der(phi) = v/rB;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size={"cosine", "sine"}, step=0.002, matters=0.001,
+      separation="order tracking in a slow run-down, with and without brake")),
+    Documentation(info="<html>
 <p><code>mu = level*(1 + cosine*cos(n*phi) + sine*sin(n*phi))</code>, <code>der(phi) = v/rB</code>.
 Thickness modulates the force of the pads, hot spots (order 4 to 12) their friction: 0.5 to 5 %. The
 torque's ripple follows pressure, not speed, and is absent without brake.</p>

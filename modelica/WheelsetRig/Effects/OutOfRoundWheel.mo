@@ -1,6 +1,6 @@
 within WheelsetRig.Effects;
-model OutOfRoundWheel "Wheel whose radius varies with its angle"
-  extends Quantities.PartialQuantity;
+model OutOfRoundWheel "A wheel that is out of round"
+  extends Quantities.PartialWheelRadius;
   parameter Units.Length cosine(min=-1e-3, max=1e-3) = 0.0 "Amplitude, part of cos";
   parameter Units.Length sine(min=-1e-3, max=1e-3) = 0.0 "Amplitude, part of sin";
   parameter Real order(unit="1", min=1.0, max=20.0) = 1.0 "Periods per turn";
@@ -8,7 +8,11 @@ model OutOfRoundWheel "Wheel whose radius varies with its angle"
 equation
   actual = nominal + cosine*cos(order*phi) + sine*sin(order*phi);
   der(phi) = omega;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size={"cosine", "sine"}, step=2e-5, matters=1e-5,
+      separation="order tracking in a slow run-down, with and without brake")),
+    Documentation(info="<html>
 <p><code>actual = nominal + cosine*cos(n*phi) + sine*sin(n*phi)</code>, order 1: 0.05 to 0.5 mm, 2
 to 20: 5 to 30 um. The wheelset must follow the radius, so the creep force ripples with
 <code>v^2</code>, also without brake.</p>

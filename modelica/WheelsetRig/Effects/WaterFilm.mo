@@ -1,5 +1,5 @@
 within WheelsetRig.Effects;
-model WaterFilm "Pad friction that water on the discs lowers until it has dried"
+model WaterFilm "Water on all discs, until their friction has dried it"
   extends Brakes.PartialPadFriction;
   parameter Real film(unit="1", min=0.0, max=1.2) = 0.0 "Film at the start, 1 on a wet disc";
   parameter Units.FrictionCoefficient muWet = 0.12 "Friction of a wet disc";
@@ -13,7 +13,13 @@ equation
   loss = (level - muWet)*film*exp(-E/E0);
   mu = level - wet*loss;
   der(E) = (level - loss)*Fperp*abs(v);
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="film", step=0.03, matters=0.02,
+      shapes(E0={0.1e6, 0.3e6, 0.45e6, 1e6}),
+      where(condition="discs", is="wet", share="wet"),
+      separation="venting the brake units one by one")),
+    Documentation(info="<html>
 <p><code>level - loss</code> is the friction of a wet disc, between dry and wet by the share of the
 film that is left, <code>film*exp(-E/E0)</code>; <code>mu</code> is the mean of all discs. The film
 leaves with friction energy, <code>der(E) = (level - loss)*Fperp*|v|</code>, not with time: at low

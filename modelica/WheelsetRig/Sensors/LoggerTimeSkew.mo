@@ -1,12 +1,16 @@
 within WheelsetRig.Sensors;
-model LoggerTimeSkew "Speed from a logger whose clock is late"
+model LoggerTimeSkew "A logger of the speeds whose clock is late"
   extends PartialSpeedSensor;
   parameter Real skew(unit="s", min=-0.05, max=0.05) = 0.0 "Time by which the clock is late";
 protected
   SpeedSignalDelay late(omega=omega, delay=skew) "The reading is late";
 equation
   reading = late.reading;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size="skew", step=0.001, matters=0.001, slots={"speedSensorW", "speedSensorR"},
+      separation="a step of the drive's torque, compared with steady braking")),
+    Documentation(info="<html>
 <p>As <code>SpeedSignalDelay</code>, for each sensor on the same logger: all of them have the same
 <code>skew</code>.</p>
 </html>"));

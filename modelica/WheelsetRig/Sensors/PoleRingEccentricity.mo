@@ -1,5 +1,5 @@
 within WheelsetRig.Sensors;
-model PoleRingEccentricity "Speed sensor whose pole ring runs out of true"
+model PoleRingEccentricity "An eccentric pole ring of the wheelset's speed sensor"
   extends PartialSpeedSensor;
   parameter Real cosine(unit="1", min=-0.01, max=0.01) = 0.0 "Relative amplitude, part of cos";
   parameter Real sine(unit="1", min=-0.01, max=0.01) = 0.0 "Relative amplitude, part of sin";
@@ -8,7 +8,11 @@ model PoleRingEccentricity "Speed sensor whose pole ring runs out of true"
 equation
   reading = omega*(1.0 + cosine*cos(order*phi) + sine*sin(order*phi));
   der(phi) = omega;
-  annotation (Documentation(info="<html>
+  annotation (
+    __Workbench(effect(
+      size={"cosine", "sine"}, step=1e-4, matters=5e-5, slots={"speedSensorW"},
+      separation="order tracking in a slow run-down, with and without brake")),
+    Documentation(info="<html>
 <p><code>reading = omega*(1 + cosine*cos(n*phi) + sine*sin(n*phi))</code>. An eccentricity of 0.05
 to 0.3 mm at a ring of 60 to 120 mm gives 0.05 to 0.3 %. The reading of one sensor ripples and
 nothing else.</p>

@@ -25,7 +25,7 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
   end Cylinder;
 
   model WheelRadius "Chain of all effects on the wheel radius"
-    extends Quantities.PartialQuantity;
+    extends Quantities.PartialWheelRadius;
     Effects.WheelRadius wear(nominal=nominal, omega=omega);
     Effects.OutOfRoundWheel shape(nominal=wear.actual, omega=omega);
   equation

@@ -26,9 +26,7 @@ def by_fmpy(
         yield partial(LOOPS[estimator], model, gains)
 
 
-def by_c(
-    estimator: str, fmu: FMU, system: System, gains: Gains
-) -> Callable[..., object] | None:
+def by_c(estimator: str, fmu: FMU, system: System, gains: Gains) -> Callable[..., object] | None:
     """The loop of an estimator in plain C, where there is one; it needs the extra [compiler]."""
     if estimator != "disturbance_observer":
         return None

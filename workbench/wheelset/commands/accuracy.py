@@ -6,9 +6,10 @@ from contextlib import ExitStack
 from importlib.metadata import version
 
 from workbench.case import read_cases
-from workbench.commands.arguments import Commands, add_recordings, add_system
+from workbench.commands.arguments import Commands, add_recordings, add_system, nearby
 from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
+from workbench.resources import cases as own_cases
 from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import StopAccuracy, observe_stop, read_truth, stop_accuracy
 from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
@@ -16,6 +17,7 @@ from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
+    own = nearby(own_cases())
     accuracy = commands.add_parser(
         "accuracy",
         description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
@@ -26,7 +28,8 @@ def add(commands: Commands) -> None:
         "  python -m workbench accuracy\n"
         "  python -m workbench rig --seed 1 --out /tmp/rig\n"
         "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
-        "  python -m workbench accuracy cases/09_wet_160_4.2_wsp --estimator ekf --estimator ukf",
+        f"  python -m workbench accuracy {own}/09_wet_160_4.2_wsp --estimator ekf "
+        "--estimator ukf",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(accuracy, out="results/accuracy")

@@ -3,13 +3,15 @@
 import argparse
 import dataclasses
 import os
-import signal
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.commands.arguments import Commands, add_system, positive
 from workbench.fmu import CoSimulation
+from workbench.pool import Pool
 from workbench.systems import load_system
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
@@ -134,30 +136,18 @@ def _rig(options: argparse.Namespace) -> int:
     scenarios = select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
-    folders = {scenario.name: options.out / scenario.name for scenario in scenarios}
-    check_files(folders.values(), options.rate)
+    check_files([options.out / scenario.name for scenario in scenarios], options.rate)
     fmu = options.fmu or load_system(options.system).model("reference").path
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
     done = 0
     interrupted = False
-    # Workers leave Ctrl-C to this process: a stop that is under way is finished and kept.
-    ignore = (signal.SIGINT, signal.SIG_IGN)
+    order = _Order(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
+    # A stop that is under way at Ctrl-C is finished and kept, in a process even if it is alone.
     workers = min(options.workers, len(scenarios))
-    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignore) as pool:
-        tasks = [
-            pool.submit(
-                _make,
-                s,
-                effects,
-                options.seed,
-                (options.rate, options.truth_every),
-                fmu,
-                folders[s.name],
-            )
-            for s in scenarios
-        ]
+    with Pool(workers, nullcontext, order, isolated=True) as pool:
+        tasks = [pool.submit(_make, scenario) for scenario in scenarios]
         try:
             for task in as_completed(tasks):
                 line = task.result()
@@ -170,23 +160,27 @@ def _rig(options: argparse.Namespace) -> int:
                 )
         except KeyboardInterrupt:
             interrupted = True
-            pool.shutdown(cancel_futures=True)
+            pool.finish()
     kept = sum(task.done() and not task.cancelled() for task in tasks)
     print(f"{kept} of {len(tasks)} cases in {options.out}")
     return 130 if interrupted else 0
 
 
-def _make(
-    scenario: Scenario,
-    effects: Effects,
-    seed: int,
-    sampling: tuple[int, int],
-    fmu: Path,
-    folder: Path,
-) -> str:
-    """Make and write one case, in a process of its own; returns a line for people."""
-    rate, every = sampling
-    stop = simulate(scenario, seed, effects, fmu)
-    write_recording(stop, effects, rate, folder, every)
+@dataclass(frozen=True)
+class _Order:
+    """What is made of every scenario; see `simulate` and `write_recording`."""
+
+    effects: Effects
+    seed: int
+    rate: int
+    every: int
+    fmu: Path
+    out: Path
+
+
+def _make(order: _Order, scenario: Scenario) -> str:
+    """Make and write one case; returns a line for people."""
+    stop = simulate(scenario, order.seed, order.effects, order.fmu)
+    write_recording(stop, order.effects, order.rate, order.out / scenario.name, order.every)
     seconds = stop.standstill - stop.drawn.coasting
     return f"{scenario.name:<26} stopped in {seconds:5.1f} s"

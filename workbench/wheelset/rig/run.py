@@ -9,7 +9,13 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import CoSimulation, Vector
-from workbench.wheelset.rig.brake import DEAD_TIME, PROTECTION_PERIOD, Brake, Valve, WheelSlideProtection
+from workbench.wheelset.rig.brake import (
+    DEAD_TIME,
+    PROTECTION_PERIOD,
+    Brake,
+    Valve,
+    WheelSlideProtection,
+)
 from workbench.wheelset.rig.drive import Drive, Losses
 from workbench.wheelset.rig.effects import Effects
 from workbench.wheelset.rig.pads import FRICTION, Pads

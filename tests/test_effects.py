@@ -1,0 +1,289 @@
+"""Effects describe themselves: read from the wheelset's library, and from one of another field."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.__main__ import main
+from workbench.compiler.flat import flatten
+from workbench.diagnosis import Effect, read_effects
+from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.slots import read_slots
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.modelica import Library, read_library
+
+ROOT = Path(__file__).parent.parent
+WHEELSET = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
+EFFECTS = read_effects(WHEELSET, "MinimalObserver")
+
+TANK = """package Tank "A tank that runs out"
+  partial model PartialOutflow "Slot: from level to flow"
+    input Real h(unit="m") "Level";
+    output Real q(unit="m3/s") "Flow";
+    output Real P(unit="W") "Power of the flow";
+  equation
+    P = 9810.0*q*h;
+  end PartialOutflow;
+
+  model Orifice "Null version: Torricelli's law"
+    extends PartialOutflow;
+    parameter Real a(unit="m2") = 1e-3 "Area";
+  equation
+    q = a*sqrt(2.0*9.81*h);
+  end Orifice;
+
+  model Clogging "An orifice that is narrower than drawn"
+    extends PartialOutflow;
+    parameter Real share(unit="1", min=0.0, max=0.9) = 0.0 "Of the area";
+    Orifice drawn(h=h) "As drawn";
+  equation
+    q = (1.0 - share)*drawn.q;
+    annotation (__Workbench(effect(
+      size="share", step=0.01, matters=0.02, separation="a look into the orifice")));
+  end Clogging;
+
+  model Leak "A leak at the bottom"
+    extends PartialOutflow;
+    parameter Real area(unit="m2", min=0.0, max=1e-3) = 0.0 "Of the leak";
+    Orifice drawn(h=h) "As drawn";
+  equation
+    q = drawn.q + area*sqrt(2.0*9.81*h);
+    annotation (__Workbench(effect(
+      size="area", step=1e-5, matters=2e-5, separation="a dry floor")));
+  end Leak;
+
+  partial model PartialGauge "Slot: from level to reading"
+    input Real level(unit="m") "True level";
+    output Real reading(unit="m") "What the gauge reads";
+  end PartialGauge;
+
+  model TrueGauge "Null version: the gauge reads the truth"
+    extends PartialGauge;
+  equation
+    reading = level;
+  end TrueGauge;
+
+  model GaugeOffset "A gauge whose zero is wrong"
+    extends PartialGauge;
+    parameter Real offset(unit="m", min=-1.0, max=1.0) = 0.0 "Reading when empty";
+  equation
+    reading = level + offset;
+    annotation (__Workbench(effect(
+      size="offset", step=0.01, matters=0.01, separation="an empty tank")));
+  end GaugeOffset;
+
+  model GaugeGain "A gauge with a wrong gain"
+    extends PartialGauge;
+    parameter Real gain(unit="1", min=-0.5, max=0.5) = 0.0 "Relative change";
+  equation
+    reading = (1.0 + gain)*level;
+    annotation (__Workbench(effect(
+      size="gain", step=0.01, matters=0.01, separation="two levels", after="GaugeOffset")));
+  end GaugeGain;
+
+  model Base "A tank"
+    parameter Real A(unit="m2", min=0.1) = 2.0 "Area";
+    input Real inflow(unit="m3/s") "Flow in";
+    output Real h(unit="m", start=1.0, fixed=true) "Level";
+    output Real reading(unit="m") = gauge.reading "Reading of the gauge";
+    replaceable Orifice orifice(h=h) constrainedby PartialOutflow(h=h) "Outflow";
+    replaceable TrueGauge gauge(level=h) constrainedby PartialGauge(level=h) "Gauge";
+  equation
+    A*der(h) = inflow - orifice.q;
+  end Base;
+end Tank;
+"""
+
+
+def tank(folder: Path, *changes: tuple[str, str]) -> Library:
+    """A library of one file, with changes."""
+    text = TANK
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    file = folder / "Tank.mo"
+    file.write_text(text)
+    return read_library(file)
+
+
+# --- the wheelset ---
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_every_effect_has_a_claim_that_gives_it_a_size(effect: Effect) -> None:
+    """A class with an annotation is an effect, and is found here without being listed."""
+    redeclared = re.compile(rf"\b{effect.name} \w+\([^;]*\b({'|'.join(effect.sizes)})\s*=")
+    claims = [
+        one.name
+        for one in WHEELSET.classes.values()
+        if one.name.startswith("WheelsetRig.Tests.")
+        for component in one.components
+        if (
+            WHEELSET.resolve(component.type, one.name) == effect.model
+            and not component.modifier.inner.keys().isdisjoint(effect.sizes)
+        )
+        or any(redeclared.search(key) for key in component.modifier.inner)
+    ]
+    assert claims
+
+
+def test_slots_follow_from_the_class_that_an_effect_extends() -> None:
+    slots = {effect.name: effect.slots for effect in EFFECTS}
+    assert slots["BrakeFade"] == ("padFriction",)
+    assert slots["SingleDiscWaterFilm"] == ("padFriction",)  # which extends WaterFilm
+    assert slots["OutOfRoundWheel"] == slots["WheelRadius"] == ("wheelRadius",)
+    assert slots["DriveTorqueGain"] == ("driveTorque",)
+    assert slots["ApexOffset"] == ("forceSensor",)
+
+
+def test_of_several_slots_of_one_class_an_effect_names_its_own() -> None:
+    slots = {effect.name: effect.slots for effect in EFFECTS}
+    assert slots["SpeedSignalDelay"] == ("speedSensorW",)
+    assert slots["LoggerTimeSkew"] == ("speedSensorW", "speedSensorR")
+    assert (slots["WheelsetLosses"], slots["RollerLosses"]) == (("wheelsetLoss",), ("rollerLoss",))
+
+
+def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
+    slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
+    cylinder, loss = slots["cylinder"], slots["wheelsetLoss"]
+    assert (cylinder.inputs, cylinder.outputs) == (("pB", "restBefore"), ("p", "rest"))
+    assert slots["padFriction"].inputs == ("level", "Fperp", "v")
+    # A loss takes a speed and gives a torque; its power follows by an equation of the slot.
+    assert (loss.inputs, loss.outputs) == (("omega",), ("tau",))
+    assert {slot.name for slot in slots.values() if not slot.chained} == {
+        "actuation",  # from a pressure to a force
+        "wheelsetLoss",
+        "rollerLoss",
+    }
+
+
+def test_of_effects_that_look_the_same_the_usual_one_stands_first() -> None:
+    names = [effect.name for effect in EFFECTS]
+    for usual, rare in (
+        ("WaterFilm", "SingleDiscWaterFilm"),
+        ("WheelRadius", "RollerRadius"),
+        ("FxOffset", "ApexOffset"),
+        ("SpeedSignalDelay", "LoggerTimeSkew"),
+    ):
+        assert names.index(usual) < names.index(rare), (usual, rare)
+
+
+def test_the_command_lists_the_effects_of_a_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    package = ROOT / "modelica" / "WheelsetRig" / "package.mo"
+    assert main(["diagnose", "--list", "--library", str(package)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == [effect.name for effect in EFFECTS]
+    assert "pads that lag behind the measured pressure" in lines[7]
+
+
+# --- another field ---
+
+
+def test_effects_of_a_library_of_one_file_are_read_in_its_order(tmp_path: Path) -> None:
+    effects = read_effects(tank(tmp_path), "Base")
+    assert [(one.name, one.slots) for one in effects] == [
+        ("Clogging", ("orifice",)),
+        ("Leak", ("orifice",)),
+        ("GaugeOffset", ("gauge",)),
+        ("GaugeGain", ("gauge",)),
+    ]
+    assert effects[0].text == "an orifice that is narrower than drawn"
+
+
+def test_after_puts_an_effect_behind_a_more_usual_one(tmp_path: Path) -> None:
+    library = tank(tmp_path, ('separation="a dry floor"', 'separation="", after="GaugeOffset"'))
+    names = [effect.name for effect in read_effects(library, "Base")]
+    assert names.index("Leak") > names.index("GaugeOffset")
+
+
+def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
+    library = tank(tmp_path)
+    effects = read_effects(library, "Base")
+    text = source(library, "Tank.Base", "Extended", effects, {}, {"A": 3.0}, "All effects")
+    (tmp_path / "Extended.mo").write_text(f"within Tank;\n{text}")
+    flat = flatten(tmp_path / "Extended.mo", "Tank.Extended")
+    names = {parameter.name for parameter in flat.parameters}
+    assert {variables(effect, effect.size)[0] for effect in effects} <= names
+    assert [state.name for state in flat.states] == ["h"]
+
+
+def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path) -> None:
+    """Closed forms: a level of 1 m, Torricelli's law."""
+    library = tank(tmp_path)
+    effects = read_effects(library, "Base")
+    text = source(library, "Base", "Extended", effects, {"Leak": {"area": 2e-4}}, {}, "")
+    path = tmp_path / "Extended.fmu"
+    build(library, "Extended", text, path, every_platform=False)
+    velocity = np.sqrt(2.0 * 9.81)
+    with FMU(path) as fmu:
+        sizes = {
+            "orifice.clogging.share": 0.1,
+            "gauge.gaugeOffset.offset": 0.2,
+            "gauge.gaugeGain.gain": 0.5,
+        }
+        fmu.start({}, sizes)
+        # Of 1e-3 m2 a tenth is closed; the leak of 2e-4 m2 is as wide as ever.
+        expected = -(0.9e-3 + 2e-4) * velocity / 2.0
+        np.testing.assert_allclose(fmu.derivatives(), [expected], rtol=1e-12)
+        reading = fmu.get(fmu.variables(["reading"]))
+        np.testing.assert_allclose(reading, [1.5 * 1.2], rtol=1e-12)
+
+
+def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_path: Path) -> None:
+    library = tank(tmp_path, ("Orifice orifice(h=h)", "Orifice orifice(h=h, a=A/1e3)"))
+    effects = read_effects(library, "Base")
+    with pytest.raises(InputError, match=r"Clogging and Leak beside a Tank\.Orifice"):
+        source(library, "Base", "Extended", effects, {}, {}, "")
+    source(library, "Base", "Extended", effects[1:], {}, {}, "")  # one of them alone
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "    extends PartialGauge;\n    parameter",
+            "    parameter",
+            "extends no slot of the base",
+        ),
+        ('size="share"', 'size="shar"', r"without a parameter 'shar' \(closest: 'share'\)"),
+        ("max=0.9) = 0.0", "max=0.9) = 0.1", "share = 0.1; expected '= 0.0'"),
+        ("max=0.9) = 0.0", "max=0.9)", "share without a value; expected '= 0.0'"),
+        ("matters=0.02, ", "", "found no 'matters'; expected a number above 0"),
+        ("matters=0.02", "matters=-0.02", "found matters = -0.02"),
+        ("step=0.01, matters=0.02", 'step="x", matters=0.02', "found step = 'x'"),
+        (', separation="a look into the orifice"', "", "found no 'separation'"),
+        ("step=0.01", "stepp=0.01", r"found 'stepp' \(closest: 'step'\)"),
+        ("(effect(", "(efect(", r"found 'efect' \(closest: 'effect'\)"),
+        ('size="share",', 'size="share", slots={"gauge"},', "found slot 'gauge'"),
+        ('size="share",', 'size="share", shapes(b={1.0}),', "without a parameter 'b'"),
+        (
+            'size="share",',
+            'size="share", shapes(share=1.0),',
+            r"found share = 1\.0; expected an arr",
+        ),
+        ('size="share",', 'size="share", after="Rust",', 'found after="Rust"'),
+        ('size="share",', 'size="share", after="Clogging",', "which does not stand after this one"),
+        ('size="share",', 'size={"a", "b"},', r"found size = \('a', 'b'\)"),
+        ('size="share",', 'size="share", falling(signal="inflow"),', "found no 'because'"),
+    ],
+)
+def test_an_effect_that_says_something_wrong_is_refused_with_its_line(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    library = tank(tmp_path, (old, new))
+    with pytest.raises(InputError, match=message) as refused:
+        read_effects(library, "Base")
+    assert str(tmp_path / "Tank.mo") in refused.value.where
+
+
+def test_a_base_model_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no class 'Bas' \(closest: 'Tank\.Base'\)"):
+        read_effects(tank(tmp_path), "Bas")

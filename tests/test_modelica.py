@@ -1,0 +1,232 @@
+"""The reader of Modelica source: what is written is read, or refused with its line."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from workbench.errors import InputError
+from workbench.modelica import Library, read_library
+
+ROOT = Path(__file__).parent.parent
+
+
+def library(folder: Path, text: str) -> Library:
+    file = folder / "P.mo"
+    file.write_text(text)
+    return read_library(file)
+
+
+@pytest.fixture(scope="module")
+def wheelset() -> Library:
+    return read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
+
+
+# --- what is read ---
+
+
+def test_classes_within_a_class_are_read_in_their_order(tmp_path: Path) -> None:
+    found = library(
+        tmp_path,
+        'package P "Two" model A model B end B; end A; partial model C "Third" end C; end P;',
+    )
+    assert list(found.classes) == ["P", "P.A", "P.A.B", "P.C"]
+    assert [one.partial for one in found.classes.values()] == [False, False, False, True]
+    assert found.find("C").description == found.find("P.C").description == "Third"
+
+
+def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset: Library) -> None:
+    files = {path.stem for path in (ROOT / "modelica").rglob("*.mo")} - {"package"}
+    names = [name.rpartition(".")[2] for name in wheelset.classes]
+    assert files <= set(names)
+    order = (ROOT / "modelica" / "WheelsetRig" / "Effects" / "package.order").read_text().split()
+    of_effects = [n.rpartition(".")[2] for n in wheelset.classes if n.startswith("WheelsetRig.Ef")]
+    assert of_effects == ["Effects", *order]
+
+
+def test_comments_are_none_of_the_code_and_strings_none_of_the_comments(tmp_path: Path) -> None:
+    found = library(
+        tmp_path,
+        """package P "No // comment, no /* comment */, a \\"quote\\" and a \\\\"
+  // model Hidden end Hidden;
+  /* model Hidden "
+     end Hidden; */
+  model A "end A;" // end A;
+    parameter Real x(unit="a;b") = 1.0 /* = 2.0 */ "First, ""
+      ; // ";
+  equation
+    assert(x > 0, "end A; \\" )");
+  end A;
+end P;
+""".replace('First, ""', 'First, " + "joined"'),
+    )
+    assert list(found.classes) == ["P", "P.A"]
+    assert found.find("P").description == 'No // comment, no /* comment */, a "quote" and a \\'
+    x = found.components("P.A")["x"]
+    assert (x.modifier.value, found.unit(x), x.description) == ("1.0", "a;b", "First, joined")
+
+
+def test_a_component_has_its_prefixes_type_values_and_constraint(tmp_path: Path) -> None:
+    found = library(
+        tmp_path,
+        """package P
+  partial model Slot end Slot;
+  model Null extends Slot; end Null;
+  model A
+    final parameter Integer n = if 1 > 0 then 3 else 4 "Number";
+    parameter Real M[2, 2] = [1, 2; 3, 4];
+    parameter Real a[2](each min=-1.0, max={f(1, "x"), 2}), b = 2.0*a[1] "Second";
+    input Real u(start=0.0, fixed=true);
+    parameter String s = "text" "Label";
+    Real y if n > 2 "Sometimes";
+    replaceable Null slot(redeclare model X = Y, x(y=1)=u) constrainedby Slot(x=u) "Place";
+  equation
+    y = u;
+    for i in 1:n loop a[i] = 1; end for;
+  end A;
+end P;
+""",
+    )
+    n, M, a, b, u, s, y, slot = found.components("P.A").values()
+    assert n.prefixes == {"final", "parameter"}
+    assert M.modifier.value == "[1, 2; 3, 4]"
+    assert n.modifier.value == "if 1 > 0 then 3 else 4"
+    assert [one.value for one in a.modifier.inner.values()] == ["-1.0", '{f(1, "x"), 2}']
+    assert (b.modifier.value, b.description, b.type) == ("2.0*a[1]", "Second", "Real")
+    assert "input" in u.prefixes
+    assert (s.modifier.value, s.description) == ('"text"', "Label")
+    assert y.description == "Sometimes"
+    assert (slot.type, slot.constraint, slot.description) == ("Null", "Slot", "Place")
+    assert slot.modifier.inner["x"].value == "u"
+    assert found.find("A").equations == {"y"}
+
+
+def test_names_are_looked_up_from_the_inside_out_through_extends_and_imports(
+    tmp_path: Path,
+) -> None:
+    found = library(
+        tmp_path,
+        """package P
+  import Far.Units;
+  package Q
+    import P.R.*;
+    model A end A;
+    model B extends A; end B;
+    model C extends .P.A; end C;
+    model D extends InR; end D;
+    model E extends Units.Torque; end E;
+    model F extends Other.A; end F;
+  end Q;
+  package R model InR end InR; end R;
+  package S
+    extends Q;
+    model G extends B; end G;
+  end S;
+  model A end A;
+end P;
+""",
+    )
+    assert {name[-1]: found.bases(f"P.Q.{name}")[0] for name in "BCDEF"} == {
+        "B": "P.Q.A",
+        "C": "P.A",
+        "D": "P.R.InR",
+        "E": "Far.Units.Torque",
+        "F": "Other.A",
+    }
+    assert found.ancestors("P.S.G") == ("P.Q.B", "P.Q.A")
+
+
+def test_what_a_class_inherits_has_the_values_it_gives(wheelset: Library) -> None:
+    whole, single = (
+        wheelset.components(f"WheelsetRig.Effects.{name}")
+        for name in ("WaterFilm", "SingleDiscWaterFilm")
+    )
+    assert list(whole) == list(single)
+    assert [one["wet"].modifier.value for one in (whole, single)] == ["1.0", "1.0/3.0"]
+    assert wheelset.unit(single["wet"]) == "1"
+    assert wheelset.unit(single["E0"]) == "J"  # by its type, whose unit is a modifier
+
+
+def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path: Path) -> None:
+    found = library(
+        tmp_path,
+        """package P
+  model A
+    annotation (Icon(graphics={Line(points={{-1, 2}, {3, 4}})}), __Other(x=1),
+      __Workbench(a(size="b" + "c", step=-1.5e-3, on=true, values={0.1e6, 1}, in_={"x", "y"}),
+        empty="a \\"b\\""), Documentation(info="<html>)</html>"));
+  end A;
+  model B extends A annotation (__Workbench(a=1)); end B;
+end P;
+""",
+    )
+    assert found.find("A").vendor == {
+        "a": {"size": "bc", "step": -1.5e-3, "on": True, "values": (1e5, 1.0), "in_": ("x", "y")},
+        "empty": 'a "b"',
+    }
+    assert found.find("B").vendor == {}  # annotations are not inherited
+
+
+# --- what is refused ---
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        ("package P\n  model A\n  end B;\nend P;", 3, "expected 'end A'"),
+        ("package P\n  model A", 2, "found the end of the file"),
+        ('package P\n  model A "no end\nend A;\nend P;', 2, "may lack its end"),
+        ("package P\n  /* no end\nend P;", 2, "may lack its end"),
+        ("package P\n  model A\n  Real x = ;\n  end A;\nend P;", 3, "rest of an expression"),
+        ("package P\n  model A\n  Real x(min=0;\n  end A;\nend P;", 3, "expected ','"),
+        ("package P\n  model A\n  Real x = f(1;\n  end A;\nend P;", 3, r"found ';'; expected '\)'"),
+        ("package P\n  model extends A end A;\nend P;", 2, "found 'extends'"),
+        ("package P\nend P;\npackage Q\nend Q;", 3, "one class in a file"),
+        ("within Q;\npackage P\nend P;", 1, "no 'within'"),
+        ("package P\n  model A end A;\n  model A end A;\nend P;", 3, "a second class P.A"),
+        ("package P\n annotation (__Workbench(a=b));\nend P;", 2, "found 'b'; expected a number"),
+        ("package P\n annotation (__Workbench(a=1/3));\nend P;", 2, "found '/'"),
+        ("package P\n annotation (__Workbench(a=1, a=2));\nend P;", 2, "expected one 'a'"),
+        ("package P ?\nend P;", 1, "found '\\?'"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_with_its_line(
+    text: str, line: int, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message) as refused:
+        library(tmp_path, text)
+    assert re.search(rf"P\.mo:{line}\b", refused.value.where)
+
+
+def test_a_file_must_stand_where_its_class_belongs(tmp_path: Path) -> None:
+    (tmp_path / "package.mo").write_text("package P end P;")
+    part = tmp_path / "A.mo"
+    part.write_text("model A end A;")
+    with pytest.raises(InputError, match="expected 'within P;'"):
+        read_library(tmp_path / "package.mo")
+    part.write_text("within P; model B end B;")
+    with pytest.raises(InputError, match=r"found class P\.B; expected a class named A"):
+        read_library(tmp_path / "package.mo")
+    part.write_bytes(b'within P; model A "\xff" end A;')
+    with pytest.raises(InputError, match="expected Modelica in UTF-8"):
+        read_library(tmp_path / "package.mo")
+    with pytest.raises(InputError, match="no such file"):
+        read_library(tmp_path / "Missing.mo")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("model A extends B; end A; model B extends A; end B;", "P.A extends itself"),
+        ("package Q end Q; model A extends Q.X; end A;", "P.Q has no class 'X'"),
+    ],
+)
+def test_what_a_class_extends_must_lead_somewhere(text: str, message: str, tmp_path: Path) -> None:
+    found = library(tmp_path, f"package P {text} end P;")
+    with pytest.raises(InputError, match=message):
+        found.components("P.A")
+
+
+def test_an_unknown_class_is_refused_with_the_closest(wheelset: Library) -> None:
+    with pytest.raises(InputError, match=r"closest: 'WheelsetRig\.MinimalObserver'"):
+        wheelset.find("MinimalObserve")

@@ -1,0 +1,166 @@
+"""The package works anywhere: import at no cost, and a wheel that holds all it needs."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import workbench
+from workbench.__main__ import main
+from workbench.commands import COMMANDS
+
+HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
+OWN = ("modelica", "fmus", "cases")  # at the top level of a checkout, in the wheel as data
+
+
+def run(*command: str, **options: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *command], capture_output=True, text=True, **options)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("-c", "import workbench"), ("-m", "workbench", "--version"), ("-m", "workbench", "--help")],
+    ids=" ".join,
+)
+def test_nothing_heavy_is_imported_before_it_is_needed(
+    root: Path, command: tuple[str, ...]
+) -> None:
+    done = run("-X", "importtime", *command, cwd=root)
+    assert done.returncode == 0
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "workbench" in imported
+    assert imported.isdisjoint(HEAVY)
+
+
+def test_the_help_lists_each_command_and_each_has_its_own(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    listed = capsys.readouterr().out
+    for name, text in COMMANDS.items():
+        assert re.search(rf"^    {name}\s+{text[:40]}", listed, re.MULTILINE)
+        with pytest.raises(SystemExit, match="0"):
+            main([name, "--help"])
+        assert capsys.readouterr().out.startswith(f"usage: workbench {name} ")
+
+
+def test_each_public_name_is_what_its_module_defines() -> None:
+    assert dir(workbench) == sorted(workbench.__all__)
+    for name in workbench.__all__:
+        assert getattr(workbench, name).__name__ == name
+
+
+def test_a_name_that_is_not_public_is_refused() -> None:
+    with pytest.raises(AttributeError, match="'workbench' has no attribute 'read_case_s'"):
+        _ = workbench.read_case_s
+
+
+# --- compiled code ---
+
+SOLVE = """
+import numba, numpy as np
+before = {key: getattr(numba.config, key) for key in dir(numba.config) if key.isupper()}
+from workbench.kernel import solve
+a, b = np.array([[2.0]]), np.array([[6.0]])
+assert solve(a, b) == 0 and b[0, 0] == 3.0
+assert before == {key: getattr(numba.config, key) for key in before}
+print(sum(solve.stats.cache_hits.values()), sum(solve.stats.cache_misses.values()))
+"""
+
+
+def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(
+    root: Path, tmp_path: Path
+) -> None:
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
+    first = run("-c", SOLVE, cwd=root, env=environment)
+    again = run("-c", SOLVE, cwd=root, env=environment)
+    assert (first.stdout, again.stdout) == ("0 1\n", "1 0\n"), first.stderr + again.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["wheelset-workbench"]
+
+
+def test_code_is_compiled_where_nothing_can_be_kept(root: Path) -> None:
+    for _ in range(2):
+        done = run("-c", SOLVE, cwd=root, env=os.environ | {"XDG_CACHE_HOME": os.devnull})
+        assert done.stdout == "0 1\n", done.stderr
+
+
+# --- the wheel ---
+
+
+@pytest.fixture(scope="module")
+def installed(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What pip installs of the wheel that is built from the source distribution."""
+    folder = tmp_path_factory.mktemp("installed")
+    sources = tmp_path_factory.mktemp("sources")
+    run("-m", "hatchling", "build", "-t", "sdist", "-d", str(sources), cwd=root, check=True)
+    (archive,) = sources.glob("*.tar.gz")
+    alone = ("--no-deps", "--no-index", "--no-build-isolation")
+    run("-m", "pip", "install", *alone, "--target", str(folder), str(archive), check=True)
+    return folder
+
+
+@pytest.fixture
+def anywhere(installed: Path, tmp_path: Path):
+    """Runs the installed `workbench` in a folder with nothing in it."""
+
+    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+        script = str(installed / "bin" / "workbench")
+        environment = os.environ | {"PYTHONPATH": str(installed)}
+        return run(script, *arguments, cwd=tmp_path, env=environment)
+
+    return call
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_the_wheel_holds_models_fmus_and_cases(root: Path, installed: Path, name: str) -> None:
+    assert files(installed / "workbench" / "data" / name) == files(root / name)
+
+
+def test_the_wheel_holds_the_whole_package_and_nothing_else(root: Path, installed: Path) -> None:
+    held = files(installed / "workbench")
+    assert {k: v for k, v in held.items() if not k.startswith("data/")} == files(root / "workbench")
+    others = {path.name for path in installed.iterdir()} - {"workbench", "bin"}
+    assert all(name.endswith(".dist-info") for name in others)
+
+
+def test_the_wheel_simulates_its_own_cases_in_an_empty_folder(anywhere, tmp_path: Path) -> None:
+    done = anywhere("simulate", "--estimator", "open_loop")
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
+    summary = json.loads((tmp_path / "results" / "simulate" / "summary.json").read_text())
+    assert len(summary["cases"]) == 14
+    assert summary["provenance"]["commit"] is None
+    # The README's table.
+    scores = summary["cases"]["03_dry_120_3.6"]["estimators"]["open_loop"]
+    assert round(100 * scores["Fx_nrmse"], 2) == 55.22
+
+
+def test_a_folder_of_the_same_name_does_not_shadow_the_cases_of_the_wheel(
+    anywhere, installed: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "cases").mkdir()
+    own = installed / "workbench" / "data" / "cases"
+    assert f"simulate {own / '09_wet_160_4.2_wsp'} " in anywhere("simulate", "--help").stdout
+
+
+def test_messages_of_the_wheel_name_only_what_it_has(anywhere) -> None:
+    missing = anywhere("simulate", "--fmu", "missing.fmu")
+    assert missing.returncode == 2
+    assert "To do: give the path of one with --fmu." in missing.stderr
+    pytest.importorskip("rumoca")
+    refused = anywhere("fmu", "build", "--all")
+    assert refused.returncode == 2
+    assert "found a package that was installed from a wheel" in refused.stderr

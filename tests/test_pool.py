@@ -1,0 +1,279 @@
+"""A pool of processes survives what its tasks do, and asks nothing of the program that uses it."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from workbench.errors import InputError
+from workbench.pool import Pool, WorkerError
+
+ROOT = Path(__file__).parents[1]
+
+
+def pid(state: object) -> int:
+    return os.getpid()
+
+
+def kill(state: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def kill_once(mark: Path) -> int:
+    """End the worker, but not the one that tries again."""
+    if not mark.exists():
+        mark.touch()
+        kill(mark)
+    return os.getpid()
+
+
+def blas_threads(state: object) -> list[int]:
+    return [library["num_threads"] for library in threadpool_info()]
+
+
+def refuse(state: object) -> None:
+    raise InputError(where="here", found="this", expected="that", remedy="do it")
+
+
+@contextmanager
+def counted(folder: Path) -> Iterator[Path]:
+    """Leaves a file for each preparation."""
+    (folder / str(os.getpid())).touch()
+    yield folder
+
+
+@pytest.mark.parametrize("isolated", [False, True])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_are_those_of_the_function(workers: int, isolated: bool) -> None:
+    with Pool(workers, nullcontext, 2.0, isolated=isolated) as pool:
+        assert pool.map(math.pow, range(5)) == [1.0, 2.0, 4.0, 8.0, 16.0]
+        assert sorted(pool.completed(math.pow, [3, 1])) == [(0, 8.0), (1, 2.0)]
+        assert pool.submit(math.pow, 0.5).result() == math.sqrt(2.0)
+        assert (pool.submit(pid).result() == os.getpid()) == (workers == 1 and not isolated)
+
+
+@pytest.mark.parametrize("isolated", [False, True])
+def test_an_error_of_a_task_is_raised_as_it_is_and_costs_no_worker(isolated: bool) -> None:
+    with Pool(1, nullcontext, None, isolated=isolated) as pool:
+        before = pool.submit(pid).result()
+        with pytest.raises(InputError, match="found this; expected that"):
+            pool.submit(refuse).result()
+        assert pool.submit(pid).result() == before
+
+
+def test_each_worker_is_prepared_once(tmp_path: Path) -> None:
+    with Pool(2, counted, tmp_path) as pool:
+        used = set(pool.map(_name_of_worker, range(50)))
+    assert used <= {file.name for file in tmp_path.iterdir()}
+    assert len(list(tmp_path.iterdir())) <= 2
+
+
+def _name_of_worker(folder: Path, number: int) -> str:
+    return str(os.getpid())
+
+
+def test_a_failed_preparation_is_raised_by_every_task() -> None:
+    with Pool(2, open, "/nowhere/at/all") as pool:
+        for _ in range(3):
+            with pytest.raises(FileNotFoundError, match="nowhere"):
+                pool.submit(pid).result(timeout=60.0)
+
+
+def test_a_task_whose_worker_dies_is_tried_again(tmp_path: Path) -> None:
+    with Pool(1, nullcontext, tmp_path / "mark", isolated=True) as pool:
+        first = pool.submit(pid).result()
+        assert pool.submit(kill_once).result() != first
+
+
+def test_a_task_that_kills_two_workers_is_lost_and_no_other() -> None:
+    with Pool(2, nullcontext, 2.0) as pool:
+        tasks: list[Future[float]] = [pool.submit(math.pow, k) for k in range(30)]
+        deadly = pool.submit(kill)
+        tasks += [pool.submit(math.pow, k) for k in range(30)]
+        with pytest.raises(WorkerError, match="ended its worker, twice"):
+            deadly.result()
+        assert [task.result() for task in tasks] == [2.0**k for k in range(30)] * 2
+
+
+def test_a_worker_that_is_killed_while_it_waits_is_replaced() -> None:
+    with Pool(1, nullcontext, None, isolated=True) as pool:
+        first = pool.submit(pid).result()
+        os.kill(first, signal.SIGKILL)
+        assert pool.submit(pid).result() != first
+
+
+def test_a_task_beyond_the_limit_is_ended_and_the_next_is_done() -> None:
+    with Pool(1, nullcontext, 600.0, limit=0.2) as pool:
+        begin = time.monotonic()
+        with pytest.raises(WorkerError, match=r"longer than 0\.2 s"):
+            pool.submit(time.sleep).result()
+        assert pool.submit(math.sqrt).result() == math.sqrt(600.0)
+        assert time.monotonic() - begin < 60.0  # of 600; what it takes depends on the machine
+
+
+def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits() -> None:
+    begin = time.monotonic()
+    with Pool(1, nullcontext, 600.0, isolated=True) as pool:
+        worker = pool.submit(pid).result()
+        tasks = [pool.submit(time.sleep) for _ in range(3)]
+        while not tasks[0].running():
+            wait(tasks[:1], timeout=0.01)
+    assert time.monotonic() - begin < 60.0
+    with pytest.raises(WorkerError, match="closed"):
+        tasks[0].result()
+    assert all(task.cancelled() for task in tasks[1:])
+    with pytest.raises(ProcessLookupError):
+        _until_gone(worker)
+
+
+def _until_gone(process: int) -> None:
+    """Raise ProcessLookupError as soon as a process is gone."""
+    end = time.monotonic() + 30.0
+    while time.monotonic() < end:
+        os.kill(process, 0)
+        time.sleep(0.01)
+
+
+def test_finishing_keeps_what_is_under_way_and_drops_what_waits() -> None:
+    with Pool(1, nullcontext, 0.3, isolated=True) as pool:
+        tasks = [pool.submit(time.sleep) for _ in range(3)]
+        while not tasks[0].running():
+            wait(tasks[:1], timeout=0.01)
+        pool.finish()
+        assert [task.cancelled() for task in tasks] == [False, True, True]
+        assert tasks[0].result() is None
+
+
+def test_workers_use_one_blas_thread() -> None:
+    with Pool(1, nullcontext, np.zeros(1), isolated=True) as pool:
+        assert set(pool.submit(blas_threads).result()) == {1}
+
+
+# --- programs that use a pool ---
+
+PLAIN = """
+import math, os, pickle, sys
+from contextlib import nullcontext
+from pathlib import Path
+from workbench.pool import Pool
+
+print("program", flush=True)
+
+class Mine:
+    pass
+
+with Pool(2, nullcontext, 3.0) as pool:
+    # While workers start, the program is still itself for itself.
+    pickle.loads(pickle.dumps(Mine()))
+    assert Path(__file__).exists() and __name__ == "__main__"
+    print(pool.map(math.pow, [1.0, 2.0]), flush=True)
+assert sys.modules["__main__"].Mine is Mine
+"""
+
+WAITING = """
+import time
+from contextlib import nullcontext
+from workbench.pool import Pool
+
+def worked(pool):
+    for _ in pool.completed(time.sleep, []):
+        pass
+    tasks = [pool.submit(time.sleep) for _ in range(4)]
+    while not tasks[0].running():
+        time.sleep(0.01)
+    print("under way", flush=True)
+    tasks[0].result()
+
+with Pool(2, nullcontext, 600.0) as pool:
+    try:
+        worked(pool)
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+
+
+def _started(program: str, folder: Path) -> "subprocess.Popen[str]":
+    path = folder / "program.py"
+    path.write_text(program)
+    return subprocess.Popen(
+        [sys.executable, str(path)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+    with _started(PLAIN, tmp_path) as program:
+        out, errors = program.communicate(timeout=120)
+    assert out == "program\n[3.0, 9.0]\n"
+    assert errors == ""
+    assert program.returncode == 0
+
+
+def test_a_program_from_the_prompt_needs_no_guard(tmp_path: Path) -> None:
+    """As in a notebook, where the program is no file."""
+    program = PLAIN.replace('Path(__file__).exists() and __name__ == "__main__"', "True")
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert (run.stdout, run.stderr) == ("program\n[3.0, 9.0]\n", "")
+
+
+def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
+    with _started(WAITING, tmp_path) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "under way\n"
+        os.killpg(program.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
+        out, errors = program.communicate(timeout=60)
+    assert (out, errors, program.returncode) == ("interrupted\n", "", 0)
+    assert _comes_true(lambda: not _living(program.pid))
+
+
+def test_workers_end_with_a_program_that_is_killed(tmp_path: Path) -> None:
+    with _started(WAITING, tmp_path) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "under way\n"
+        assert len(_living(program.pid)) > 2
+        program.kill()
+    assert _comes_true(lambda: not _living(program.pid))
+
+
+def _comes_true(condition: Callable[[], bool]) -> bool:
+    """Wait half a minute at most, which a machine that has other work to do may need."""
+    end = time.monotonic() + 30.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return condition()
+
+
+def _living(session: int) -> list[int]:
+    """Processes of a session that are not zombies."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            state = (entry / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue  # it ended meanwhile
+        if int(state[3]) == session and state[0] != "Z":
+            found.append(int(entry.name))
+    return found

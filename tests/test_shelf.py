@@ -1,0 +1,65 @@
+"""Built FMUs are kept between runs."""
+
+from pathlib import Path
+
+import pytest
+
+from workbench import shelf
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(shelf.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    return shelf.folder()
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    folder = tmp_path / "Library"
+    folder.mkdir()
+    (folder / "package.mo").write_text("package Library end Library;")
+    return folder
+
+
+def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -> None:
+    built = []
+
+    def make(path: Path) -> None:
+        built.append(path)
+        path.write_bytes(b"an FMU")
+
+    for target in (tmp_path / "one.fmu", tmp_path / "two.fmu"):
+        shelf.fetch("name", target, make)
+        assert target.read_bytes() == b"an FMU"
+    assert built == [tmp_path / "one.fmu"]
+    assert [file.name for file in cache.iterdir()] == ["name.fmu"]
+
+
+def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
+    before = shelf.key(library, "Model", "model Model end Model;")
+    assert before == shelf.key(library, "Model", "model Model end Model;")
+    assert before != shelf.key(library, "Model", "model Model Real x; end Model;")
+    (library / "package.mo").write_text("package Library constant Real c = 1; end Library;")
+    assert before != shelf.key(library, "Model", "model Model end Model;")
+
+
+def test_a_cache_that_cannot_be_written_costs_only_time(cache: Path, tmp_path: Path) -> None:
+    cache.parent.write_text("a file where the folder should be")
+    shelf.fetch("name", tmp_path / "one.fmu", lambda path: path.write_bytes(b"an FMU"))
+    assert (tmp_path / "one.fmu").read_bytes() == b"an FMU"
+
+
+def test_the_least_used_are_dropped(cache: Path, tmp_path: Path) -> None:
+    for number in range(40):
+        shelf.fetch(f"{number}", tmp_path / "a.fmu", lambda path: path.write_bytes(b"an FMU"))
+    assert len(list(cache.iterdir())) == 32
+    assert (cache / "39.fmu").exists()
+
+
+def test_a_build_that_fails_keeps_nothing(cache: Path, tmp_path: Path) -> None:
+    def fail(path: Path) -> None:
+        raise ValueError("no such class")
+
+    with pytest.raises(ValueError, match="no such class"):
+        shelf.fetch("name", tmp_path / "one.fmu", fail)
+    assert not cache.exists()

@@ -1,0 +1,126 @@
+"""A point of the fit, and what the stops say about it: errors, derivatives, likelihood."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from workbench.diagnosis.evidence import Evidence
+from workbench.diagnosis.quadratic import Key
+from workbench.fmu import Matrix, Vector
+
+_NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
+_SECOND = 20  # blocks
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns.
+
+    Attributes
+    ----------
+    sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
+    levels : common level by quantity and surface, as ("muDC", "dry"), or sensor.
+    deviations : of each stop from the common values, in standard deviations, (K, 5).
+    phases : [rad] of order-locked effects, (K,) by effect.
+    """
+
+    sizes: Mapping[Key, float]
+    levels: Mapping[Key, float]
+    deviations: Matrix
+    phases: Mapping[str, Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Evidence of all stops about a point.
+
+    Attributes
+    ----------
+    keys : of the columns of each jacobian: FORCE_DELAY, TOLERANCES, (effect, parameter).
+    inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
+    away : chi-squared of levels and deviations against what tolerances say of them.
+    """
+
+    point: Point
+    keys: tuple[Key, ...]
+    evidence: tuple[Evidence, ...]
+    inflation: Vector
+    away: float
+
+    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
+        """The same with more columns, (b*m + 1, p) of each stop."""
+        evidence = tuple(
+            replace(one, jacobian=np.column_stack([one.jacobian, more]))
+            for one, more in zip(self.evidence, jacobians, strict=True)
+        )
+        return replace(self, keys=(*self.keys, *keys), evidence=evidence)
+
+    @property
+    def misfit(self) -> float:
+        """Chi-squared of all stops at the point, in units of the noise."""
+        return float(sum(one.residual @ one.residual for one in self.evidence))
+
+    @property
+    def _squares(self) -> tuple[int, Vector]:
+        """Number of blocks, and mean square of their errors by channel (m,)."""
+        errors = np.concatenate([one.errors for one in self.evidence])
+        return len(errors), np.square(errors).mean(axis=0)
+
+    @property
+    def deviance(self) -> float:
+        """What a fit makes least: minus twice the log likelihood, up to a constant.
+
+        Of a channel that is wrong, the variance is unknown, and errors that last count once in a
+        second: its logarithm counts. To spoil one channel for another is no gain then.
+        Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
+        """
+        count, mean = self._squares
+        noise = count * np.minimum(mean, _NOISE)
+        wrong = count / _SECOND * np.log(self.spread)
+        rest = sum(one.rest**2 for one in self.evidence)
+        return float((noise + wrong).sum()) + rest + self.away
+
+    @property
+    def spread(self) -> Vector:
+        """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
+        spread: Vector = 1.0 + _SECOND * np.maximum(0.0, self._squares[1] - _NOISE)
+        return spread
+
+    def weighed(self, inflation: Vector) -> float:
+        """Chi-squared, each channel in units of what is wrong with it, (m,)."""
+        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
+
+
+def seconds(errors: Matrix) -> Matrix:
+    """Mean squares over seconds of whitened errors (b, m), times blocks, (s, m): noise leaves 1."""
+    count = len(errors) // _SECOND * _SECOND
+    means = errors[:count].reshape(-1, _SECOND, errors.shape[1]).mean(axis=1)
+    squares: Matrix = _SECOND * means**2
+    return squares
+
+
+def slowness(evidence: Sequence[Evidence]) -> Vector:
+    """Variance of errors that last a second over that of white noise, by channel, at least 1.
+
+    What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
+    against that, not against the noise.
+    """
+    lasting = np.concatenate([seconds(one.errors) for one in evidence])
+    slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
+    return slow
+
+
+def between(one: Point, other: Point) -> Point:
+    """Half way; nothing that one of them lacks."""
+
+    def half(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> dict[Any, Any]:
+        return {key: 0.5 * (value + b[key]) for key, value in a.items()}
+
+    return Point(
+        half(one.sizes, other.sizes),
+        half(one.levels, other.levels),
+        0.5 * (one.deviations + other.deviations),
+        half(one.phases, other.phases),
+    )

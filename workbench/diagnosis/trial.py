@@ -1,0 +1,178 @@
+"""Candidates about a point that is fitted: what each would explain, linearised."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.fit import Fit, variant
+from workbench.diagnosis.linearised import Linearised
+from workbench.diagnosis.quadratic import Joint, Quadratic, add, covariance, minimum
+from workbench.fmu import Matrix, Vector
+
+Candidate = tuple[Effect, Mapping[str, float]]
+
+_IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What one effect would explain, linearised.
+
+    Attributes
+    ----------
+    effect, shape : the candidate, and the shape it was tried with.
+    size, sigma : estimate of its size and standard deviation.
+    units : of the size and of the parameters of the shape, by name.
+    gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
+    held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
+    phases : (K,) [rad] of an order-locked effect.
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+    size: float
+    sigma: float
+    units: Mapping[str, str]
+    gain: float
+    held_out: Vector
+    phases: Vector
+
+
+def shapes(effect: Effect) -> list[dict[str, float]]:
+    """Shapes with which an effect is tried."""
+    tried: list[dict[str, float]] = [{}]
+    for name, values in effect.shapes:
+        tried = [{**one, name: value} for one in tried for value in values]
+    return tried
+
+
+def tried(fit: Fit, lin: Linearised, candidates: Sequence[Candidate]) -> "Trial":
+    """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
+    extra = [
+        (variant(effect, shape), parameter)
+        for effect, shape in candidates
+        for parameter in effect.sizes
+    ]
+    return Trial(fit, fit.quadratics(lin, extra), candidates)
+
+
+class Trial:
+    """All candidates about one point.
+
+    Each may be present at a size that does not matter, as part of the baseline: a candidate must
+    explain what all others together, too small to matter, do not. On held-out stops it is judged
+    alone, since what companions cost, by their size, shows only where they are fitted.
+    """
+
+    def __init__(
+        self,
+        fit: Fit,
+        joint: Joint,
+        candidates: Sequence[Candidate],
+    ) -> None:
+        self._fit, self.joint, self._candidates = fit, joint, candidates
+        self._stops = joint.stops()
+        self._known = list(range(len(joint.known)))
+        self.levels = joint.levels
+        middle: dict[str, tuple[int, float]] = {}
+        for effect, shape in candidates:
+            if not effect.order_locked:
+                at = joint.shared.index((variant(effect, shape), effect.size))
+                middle[effect.name] = (at, effect.matters)
+        self._immaterial = middle
+        self._without = _held_out(*self._select({}, alone=True))
+        base = self._select({})
+        total = add([*base[0], base[1]])
+        self._reference = total.at(minimum(total))
+
+    def _select(
+        self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
+    ) -> tuple[list[Quadratic], Quadratic]:
+        """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
+        others = [one for key, one in self._immaterial.items() if key != name and not alone]
+        columns = [*self._known, *(at for at, _ in others)]
+        count = len(columns) + bool(own)
+        transforms = []
+        for k in range(len(self._stops)):
+            transform = np.zeros((len(self.joint.shared), count))
+            transform[columns, range(len(columns))] = 1.0
+            for at, direction in own.items():
+                transform[at, -1] = direction[k]
+            transforms.append(transform)
+        stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
+        prior = self.joint.prior.columns(transforms[0])
+        for j, (_, matters) in enumerate(others, start=len(self._known)):
+            prior.N[j, j] += (_IMMATERIAL / matters) ** 2
+        return stops, prior
+
+    def covariance(self) -> Matrix:
+        """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
+        stops, prior = self._select({})
+        count = len(self._known)
+        known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
+        return known
+
+    def scores(self) -> list[Score]:
+        """All candidates, best first."""
+        found = [self._score(effect, shape) for effect, shape in self._candidates]
+        return sorted(found, key=lambda one: -one.held_out.sum())
+
+    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Score:
+        at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
+        phases = np.zeros(len(self._stops))
+        own = {at[0]: np.ones(len(self._stops))}
+        if effect.order_locked:
+            phases = np.array([_phase(stop, at) for stop in self._stops])
+            own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
+        low, high = self._fit.bounds(effect, effect.size)
+        stops, prior = self._select(own, effect.name)
+        total = add([*stops, prior])
+        best = minimum(total)
+        sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
+        size = float(best[-1])
+        if not low <= size <= high:
+            # What its bounds allow of it: the rest of the unknowns do their best beside that.
+            size = float(np.clip(size, low, high))
+            total = _fixed(total, size)
+            best = minimum(total)
+        alone, prior = self._select(own, alone=True)
+        single = float(minimum(add([*alone, prior]))[-1])
+        if not low <= single <= high:
+            single = float(np.clip(single, low, high))
+            alone, prior = [_fixed(stop, single) for stop in alone], _fixed(prior, single)
+        return Score(
+            effect=effect,
+            shape=shape,
+            size=size,
+            sigma=sigma,
+            units={name: self._fit.unit(effect, name) for name in (effect.size, *shape)},
+            gain=self._reference - total.at(best),
+            held_out=self._without - _held_out(alone, prior),
+            phases=phases,
+        )
+
+
+def _phase(stop: Quadratic, at: Sequence[int]) -> float:
+    """Phase of an order-locked effect in one stop [rad], everything else as it is."""
+    amplitude = -np.linalg.lstsq(stop.N[np.ix_(at, at)], stop.g[at], rcond=None)[0]
+    return float(np.arctan2(amplitude[1], amplitude[0]))
+
+
+def _fixed(one: Quadratic, last: float) -> Quadratic:
+    """Chi-squared over the other unknowns, the last one held."""
+    N = one.N[:-1, :-1]
+    g = one.g[:-1] + last * one.N[:-1, -1]
+    c = one.c + 2.0 * last * one.g[-1] + last**2 * one.N[-1, -1]
+    return Quadratic(N, g, float(c), one.rows)
+
+
+def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
+    """Chi-squared of each stop at the optimum of the others, (K,)."""
+    total = add([*stops, prior])
+    result = np.zeros(len(stops))
+    for k, stop in enumerate(stops):
+        others = Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0)
+        result[k] = stop.at(minimum(others))
+    return result

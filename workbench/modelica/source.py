@@ -1,0 +1,295 @@
+"""Reader of Modelica source: the structure of classes alone.
+
+Equations are passed over, and values are kept as text. What cannot be read is refused with its
+file and line.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from workbench.errors import InputError
+from workbench.modelica.classes import Class, Component, Extends, Modifier
+from workbench.modelica.tokens import (
+    CLASS_PREFIXES,
+    CLOSING,
+    KINDS,
+    OPERATORS,
+    PREFIXES,
+    SECTIONS,
+    Cursor,
+)
+
+VENDOR = "__Workbench"
+
+_PROPAGATION = frozenset({"each", "final"})
+
+
+@dataclass
+class _Body:
+    """What is found in a class while it is read."""
+
+    extends: list[Extends] = field(default_factory=list)
+    imports: list[tuple[str, str]] = field(default_factory=list)
+    components: list[Component] = field(default_factory=list)
+    equations: list[str] = field(default_factory=list)
+    vendor: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Reader(Cursor):
+    """Reads one file, by recursive descent."""
+
+    def __init__(self, file: Path, text: str) -> None:
+        super().__init__(file, text)
+        self._found: list[Class] = []
+
+    def file(self, enclosing: str) -> list[Class]:
+        """The class of the file and those within it, in order."""
+        within = ""
+        if self.took("within"):
+            within = "" if self.sees(";") else self.name()
+            self.expect(";")
+        if within != enclosing:
+            raise InputError(
+                where=f"{self._file}:1",
+                found=f"'within {within};'" if within else "no 'within'",
+                expected=f"'within {enclosing};'" if enclosing else "no 'within'",
+                remedy="correct it, or move the file to its package",
+            )
+        self.took("final")
+        self._definition(enclosing)
+        self.expect(";")
+        if self.token.kind != "end":
+            raise self.refusal("one class in a file, and others within it")
+        return self._found
+
+    # --- classes ---
+
+    def _definition(self, enclosing: str) -> None:
+        prefixes = self.words(CLASS_PREFIXES)
+        kind = self.one_of(KINDS)
+        if kind == "operator" and self.token.text in ("function", "record"):
+            kind = self.advance().text
+        where, place = self.where, len(self._found)
+        short = self.identifier()
+        name = f"{enclosing}.{short}" if enclosing else short
+        if self.took("="):
+            extends = self._alias()
+            description, vendor = self._comment()
+            body = _Body(extends=extends, vendor=vendor)
+        else:
+            description, body = self.string(), _Body()
+            self._composition(name, body)
+        made = Class(
+            name=name,
+            kind=kind,
+            partial="partial" in prefixes,
+            description=description,
+            extends=tuple(body.extends),
+            imports=tuple(body.imports),
+            components=tuple(body.components),
+            equations=frozenset(body.equations),
+            vendor=body.vendor,
+            where=where,
+        )
+        self._found.insert(place, made)
+
+    def _alias(self) -> list[Extends]:
+        """What stands after `type X =`."""
+        if self.took("enumeration") or self.took("der"):
+            self.group()
+            return []
+        self.words(PREFIXES)
+        base = self.name()
+        self.subscripts()
+        return [Extends(base, Modifier(inner=self._modifiers()))]
+
+    def _composition(self, name: str, body: _Body) -> None:
+        in_equations = False
+        short = name.rpartition(".")[2]
+        while True:
+            word = self.token.text
+            if word == "end" and self.following.text == short:
+                self.advance()
+                self.advance()
+                return
+            if word in ("public", "protected"):
+                self.advance()
+                in_equations = False
+            elif word == "end" and not in_equations:
+                raise self.refusal(f"'end {short}', or more of {short}")
+            elif word in SECTIONS:
+                self.advance()
+                in_equations = True
+            elif word == "annotation":
+                body.vendor = self._annotation()
+                self.expect(";")
+            elif in_equations or word == "external":
+                self._statement(body)
+            else:
+                self._element(name, body)
+
+    def _statement(self, body: _Body) -> None:
+        left = self.token
+        if left.kind == "name" and self.following.text == "=":
+            body.equations.append(left.text)
+        self.skip(";")
+        self.expect(";")
+
+    def _element(self, name: str, body: _Body) -> None:
+        if self.took("import"):
+            body.imports += self._import()
+            self._comment()
+        elif self.took("extends"):
+            base = self.name()
+            body.extends.append(Extends(base, Modifier(inner=self._modifiers())))
+            self._comment()
+        else:
+            prefixes = self.words(PREFIXES)
+            if self.token.text in KINDS | CLASS_PREFIXES:
+                self._definition(name)
+                self._constraint()
+            else:
+                body.components += self._components(name, prefixes)
+        self.expect(";")
+
+    def _import(self) -> list[tuple[str, str]]:
+        target = self.name()
+        if self.took("="):
+            return [(target, self.name())]
+        if self.took(".*"):
+            return [("*", target)]
+        if self.took("."):
+            self.expect("{")
+            names = [self.identifier()]
+            while self.took(","):
+                names.append(self.identifier())
+            self.expect("}")
+            return [(name, f"{target}.{name}") for name in names]
+        return [(target.rpartition(".")[2], target)]
+
+    def _components(self, owner: str, prefixes: frozenset[str]) -> list[Component]:
+        declared = self.name()
+        self.subscripts()
+        found: list[Component] = []
+        while True:
+            where, name = self.where, self.identifier()
+            self.subscripts()
+            modifier = self._modification()
+            if self.took("if"):
+                self._expression()
+            description, _ = self._comment()
+            found.append(
+                Component(name, owner, declared, prefixes, modifier, "", description, where)
+            )
+            if not self.took(","):
+                break
+        constraint, description = self._constraint()
+        return [
+            replace(one, constraint=constraint, description=one.description or description)
+            for one in found
+        ]
+
+    def _constraint(self) -> tuple[str, str]:
+        """Constraining class and description after it, both empty where there is none."""
+        if not self.took("constrainedby"):
+            return "", ""
+        name = self.name()
+        self._modifiers()
+        return name, self._comment()[0]
+
+    # --- modifiers and values ---
+
+    def _modification(self) -> Modifier:
+        inner = self._modifiers()
+        given = self.took("=") or self.took(":=")
+        return Modifier(self._expression() if given else "", inner)
+
+    def _modifiers(self) -> dict[str, Modifier]:
+        inner: dict[str, Modifier] = {}
+        if not self.took("(") or self.took(")"):
+            return inner
+        while True:
+            self.words(_PROPAGATION)
+            if self.token.text in ("redeclare", "replaceable"):
+                redeclaration = self.skip(",", ")")
+                inner[redeclaration] = Modifier()
+            else:
+                name = self.name()
+                inner[name] = self._modification()
+                self.string()
+            if self.took(")"):
+                return inner
+            self.expect(",")
+
+    def _expression(self) -> str:
+        """Text up to what cannot be of the same expression."""
+        start, complete = self.token.start, False
+        while True:
+            kind, text = self.token.kind, self.token.text
+            if text in CLOSING:
+                self.group()
+                complete = True
+            elif text in (",", ";", ")", "annotation", "constrainedby") or (
+                complete and (kind == "string" or text == "if")
+            ):
+                break
+            else:
+                self.advance()
+                complete = kind in ("number", "string") or (
+                    kind == "name" and text not in OPERATORS
+                )
+        if not complete:
+            raise self.refusal("the rest of an expression")
+        return self._text[start : self._tokens[self._next - 1].end]
+
+    def _comment(self) -> tuple[str, Mapping[str, Any]]:
+        description = self.string()
+        return description, self._annotation() if self.sees("annotation") else {}
+
+    def _annotation(self) -> Mapping[str, Any]:
+        """Content of the workbench's annotation; others are passed over."""
+        vendor: Mapping[str, Any] = {}
+        self.expect("annotation")
+        self.expect("(")
+        while not self.took(")"):
+            if self.took(VENDOR):
+                vendor = self._tree()
+            else:
+                self.skip(",", ")")
+            if not self.sees(")"):
+                self.expect(",")
+        return vendor
+
+    def _tree(self) -> dict[str, Any]:
+        tree: dict[str, Any] = {}
+        self.expect("(")
+        while True:
+            if (key := self.identifier()) in tree:
+                raise self.refusal(f"one '{key}'")
+            if self.sees("("):
+                tree[key] = self._tree()
+            else:
+                self.expect("=")
+                tree[key] = self._literal()
+            if self.took(")"):
+                return tree
+            self.expect(",")
+
+    def _literal(self) -> Any:
+        if self.token.kind == "string":
+            return self.string()
+        if self.took("{"):
+            values = [self._literal()]
+            while self.took(","):
+                values.append(self._literal())
+            self.expect("}")
+            return tuple(values)
+        for word, value in (("true", True), ("false", False)):
+            if self.took(word):
+                return value
+        sign = -1.0 if self.took("-") else 1.0
+        if self.token.kind != "number":
+            raise self.refusal("a number, a string, true, false or an array of them")
+        return sign * float(self.advance().text)

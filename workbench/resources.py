@@ -1,0 +1,28 @@
+"""Where the files are that come with the package: Modelica, FMUs, recorded cases.
+
+A wheel holds them itself, in `workbench/data`; a checkout has them at its top level.
+"""
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+_DATA = _PACKAGE / "data"
+_ROOT = _DATA if _DATA.is_dir() else _PACKAGE.parent
+
+# Top level of the sources that this package is run from; None if it was installed from a wheel.
+CHECKOUT = None if _ROOT == _DATA else _ROOT
+
+
+def modelica() -> Path:
+    """Folder of the Modelica libraries, one folder each."""
+    return _ROOT / "modelica"
+
+
+def fmus() -> Path:
+    """Folder of the built FMUs, `fmi2` and `fmi3`, with `manifest.json`."""
+    return _ROOT / "fmus"
+
+
+def cases() -> Path:
+    """Folder of the recorded cases, one folder each."""
+    return _ROOT / "cases"

@@ -1,0 +1,78 @@
+"""Built FMUs, kept between runs in the user's cache folder.
+
+The name of a kept file is the hash of all that goes into it, so that it needs no renewal and any
+process may use it. Nothing depends on the folder: where it cannot be written, FMUs are built anew.
+"""
+
+import contextlib
+import hashlib
+import os
+import platform
+import shutil
+import tempfile
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import platformdirs
+
+_COMPILER = Path(__file__).parent / "compiler"
+_TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
+_MOST = 32  # files, of 0.1 to 0.5 MB: the library and what was found in a few weeks' recordings
+
+
+def folder() -> Path:
+    """Where built FMUs are kept."""
+    return Path(platformdirs.user_cache_dir("wheelset-workbench")) / "fmus"
+
+
+def key(library: Path, *parts: str) -> str:
+    """Hash of a Modelica library, of the compiler and of what else an FMU is made from.
+
+    Parameters
+    ----------
+    library : folder of the library.
+    parts : such as the name and the source of a model that extends it.
+    """
+    known = {".mo", ".order", ".py", ".c", ".h"}
+    digest = hashlib.sha256()
+    for root in (library, _COMPILER):
+        for file in sorted(path for path in root.rglob("*") if path.suffix in known):
+            for part in (file.relative_to(root).as_posix().encode(), file.read_bytes()):
+                digest.update(len(part).to_bytes(8, "little") + part)
+    for text in (*parts, platform.system(), platform.machine(), *map(_version, _TOOLS)):
+        digest.update(len(text.encode()).to_bytes(8, "little") + text.encode())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def fetch(name: str, path: Path, make: Callable[[Path], object]) -> None:
+    """Write an FMU to `path`: the one that is kept under a name, else what `make` writes.
+
+    Parameters
+    ----------
+    name : of `key`.
+    make : builds the FMU at the path that it is given.
+    """
+    kept = folder() / f"{name}.fmu"
+    with contextlib.suppress(OSError):
+        shutil.copyfile(kept, path)
+        os.utime(kept)  # of use, which decides what is dropped
+        return
+    make(path)
+    # Another process may keep the same file, or drop it, at any time: it appears whole or not.
+    with contextlib.suppress(OSError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=kept.parent, suffix=".part")
+        os.close(handle)
+        shutil.copyfile(path, part)
+        Path(part).replace(kept)
+        every = sorted(kept.parent.iterdir(), key=lambda file: -file.stat().st_mtime)
+        for old in every[_MOST:]:
+            old.unlink()

@@ -1,0 +1,240 @@
+"""A tuning from a model and recorded cases to gains, and to what they are worth."""
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.errors import FMUError, InputError, closest
+from workbench.fmu import Vector
+from workbench.observers import Estimator, SearchSpace, estimators
+from workbench.system import System
+from workbench.systems import open_model
+from workbench.tuning.checkpoint import Generation
+from workbench.tuning.cost import Job, recordings
+from workbench.tuning.search import Plan, Search, search
+from workbench.tuning.validation import (
+    Fold,
+    Sensitivity,
+    cross_validate,
+    evaluate_gains,
+    sensitivities,
+    untuned_filters,
+)
+from workbench.tuning.workers import Workers
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is tuned, and where it is searched.
+
+    Attributes
+    ----------
+    cases : that the job's recordings were made from.
+    meanings : what each gain does, and its unit, by its name.
+    provenance : what the job was made from, for files of results.
+    """
+
+    job: Job
+    space: SearchSpace
+    cases: tuple[Case, ...]
+    meanings: Mapping[str, tuple[str, str]]
+    provenance: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """What a tuning came to.
+
+    Attributes
+    ----------
+    search : the best gains, and how they were found.
+    before : (k,) z_k with the reasoned gains.
+    sensitivities : of each gain; empty after an interruption, and so are the next two.
+    beside : (k,) z_k of methods that were not tuned, by name.
+    folds : those that were finished.
+    interrupted : whether Ctrl-C ended it before its end.
+    """
+
+    problem: Problem
+    plan: Plan
+    search: Search
+    before: Vector
+    interrupted: bool
+    sensitivities: Sequence[Sensitivity] = ()
+    beside: Mapping[str, Vector] = field(default_factory=dict)
+    folds: Sequence[Fold] = ()
+
+
+class Progress:
+    """Is told how a tuning goes; this one keeps it to itself."""
+
+    def begins(self, fold: int) -> None:
+        """A search begins: 0 for that on all cases, else the number of a fold."""
+
+    def evolved(self, history: Sequence[Generation]) -> None:
+        """A generation is done."""
+
+    def found(self, tuned: Tuned) -> None:
+        """Gains are found; what they are worth is not known yet."""
+
+    def warn(self, message: str) -> None:
+        """Something went wrong that the search survives."""
+
+
+def prepare(
+    system: System,
+    estimator: str,
+    cases: Sequence[Case],
+    scale_errors: Mapping[str, float] | None = None,
+) -> Problem:
+    """Gains to start from, bounds to search in, and recordings to judge by.
+
+    Parameters
+    ----------
+    estimator : its name.
+    scale_errors : relative [1], by output; see `recordings`. None: as the system says.
+
+    Raises
+    ------
+    InputError
+        If there is no such estimator, the model is not fit for it, or a case cannot judge.
+    """
+    kind = tunable(system, estimator)
+    if scale_errors is None:
+        scale_errors = {one.name: one.scale_error for one in system.outputs if one.scale_error}
+    # A recording shows nothing slower than itself, and its samples carry nothing faster.
+    slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
+    fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
+    with open_model(system, kind.role) as model:
+        gains = kind.reasoned(model, system)
+        space = kind.space(model, system, gains, slowest, fastest)
+        meanings = kind.meanings(model, system, gains)
+        provenance = {
+            "workbench": version("wheelset-workbench"),
+            "python": platform.python_version(),
+            "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
+            "system": system.name,
+            "fmu": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
+            "cases": [case.name for case in cases],
+            "scale_errors": dict(scale_errors),
+            "weights": dict(system.objective.weights),
+        }
+        content = model.path.read_bytes()
+    judged = recordings(cases, system, scale_errors)
+    job = Job(estimator, system, content, gains, judged)
+    return Problem(job, space, tuple(cases), meanings, provenance)
+
+
+def tunable(system: System, estimator: str) -> type[Estimator]:
+    """An estimator that has gains.
+
+    Raises
+    ------
+    InputError
+        If the system has none of this name.
+    """
+    known = {name: kind for name, kind in estimators(system).items() if kind.tunable}
+    if estimator not in known:
+        raise InputError(
+            where=f"estimator '{estimator}'",
+            found=f"none with gains of this name{closest(estimator, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    return known[estimator]
+
+
+def tune(
+    pool: Workers,
+    problem: Problem,
+    plan: Plan,
+    checkpoints: Path,
+    *,
+    folds: int = 0,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Tuned | None:
+    """Search on all cases, then find out what the gains are worth.
+
+    Ctrl-C ends the search, or what follows it, and keeps what there is.
+
+    Parameters
+    ----------
+    pool : workers prepared with the problem's job.
+    checkpoints : folder where each search keeps its state after every generation.
+    folds : how many times to tune without a part of the cases and evaluate on it; 0 for none.
+    resume : go on from the checkpoints that are there.
+
+    Returns
+    -------
+    Tuned, or None if it was interrupted before there was anything to return.
+
+    Raises
+    ------
+    FMUError
+        If the reasoned gains fail, so that there is nothing to start from.
+    """
+    run = _Run(pool, problem, plan, checkpoints, resume, progress or Progress())
+    job = problem.job
+    before = evaluate_gains(pool, job, [job.gains.values])[0]
+    if not np.isfinite(before).all():
+        raise FMUError(
+            f"{problem.provenance['fmu']['file']}: the FMU fails, hangs or diverges with the "
+            "untuned gains, so there is nothing to start from; see 'python -m workbench simulate'"
+        )
+    found = run.search(0, range(len(job.recordings)))
+    if found is None:
+        return None
+    tuned = Tuned(problem, plan, found, before, found.interrupted)
+    run.progress.found(tuned)
+    return tuned if found.interrupted else run.examine(tuned, folds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One call of `tune`."""
+
+    pool: Workers
+    problem: Problem
+    plan: Plan
+    checkpoints: Path
+    resume: bool
+    progress: Progress
+
+    def search(self, fold: int, on: Sequence[int]) -> Search | None:
+        """Search on some cases."""
+        self.progress.begins(fold)
+        return search(
+            self.pool,
+            self.problem.job,
+            self.problem.space,
+            on,
+            self.plan,
+            self.checkpoints / (f"checkpoint_fold{fold}.json" if fold else "checkpoint.json"),
+            resume=self.resume,
+            report=self.progress.evolved,
+            warn=self.progress.warn,
+        )
+
+    def examine(self, tuned: Tuned, folds: int) -> Tuned:
+        """Find out what gains are worth; Ctrl-C leaves out the rest."""
+        pool, problem = self.pool, self.problem
+        job, reasoned = problem.job, problem.job.gains.values
+        try:
+            effects = sensitivities(pool, job, problem.space, tuned.search)
+            tuned = replace(tuned, sensitivities=effects)
+            tuned = replace(tuned, beside=untuned_filters(job))
+            if folds:
+                done = cross_validate(
+                    *(pool, job, problem.cases, reasoned, folds),
+                    lambda number, on: self.search(number + 1, on),
+                )
+                tuned = replace(tuned, folds=done, interrupted=len(done) < folds)
+        except KeyboardInterrupt:
+            return replace(tuned, interrupted=True)
+        return tuned
