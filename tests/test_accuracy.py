@@ -24,12 +24,12 @@ from workbench.wheelset.accuracy import (
     friction_error,
     minimum_error,
     observe_stop,
-    read_truth,
     rise_delay,
     slide_error,
 )
 from workbench.wheelset.claims import PeakForce
 from workbench.wheelset.rig import Effects, Stop, select, simulate, write_recording
+from workbench.wheelset.truth import read_truth
 
 ROOT = Path(__file__).parent.parent
 RECORDINGS = ROOT.parent / "shared" / "recordings"

@@ -22,20 +22,19 @@ from workbench.wheelset.accuracy import (
     Accuracy,
     KnownStop,
     StopAccuracy,
-    Truth,
     accuracy,
     contact_errors,
     force_error,
     friction_error,
     minimum_error,
     observe_stop,
-    read_truth,
     rise_delay,
     slide_error,
     stop_accuracy,
     worst,
 )
 from workbench.wheelset.accuracy_report import format_accuracy
+from workbench.wheelset.truth import Truth, read_truth
 
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
 RW, RR = 0.46, 0.70  # [m]

@@ -32,6 +32,25 @@ def load_system(which: str | Path) -> System:
     return read_system(path)
 
 
+def model_path(system: System, role: str) -> Path:
+    """The FMU of a role.
+
+    Raises
+    ------
+    InputError
+        If the system has no model in this role, or it is not built.
+    """
+    model = system.models.get(role)
+    if model is None or model.path is None:
+        raise InputError(
+            where=f"{system.source}, [models] {role}",
+            found="no such model" if model is None else "a model without an FMU",
+            expected=f"an FMU in the role '{role}'",
+            remedy=f'write {role} = {{ class = "NAME", fmu = "FILE" }}',
+        )
+    return model.path
+
+
 def open_model(system: System, role: str = OBSERVER) -> FMU:
     """Open the model of a role, with the parameters of this machine that it has.
 

@@ -17,14 +17,14 @@ def bench_tuning(system: System, cases: Sequence[Case], case: Case) -> dict[str,
     """
     from workbench.benchmark.tuning import (
         format_tuning,
+        observe_memory,
         time_evaluations,
-        time_memory,
         time_workers,
     )
 
     evaluations = time_evaluations(case, system)
     workers = time_workers(cases, system)
-    memory = time_memory([one.source.parent for one in cases], system)
+    memory = observe_memory([one.source.parent for one in cases], system)
     print(f"\n{format_tuning(evaluations, workers, memory)}")
     return {
         "case": case.name,

@@ -13,7 +13,7 @@ from workbench.files import write_json, write_whole
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.gains_file import read_gains, tuned_file
 from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.systems import load_system, model_path, open_model
 
 if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
@@ -78,7 +78,7 @@ def _export(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     kind, gains, source = _gains(system, options.estimator, options.gains)
     observer = ObserverModel(system, kind, gains, source.read_text(encoding="utf-8"))
-    reference = options.reference or system.model("reference").path
+    reference: Path = options.reference or model_path(system, "reference")
     name = observer.model.rpartition(".")[2]
     with tempfile.TemporaryDirectory() as scratch:
 

@@ -8,12 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from workbench.commands.arguments import Commands, add_system, positive, require_compiler
-from workbench.errors import InputError
 from workbench.power import Repertoire, diagnose_sets, open_virtual_rig, plan, summarise
 from workbench.power.diagnosing import library_effects
 from workbench.report.power import format_power, write_power
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.systems import load_system, model_path
 
 
 def add(commands: Commands) -> None:
@@ -81,25 +79,12 @@ def _size(text: str) -> float:
     return value
 
 
-def _system(options: argparse.Namespace) -> tuple[System, Path]:
-    """The system, and the model that makes its recordings."""
+def _power(options: argparse.Namespace) -> int:
+    require_compiler()
     system = load_system(options.system)
     if options.library:
         system = replace(system, library=options.library)
-    reference = options.fmu or system.model("reference").path
-    if reference is None:
-        raise InputError(
-            where=str(system.source),
-            found="no FMU of the model that makes recordings",
-            expected="a model in the role 'reference', with its FMU",
-            remedy="build it with 'python -m workbench fmu build', or give one with --fmu",
-        )
-    return system, reference
-
-
-def _power(options: argparse.Namespace) -> int:
-    require_compiler()
-    system, reference = _system(options)
+    reference = options.fmu or model_path(system, "reference")
     rig = open_virtual_rig(system, options.case, reference)
     effects = library_effects(system)
     repertoire = Repertoire(rig.plantables, effects)

@@ -1,7 +1,7 @@
 within WheelsetRig.Observers;
 model DisturbanceObserver "Minimal model, its frictions states that are corrected by measured speeds"
-  extends PartialObserver(effect_muWR=49.386538, effect_muDC=-111.068182);
-  parameter Real L11(unit="1/s") = 4.14191568 "From dy of the wheelset to der(omegaW)";
+  extends PartialObserver(effect_muWR=49.3865394, effect_muDC=-111.068182);
+  parameter Real L11(unit="1/s") = 4.14191574 "From dy of the wheelset to der(omegaW)";
   parameter Real L12(unit="1/s") = 141.40357 "From dy of the roller to der(omegaW)";
   parameter Real L13(unit="1/s2") = 0.0 "From the integral of dy of the wheelset to der(omegaW)";
   parameter Real L14(unit="1/s2") = 0.0 "From the integral of dy of the roller to der(omegaW)";

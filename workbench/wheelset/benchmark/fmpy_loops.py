@@ -13,9 +13,7 @@ from typing import Self
 import numpy as np
 from fmpy import extract, instantiate_fmu, read_model_description
 
-from workbench.case import Case
 from workbench.fmu import Matrix, Vector
-from workbench.objective import samples
 from workbench.observers import Estimate, Gains
 from workbench.observers.unscented import POINT_DISTANCE, TANGENT_SHARE
 from workbench.system import System
@@ -291,21 +289,3 @@ def unscented_kalman_filter(
 ) -> Estimate:
     """Unscented Kalman filter with its covariance in full; see `disturbance_observer`."""
     return _filter(model, noise, time, u, y, points=True)
-
-
-def objective(estimate: Estimate, case: Case, system: System) -> float:
-    """z_k, equation (12) of Schwarz et al. (2018), of deviations below the bandwidth."""
-    names, columns = list(system.objective.weights), list(system.columns)
-    estimated = np.asarray(estimate.values)[:, [columns.index(name) for name in names]]
-    deviations = estimated - np.column_stack([case[name] for name in names])
-    steps, shares = samples(case.time)
-    # Two equal poles, which together are down by 3 dB at the bandwidth.
-    corner = 2 * np.pi * system.objective.bandwidth / np.sqrt(np.sqrt(2) - 1)
-    gains = np.where(steps > 0.0, 1.0 - np.exp(-corner * steps), 1.0)
-    smooth = np.empty_like(deviations)
-    first = second = np.zeros(len(names))
-    for k, gain in enumerate(gains):
-        first = first + gain * (deviations[k] - first)
-        second = second + gain * (first - second)
-        smooth[k] = second
-    return float(shares @ np.abs(smooth) @ np.array(list(system.objective.weights.values())))

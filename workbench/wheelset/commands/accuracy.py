@@ -11,8 +11,9 @@ from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
 from workbench.resources import cases as own_cases
 from workbench.systems import load_system, open_model
-from workbench.wheelset.accuracy import StopAccuracy, observe_stop, read_truth, stop_accuracy
+from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
 from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
+from workbench.wheelset.truth import read_truth
 
 
 def add(commands: Commands) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from workbench.commands.arguments import Commands, add_system, positive
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
-from workbench.systems import load_system
+from workbench.systems import load_system, model_path
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
     ORDINARY_PADS,
@@ -69,6 +69,12 @@ def add(commands: Commands) -> None:
         help="friction of dry pads: with speed, temperature and force, or constant as in the "
         "nominal model (default: %(default)s)",
     )
+    _add_making(rig)
+    rig.set_defaults(run=_rig)
+
+
+def _add_making(rig: argparse.ArgumentParser) -> None:
+    """Add what says how recordings are made and written."""
     rig.add_argument(
         "--rate",
         type=positive,
@@ -97,7 +103,6 @@ def add(commands: Commands) -> None:
         metavar="N",
         help="processes (default: one per processor, %(default)s)",
     )
-    rig.set_defaults(run=_rig)
 
 
 def _epilog() -> str:
@@ -137,7 +142,7 @@ def _rig(options: argparse.Namespace) -> int:
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
-    fmu = options.fmu or load_system(options.system).model("reference").path
+    fmu = options.fmu or model_path(load_system(options.system), "reference")
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
