@@ -108,12 +108,13 @@ def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
     times = []
     for kind in (kind for kind in choose(system, []).values() if kind.tunable):
         job = tuning_job(kind, system, [case])
+        if not job.gains.design:
+            continue  # a filter makes its feedback as it goes
         with (
             open_model(system, kind.role) as fmu,
             by_fmpy(kind.name, fmu, system, job.gains) as loop,
         ):
-            # A filter, which has no constants of a design, makes its feedback as it goes.
-            if loop is not None and job.gains.design:
+            if loop is not None:
                 by_loop = functools.partial(evaluate_by_loop, loop, case, system)
                 times.append(time_evaluation(job, by_loop))
     return times
