@@ -7,14 +7,16 @@ from importlib.util import find_spec
 from types import ModuleType
 
 from workbench.fmu import FMU
-from workbench.observers import Gains
+from workbench.observers import Estimate, Gains
 from workbench.system import System
 
 Loop = Callable[..., object]  # of time, u and y, as Estimator.run
 
 
 @contextmanager
-def by_fmpy(estimator: str, fmu: FMU, system: System, gains: Gains) -> Iterator[Loop | None]:
+def by_fmpy(
+    estimator: str, fmu: FMU, system: System, gains: Gains
+) -> Iterator[Callable[..., Estimate] | None]:
     """The loop of an estimator with FMPy's methods and numpy; None where there is none."""
     module = _companion(system)
     if module is None or estimator not in module.LOOPS:

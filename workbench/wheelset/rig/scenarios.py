@@ -66,6 +66,12 @@ class Scenario:
         asked = [pressure for begin, pressure in self.steps if braking >= begin]
         return asked[-1] if asked else self.conditions.brake_pressure
 
+    def friction(self, braking: float) -> float:
+        """Friction of the contact at zero slip velocity, a time [s] after the first demand."""
+        patch = self.patch
+        low = patch is not None and patch.begin <= braking < patch.end
+        return patch.muWR if patch is not None and low else self.muWR
+
     @property
     def number(self) -> int:
         """NN of the name."""
