@@ -15,11 +15,10 @@ import pytest
 
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
-from workbench.system import System
-from workbench.systems import load_system
 from workbench.objective import Weights
 from workbench.pool import Pool
-from workbench.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
+from workbench.system import System
+from workbench.systems import load_system
 from workbench.tuning import (
     Evaluator,
     Job,
@@ -28,14 +27,15 @@ from workbench.tuning import (
     recording,
     search_space,
 )
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
 pytest.register_assert_rewrite(
     "tests.case_folders", "tests.diagnosis_pages", "tests.runtime_instances"
 )
 
-from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
-from .runtime_instances import Fmu, compile_model  # noqa: E402
+from .diagnosis_pages import PLANTED, STOPS
+from .runtime_instances import Fmu, compile_model
 
 ROOT = Path(__file__).parent.parent
 

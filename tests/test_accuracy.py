@@ -8,31 +8,34 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.accuracy import (
-    Judged,
+from workbench.case import Case, read_cases
+from workbench.cosim import replay
+from workbench.objective import score
+from workbench.observers import Estimator
+from workbench.observers import estimators as all_estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.recording import read_columns
+from workbench.systems import load_system, open_model
+from workbench.wheelset.accuracy import (
+    KnownStop,
     contact_errors,
     fall_delay,
     force_error,
     friction_error,
-    judge,
     minimum_error,
-    read_truth,
+    observe_stop,
     rise_delay,
     slide_error,
 )
-from workbench.case import Case, read_cases
-from workbench.cosim import observe
-from workbench.fmu import FMU
-from workbench.objective import Weights, score
-from workbench.observers import ESTIMATORS, Estimator, PeakForce, make_estimators
-from workbench.recording import read_columns
-from workbench.rig import Effects, Stop, select, simulate, write_recording
-from workbench.tuning import default_settings
+from workbench.wheelset.claims import PeakForce
+from workbench.wheelset.rig import Effects, Stop, select, simulate, write_recording
+from workbench.wheelset.truth import read_truth
 
 ROOT = Path(__file__).parent.parent
 RECORDINGS = ROOT.parent / "shared" / "recordings"
-OBSERVERS = ESTIMATORS[2:]  # the others are baselines
-RR = 0.70
+SYSTEM = load_system("wheelset")
+KINDS = all_estimators(SYSTEM)
+OBSERVERS = tuple(KINDS)[2:]  # the others are baselines
 
 STOPS = tuple(sorted(folder.name for folder in (ROOT / "cases").iterdir()))
 DRY = tuple(name for name in STOPS if "_dry_" in name)
@@ -41,22 +44,25 @@ SLIDE = "09_wet_160_4.2_wsp"
 
 
 @pytest.fixture(scope="module")
-def estimators(root: Path) -> Iterator[dict[str, Estimator]]:
-    fmus = root / "fmus" / "fmi2"
-    with FMU(fmus / "MinimalObserver.fmu") as minimal, FMU(fmus / "FullObserver.fmu") as full:
-        made = make_estimators(ESTIMATORS, minimal, full, default_settings(minimal, full)[0])
-        yield {estimator.name: estimator for estimator in made}
+def estimators() -> Iterator[dict[str, Estimator]]:
+    with open_model(SYSTEM) as minimal, open_model(SYSTEM, "full") as full:
+        models = {"observer": minimal, "full": full}
+        yield {
+            name: kind(fmu, SYSTEM, usual_gains(kind, fmu, SYSTEM))
+            for name, kind in KINDS.items()
+            if (fmu := models[kind.role])
+        }
 
 
 # --- against the truth of the virtual rig ---
 
 
 @pytest.fixture(scope="module")
-def stops(estimators: dict[str, Estimator]) -> dict[str, Judged]:
+def stops(estimators: dict[str, Estimator]) -> dict[str, KnownStop]:
     made = list(estimators.values())
     return {
-        case.name: judge(case, read_truth(case, RR), made, RR)
-        for case in read_cases([ROOT / "cases"])
+        case.name: observe_stop(case, read_truth(case, SYSTEM), made, SYSTEM)
+        for case in read_cases([ROOT / "cases"], SYSTEM)
     }
 
 
@@ -67,7 +73,7 @@ def stops(estimators: dict[str, Estimator]) -> dict[str, Judged]:
     ids=["dry", "wet", "slide"],
 )
 def test_force_error_is_small(
-    stops: dict[str, Judged], observer: str, names: list[str], limit: float
+    stops: dict[str, KnownStop], observer: str, names: list[str], limit: float
 ) -> None:
     """Error of the contact force itself, which no sensor reads: rms over mean, below 5 Hz."""
     for name in names:
@@ -77,7 +83,7 @@ def test_force_error_is_small(
 @pytest.mark.parametrize("observer", OBSERVERS)
 @pytest.mark.parametrize(("names", "limit"), [(DRY, 0.01), (WET, 0.02)], ids=["dry", "wet"])
 def test_friction_of_the_pads_is_recovered(
-    stops: dict[str, Judged], observer: str, names: tuple[str, ...], limit: float
+    stops: dict[str, KnownStop], observer: str, names: tuple[str, ...], limit: float
 ) -> None:
     """From 1 s after the first contact to 1 m/s, below 5 Hz, at every time."""
     for name in names:
@@ -85,7 +91,7 @@ def test_friction_of_the_pads_is_recovered(
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_force_is_followed_within_half_a_second(stops: dict[str, Judged], observer: str) -> None:
+def test_force_is_followed_within_half_a_second(stops: dict[str, KnownStop], observer: str) -> None:
     """Nine tenths of what is reached 2 s after the first contact, and of the fall in the slide.
 
     The answer to a step proper is in `test_observers`.
@@ -109,7 +115,7 @@ OSCILLATING = {
 
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_no_oscillation_at_the_first_contact_of_the_pads(
-    stops: dict[str, Judged], observer: str
+    stops: dict[str, KnownStop], observer: str
 ) -> None:
     """The error swings to both sides by less than 3 % of the force that is being built up.
 
@@ -124,14 +130,14 @@ def test_no_oscillation_at_the_first_contact_of_the_pads(
 
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_dry_pads_are_followed_from_the_first_contact_on(
-    stops: dict[str, Judged], observer: str
+    stops: dict[str, KnownStop], observer: str
 ) -> None:
     for name in DRY:
         assert max(contact_errors(stops[name], observer)) < 0.03, name  # 3 % as above
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_the_slide_is_followed_to_its_minimum(stops: dict[str, Judged], observer: str) -> None:
+def test_the_slide_is_followed_to_its_minimum(stops: dict[str, KnownStop], observer: str) -> None:
     """The paper's disturbance observer misses the minimum."""
     stop = stops[SLIDE]
     # 15 % is what is asked inside a slide.
@@ -152,7 +158,7 @@ def slippery(
             stop = simulate(replace(scenario, muWR=muWR), 1, Effects(), reference_path)
             write_recording(stop, Effects(), 200, folder / f"{name}_{muWR}")
             made[f"{name}_{muWR}"] = stop
-    return [(case, made[case.name]) for case in read_cases([folder])]
+    return [(case, made[case.name]) for case in read_cases([folder], SYSTEM)]
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
@@ -166,10 +172,10 @@ def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
     """
     estimator, near = estimators[observer], []
     for case, stop in slippery:
-        run = observe(case, estimator)
-        used = PeakForce(estimator.fmu).utilisation(run.estimate)
+        run = replay(case, estimator)
+        used = PeakForce(estimator.fmu, SYSTEM).utilisation(run.estimate)
         error = run.signal("muWR") / stop.at(case.time, "muWR") - 1.0
-        near.append(error[run.muWR_claimed & (used > 0.7)])
+        near.append(error[run.claimed["muWR"] & (used > 0.7)])
     errors = np.abs(np.concatenate(near))
     assert errors.size > 10_000
     # What is measured, with a margin: 99.8 % of the Kalman filters, 91.5 to 96 % of the others.
@@ -182,13 +188,12 @@ def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
 ) -> None:
     """Median of the EKF where a dry contact would be claimed; the share is of the README."""
     (stop,) = (ROOT / "cases").glob(f"{name}_*")
-    (case,) = read_cases([stop])
-    run = observe(
-        replace(case, conditions=replace(case.conditions, wheel_rail="dry")), estimators["ekf"]
-    )
+    (case,) = read_cases([stop], SYSTEM)
+    as_dry = replace(case, conditions={**case.conditions, "wheel_rail": "dry"})
+    run = replay(as_dry, estimators["ekf"])
     truth = read_columns(stop / "truth.csv", ["time", "muWR"])
     true = np.interp(case.time, truth["time"].values, truth["muWR"].values)
-    error = (run.signal("muWR") / true - 1.0)[run.muWR_claimed]
+    error = (run.signal("muWR") / true - 1.0)[run.claimed["muWR"]]
     assert np.median(error) == pytest.approx(-low, abs=0.02)
 
 
@@ -198,9 +203,9 @@ def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
 def worst(estimator: Estimator, folder: Path, pattern: str = "") -> float:
     """Largest error of Fx, rms over mean, over the cases whose name holds the pattern."""
     errors = []
-    for case in read_cases([folder]):
+    for case in read_cases([folder], SYSTEM):
         if pattern in case.name:
-            error = score(case, observe(case, estimator), RR, Weights()).Fx_nrmse
+            error = score(case, replay(case, estimator), SYSTEM).nrmse
             assert error is not None, case.name
             errors.append(error)
     return max(errors)

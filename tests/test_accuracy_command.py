@@ -11,33 +11,34 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
-from workbench.accuracy import (
+from workbench.case import Case, read_case
+from workbench.cosim import Ending, Run
+from workbench.fmu import Vector
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.system import System
+from workbench.systems import load_system, open_model
+from workbench.wheelset.accuracy import (
     ROWS,
     Accuracy,
-    Judged,
+    KnownStop,
     StopAccuracy,
-    Truth,
     accuracy,
     contact_errors,
     force_error,
     friction_error,
-    judge,
     minimum_error,
-    read_truth,
+    observe_stop,
     rise_delay,
     slide_error,
     stop_accuracy,
     worst,
 )
-from workbench.case import Case, Conditions, read_case
-from workbench.cosim import Outcome, Run
-from workbench.fmu import FMU, Vector
-from workbench.observers import ESTIMATE, FilterNoise
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.report.accuracy import format_accuracy
+from workbench.wheelset.accuracy_report import format_accuracy
+from workbench.wheelset.truth import Truth, read_truth
 
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
-RR = 0.70  # [m]
+RW, RR = 0.46, 0.70  # [m]
+SYSTEM = load_system("wheelset")
 
 # --- definitions, on a stop in reverse from 30 m/s, with a slide from 10 to 11.5 s ---
 
@@ -49,13 +50,22 @@ FORCE[SLIDING] -= 6e3 * (1.0 - np.cos(2 * np.pi * (TIME[SLIDING] - 10.0) / 1.5))
 CASE = Case(
     name="hand",
     title="by hand",
-    conditions=Conditions(30.0, 3e5, "wet", ("dry", "dry", "wet"), -1),
+    conditions={
+        "initial_speed": 30.0,
+        "brake_pressure": 3e5,
+        "wheel_rail": "wet",
+        "discs": ("dry", "dry", "wet"),
+        "direction": -1,
+    },
     time=TIME,
-    pB=np.where(TIME > 4.0, 3e5, 0.0),
-    tauR=np.zeros(TIME.size),
-    omegaW=-SPEED / 0.46,
-    omegaR=-SPEED / RR,
-    Fx=None,
+    signals={
+        "pB": np.where(TIME > 4.0, 3e5, 0.0),
+        "tauR": np.zeros(TIME.size),
+        "omegaW": -SPEED / RW,
+        "omegaR": -SPEED / RR,
+    },
+    inputs=("pB", "tauR"),
+    outputs=("omegaW", "omegaR"),
     source=Path("hand/measured.csv"),
 )
 TRUTH = Truth(
@@ -67,14 +77,15 @@ TRUTH = Truth(
 )
 
 
-def estimated(force: Vector, muDC: Vector, outcome: Outcome = Outcome.OK) -> Judged:
+def estimated(force: Vector, muDC: Vector, ending: Ending = Ending.OK) -> KnownStop:
     """The stop with one run, whose force brakes if it is positive."""
-    estimate = np.full((TIME.size, len(ESTIMATE)), np.nan)
-    estimate[:, list(ESTIMATE).index("Fx")] = -force
-    estimate[:, list(ESTIMATE).index("muDC")] = muDC
-    blank, never = np.full(TIME.size, np.nan), np.zeros(TIME.size, bool)
-    run = Run("hand", "one", TIME, estimate, estimate, blank, outcome, "", 0.0, never)
-    return Judged(CASE, TRUTH, {"one": run}, RR)
+    estimate = np.full((TIME.size, len(SYSTEM.columns)), np.nan)
+    estimate[:, list(SYSTEM.columns).index("Fx")] = -force
+    estimate[:, list(SYSTEM.columns).index("muDC")] = muDC
+    blank = np.full(TIME.size, np.nan)
+    columns = SYSTEM.columns
+    run = Run("hand", "one", columns, TIME, estimate, estimate, blank, ending, "", 0.0, {})
+    return KnownStop(CASE, TRUTH, {"one": run}, SYSTEM)
 
 
 def test_a_force_that_is_too_large_by_a_constant() -> None:
@@ -155,20 +166,24 @@ def test_the_worst_is_taken_over_the_stops_that_a_row_concerns() -> None:
 
 def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst() -> None:
     never = Accuracy(force=0.01, rise_delay=math.inf)
-    failed = accuracy(estimated(FORCE, TRUTH.muDC, Outcome.NOT_FINITE), "one")
+    failed = accuracy(estimated(FORCE, TRUTH.muDC, Ending.NOT_FINITE), "one")
     stops = [stop_of("a", False, False, never), stop_of("b", True, False, failed)]
     cells = {line[:30].strip(): line[34:].split() for line in format_accuracy(stops).splitlines()}
     assert cells["force, dry discs"] == ["1.00", "%"]
     assert cells["force, wet discs"] == ["failed"]
     assert "never" in format_accuracy(stops[:1])
-    assert f"b, one: {Outcome.NOT_FINITE.value}" in format_accuracy(stops)
+    assert f"b, one: {Ending.NOT_FINITE.value}" in format_accuracy(stops)
 
 
 # --- the command ---
 
 
 def test_command_writes_every_stop_and_the_worst(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    system: System,
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """On cases that keep the truth of every fourth sample."""
     monkeypatch.chdir(root)
@@ -178,10 +193,12 @@ def test_command_writes_every_stop_and_the_worst(
     printed = capsys.readouterr().out
     assert all(row.text in printed for row in ROWS)
 
-    with FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as minimal:
-        ekf = ExtendedKalmanFilter(minimal, FilterNoise())
-        read = (read_case(root / case) for case in cases)
-        stops = {case.name: judge(case, read_truth(case, RR), [ekf], RR) for case in read}
+    with open_model(system) as fmu:
+        ekf = ExtendedKalmanFilter(fmu, system, ExtendedKalmanFilter.reasoned(fmu, system))
+        read = (read_case(root / case, system) for case in cases)
+        stops = {
+            case.name: observe_stop(case, read_truth(case, system), [ekf], system) for case in read
+        }
     summary = json.loads((tmp_path / "accuracy.json").read_text())
     table = pd.read_csv(tmp_path / "accuracy.csv").set_index(["case", "estimator"])
     for name, stop in stops.items():

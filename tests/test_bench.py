@@ -10,7 +10,7 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-from workbench.compiler.benchmark import measure_calls
+from workbench.compiler.benchmark import time_calls
 from workbench.description import read_description
 from workbench.errors import InputError
 
@@ -28,7 +28,7 @@ def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -
 
 
 def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path) -> None:
-    times = measure_calls(read_description(minimal_path), seed=1)
+    times = time_calls(read_description(minimal_path), seed=1)
     assert (times.states, times.inputs) == (2, 6)
     # 50 operations and five elementary functions: no computer needs less than 5 ns or, through
     # FMI, more than 5 us. A step is several evaluations.
@@ -51,7 +51,7 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_pat
         "    return (fmi2Status)instance_get_derivatives",
     )
     # 1000 volatile increments take 200 ns or more, the plain call 30 to 100.
-    assert measure_calls(read_description(slow), seed=1).ratios()["derivatives"] > 3.0
+    assert time_calls(read_description(slow), seed=1).ratios()["derivatives"] > 3.0
 
 
 @pytest.mark.parametrize(
@@ -66,11 +66,11 @@ def test_an_interface_that_gives_other_numbers_is_refused(
 ) -> None:
     changed = change_source(minimal_path, tmp_path / "wrong.fmu", "instance.c", right, wrong)
     with pytest.raises(InputError, match=rf"wrong\.fmu: found {found}"):
-        measure_calls(read_description(changed), seed=1)
+        time_calls(read_description(changed), seed=1)
 
 
 def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path) -> None:
     path = tmp_path / "three.fmu"
     shutil.copyfile(root / "fmus" / "fmi3" / "MinimalObserver.fmu", path)
     with pytest.raises(InputError, match=r"C sources of FMI 2\.0 that compile"):
-        measure_calls(read_description(path), seed=1)
+        time_calls(read_description(path), seed=1)

@@ -1,41 +1,31 @@
 """The loops that observers are measured against give the same estimates as the compiled laws."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.benchmark import fmpy_loops
 from workbench.benchmark.observers import resample
 from workbench.case import Case
 from workbench.fmu import FMU
-from workbench.observers import DisturbanceObserver, all_estimators, reasoned_settings
-
-LOOPS = {
-    "disturbance_observer": (fmpy_loops.disturbance_observer, "disturbance", "MinimalObserver"),
-    "parameter_estimator": (fmpy_loops.parameter_estimator, "parameter", "FullObserver"),
-    "ekf": (fmpy_loops.extended_kalman_filter, "noise", "MinimalObserver"),
-    "ukf": (fmpy_loops.unscented_kalman_filter, "noise", "MinimalObserver"),
-}
+from workbench.observers import choose
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.system import System
+from workbench.systems import open_model
+from workbench.wheelset.benchmark import LOOPS, by_fmpy
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_compiled_laws_agree_with_loops_written_in_numpy(
-    root: Path, dry_case: Case, name: str
+    system: System, dry_case: Case, name: str
 ) -> None:
     """Coasting, braking and standstill. 1e-9 of a column's largest value: rounding, grown 1e4."""
-    loop: Callable[..., fmpy_loops.Estimate]
-    loop, kind, model = LOOPS[name]
-    fmus = root / "fmus" / "fmi2"
     samples = (dry_case.time, dry_case.u, dry_case.y)
-    with FMU(fmus / "MinimalObserver.fmu") as minimal, FMU(fmus / "FullObserver.fmu") as full:
-        settings = reasoned_settings(minimal, full)
-        estimators = {e.name: e for e in all_estimators(minimal, full, settings)}
-        ours = estimators[name].run(*samples)
-        with fmpy_loops.FMPyModel(fmus / f"{model}.fmu") as by_fmpy:
-            theirs = loop(by_fmpy, getattr(settings, kind), *samples)
+    kind = choose(system, [name])[name]
+    with open_model(system, kind.role) as fmu:
+        gains = kind.reasoned(fmu, system)
+        ours = kind(fmu, system, gains).run(*samples)
+        with by_fmpy(name, fmu, system, gains) as loop:
+            theirs = loop(*samples)
     scale = np.abs(theirs.values).max(axis=0)
     assert_allclose(ours.values / scale, theirs.values / scale, rtol=0, atol=1e-9)
     if name in ("ekf", "ukf"):
@@ -45,15 +35,17 @@ def test_compiled_laws_agree_with_loops_written_in_numpy(
         assert_allclose(ours.nis, theirs.nis, rtol=1e-6, atol=1e-8)
 
 
-def test_plain_c_gives_the_same_bits_as_the_compiled_law(minimal: FMU, dry_case: Case) -> None:
+def test_plain_c_gives_the_same_bits_as_the_compiled_law(
+    system: System, minimal: FMU, dry_case: Case
+) -> None:
     """Same arithmetic in the same order, and neither compiler may contract or reorder it."""
     pytest.importorskip("ziglang")
-    from workbench.benchmark.c_loop import CLoop
-    from workbench.observers import stationary_gains
+    from workbench.wheelset.benchmark.c_loop import CLoop
 
-    gains = stationary_gains(minimal)
-    ours = DisturbanceObserver(minimal, gains).run(dry_case.time, dry_case.u, dry_case.y)
-    theirs = CLoop(minimal, gains).run(dry_case.time, dry_case.u, dry_case.y)
+    gains = DisturbanceObserver.reasoned(minimal, system)
+    observer = DisturbanceObserver(minimal, system, gains)
+    ours = observer.run(dry_case.time, dry_case.u, dry_case.y)
+    theirs = CLoop(minimal, system, gains).run(dry_case.time, dry_case.u, dry_case.y)
     assert_array_equal(ours.values, theirs)
 
 

@@ -10,23 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.benchmark import fmpy_loops
 from workbench.benchmark.memory import peak_memory, watch_command
 from workbench.benchmark.tuning import (
     EvaluationTimes,
     TuningMemory,
     WorkerRates,
-    evaluate_by_fmpy,
+    evaluate_by_loop,
     format_tuning,
-    measure_evaluation,
-    measure_evaluations,
-    measure_memory,
-    measure_workers,
+    observe_memory,
+    time_evaluation,
+    time_evaluations,
+    time_workers,
     tuning_job,
 )
 from workbench.case import Case
-from workbench.objective import Weights
-from workbench.observers import DisturbanceObserver
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.system import System
+from workbench.systems import open_model
+from workbench.wheelset.benchmark import by_fmpy
 
 SAMPLES = slice(700, 1300)  # 3 s: first pressure and the beginning of the stop
 MB = 1e6
@@ -34,15 +35,13 @@ MB = 1e6
 
 @pytest.fixture(scope="module")
 def case(dry_case: Case) -> Case:
-    signals = ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
-    return replace(dry_case, **{name: getattr(dry_case, name)[SAMPLES] for name in signals})
+    return dry_case.part(SAMPLES)
 
 
 def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(
-    root: Path, minimal_path: Path, case: Case
+    system: System, case: Case
 ) -> None:
-    full = root / "fmus" / "fmi2" / "FullObserver.fmu"
-    rows = measure_evaluations(case, minimal_path, full)
+    rows = time_evaluations(case, system)
     assert [row.estimator for row in rows] == ["disturbance_observer", "parameter_estimator"]
     for row in rows:
         assert row.steps == 600
@@ -52,18 +51,21 @@ def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(
         assert row.ratios() == {"fmpy": row.fmpy / row.ours}
 
 
-def test_times_of_evaluations_that_disagree_are_refused(minimal_path: Path, case: Case) -> None:
+def test_times_of_evaluations_that_disagree_are_refused(system: System, case: Case) -> None:
     """The other counts the force a millionth more."""
-    job = tuning_job(DisturbanceObserver.name, minimal_path, [case])
-    heavier = replace(job, weights=Weights(cF=1.000001e-3))
-    with fmpy_loops.FMPyModel(minimal_path) as model:
-        loop = functools.partial(fmpy_loops.disturbance_observer, model)
-        with pytest.raises(ArithmeticError, match="not those of the same evaluation"):
-            measure_evaluation(job, functools.partial(evaluate_by_fmpy, heavier, loop))
+    job = tuning_job(DisturbanceObserver, system, [case])
+    weights = {**system.objective.weights, "Fx": 1.000001e-3}
+    heavier = replace(system, objective=replace(system.objective, weights=weights))
+    with (
+        open_model(system) as fmu,
+        by_fmpy(job.estimator, fmu, system, job.gains) as loop,
+        pytest.raises(ArithmeticError, match="not those of the same evaluation"),
+    ):
+        time_evaluation(job, functools.partial(evaluate_by_loop, loop, case, heavier))
 
 
-def test_rates_of_workers_are_measured(minimal_path: Path, case: Case) -> None:
-    rates = measure_workers([case], minimal_path, candidates=4)
+def test_rates_of_workers_are_measured(system: System, case: Case) -> None:
+    rates = time_workers([case], system, candidates=4)
     assert (rates.cases, rates.candidates) == (1, 4)
     assert min(rates.one, rates.two) > 0.0
     assert rates.ratios()["two"] == rates.two / rates.one
@@ -75,10 +77,10 @@ def test_rates_of_workers_are_measured(minimal_path: Path, case: Case) -> None:
 
 
 def test_memory_of_master_and_workers_is_measured(
-    root: Path, minimal_path: Path, monkeypatch: pytest.MonkeyPatch
+    root: Path, system: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(root)
-    memory = measure_memory([root / "cases" / "03_dry_120_3.6"], minimal_path)
+    memory = observe_memory([root / "cases" / "03_dry_120_3.6"], system)
     # numba and its compiler alone take 80 MB in each.
     assert min(memory.master, memory.worker) > 80 * MB
     # A worker as large as the other within a fifth, and Python's process that clears up.

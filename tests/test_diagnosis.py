@@ -21,7 +21,7 @@ from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import judge
 from workbench.modelica import read_library
-from workbench.rig import SCENARIOS, Effects, select, simulate, write_recording
+from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
 
 ROOT = Path(__file__).parent.parent
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")

@@ -1,7 +1,6 @@
 """The physical trend of disc-pad friction: null, closed forms, and what it is good for."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,15 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.case import Case, read_case
-from workbench.cosim import Outcome, Run, observe
+from workbench.cosim import Ending, Run, replay
 from workbench.fmu import FMU
-from workbench.objective import Weights, score
-from workbench.observers import (
-    DiscModel,
-    DisturbanceGains,
-    DisturbanceObserver,
-    stationary_gains,
-)
+from workbench.objective import score
+from workbench.observers import Estimator, Gains
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.system import System
+from workbench.wheelset.estimators.disc import DiscModel, DiscObserver
 
 RR, RB, NOMINAL = 0.70, 0.30, 0.30
 
@@ -29,43 +26,55 @@ def fmu(minimal_path: Path) -> Iterator[FMU]:
 
 
 @pytest.fixture(scope="module")
-def gains(fmu: FMU) -> DisturbanceGains:
-    return stationary_gains(fmu)
+def gains(fmu: FMU, system: System) -> Gains:
+    return DisturbanceObserver.reasoned(fmu, system)
 
 
-def slowed(gains: DisturbanceGains, share: float) -> DisturbanceGains:
+def slowed(gains: Gains, share: float) -> Gains:
     """A share of the feedback on muDC; the wheelset still follows its measured speed."""
-    return replace(gains, L=gains.L * np.array([1.0, 1.0, 1.0, share])[:, None])
+    values = gains.values.copy()
+    values[12:16] *= share
+    return gains.with_values(values)
 
 
-def without_feedback(fmu: FMU, gains: DisturbanceGains, case: Case, disc: DiscModel) -> Run:
-    run = observe(case, DisturbanceObserver(fmu, slowed(gains, 0.0), disc))
-    assert run.outcome is Outcome.OK
+def without_feedback(fmu: FMU, system: System, gains: Gains, case: Case, disc: DiscModel) -> Run:
+    run = replay(case, DiscObserver(fmu, system, slowed(gains, 0.0), disc))
+    assert run.ending is Ending.OK
     return run
 
 
+def column(system: System, name: str) -> int:
+    return list(system.columns).index(name)
+
+
 def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(
-    fmu: FMU, gains: DisturbanceGains, dry_case: Case
+    fmu: FMU, system: System, gains: Gains, dry_case: Case
 ) -> None:
     """The disc warms, but neither speed nor temperature matters to friction."""
     zero = DiscModel(slope=0.0, fade=0.0)
-    runs = [observe(dry_case, DisturbanceObserver(fmu, gains, d)) for d in (None, zero)]
-    assert runs[0].outcome is Outcome.OK
+    observers: list[Estimator] = [
+        DisturbanceObserver(fmu, system, gains),
+        DiscObserver(fmu, system, gains, zero),
+    ]
+    runs = [replay(dry_case, observer) for observer in observers]
+    assert runs[0].ending is Ending.OK
     assert_array_equal(runs[0].estimate, runs[1].estimate)
 
 
-def test_the_two_observers_can_be_told_apart_by_name(fmu: FMU, gains: DisturbanceGains) -> None:
-    names = [DisturbanceObserver(fmu, gains, d).name for d in (None, DiscModel())]
+def test_the_two_observers_can_be_told_apart_by_name(
+    fmu: FMU, system: System, gains: Gains
+) -> None:
+    names = [kind(fmu, system, gains).name for kind in (DisturbanceObserver, DiscObserver)]
     assert names == ["disturbance_observer", "disturbance_observer_disc"]
 
 
 @pytest.mark.parametrize("name", ["03_dry_120_3.6", "05_dry_120_2.7_rev"])
 def test_without_feedback_friction_follows_the_law_of_speed(
-    root: Path, fmu: FMU, gains: DisturbanceGains, name: str
+    root: Path, fmu: FMU, system: System, gains: Gains, name: str
 ) -> None:
     """Reference: muDC = 0.30 (1 + slope (1 - v/speed)), in both directions."""
-    case = read_case(root / "cases" / name)
-    run = without_feedback(fmu, gains, case, DiscModel(slope=0.2, fade=0.0, speed=22.0))
+    case = read_case(root / "cases" / name, system)
+    run = without_feedback(fmu, system, gains, case, DiscModel(slope=0.2, fade=0.0, speed=22.0))
     law = NOMINAL * (1.0 + 0.2 * (1.0 - RR * np.abs(run.signal("omegaR")) / 22.0))
     # The law takes the speed of the sample before; the rest is rounding of 8000 additions.
     assert_allclose(run.signal("muDC")[1:], law[:-1], atol=1e-11, rtol=0.0)
@@ -73,7 +82,7 @@ def test_without_feedback_friction_follows_the_law_of_speed(
 
 
 def test_without_feedback_friction_fades_with_the_energy_of_the_brake(
-    fmu: FMU, gains: DisturbanceGains, dry_case: Case
+    fmu: FMU, system: System, gains: Gains, dry_case: Case
 ) -> None:
     """Reference: warming is share * energy / capacity without cooling; brake as in the nominal
     plant, three discs, 10.86 kN/bar above 0.25 bar."""
@@ -87,8 +96,8 @@ def test_without_feedback_friction_fades_with_the_energy_of_the_brake(
         share=share,
         cooling=0.0,
     )
-    run = without_feedback(fmu, gains, dry_case, disc)
-    press = 10.86e3 * np.maximum(0.0, dry_case.pB / 1e5 - 0.25)
+    run = without_feedback(fmu, system, gains, dry_case, disc)
+    press = 10.86e3 * np.maximum(0.0, dry_case["pB"] / 1e5 - 0.25)
     omegaW = run.signal("omegaW")
     power = 3 * RB * run.signal("muDC") * press * np.abs(omegaW * np.tanh(omegaW / 0.05))
     energy = np.append(0.0, np.cumsum(power[:-1] * np.diff(dry_case.time)))
@@ -99,16 +108,19 @@ def test_without_feedback_friction_fades_with_the_energy_of_the_brake(
 
 
 def test_a_disc_cools_to_the_air_with_its_time_constant(
-    fmu: FMU, gains: DisturbanceGains, dry_case: Case
+    fmu: FMU, system: System, gains: Gains, dry_case: Case
 ) -> None:
     """Reference: T - ambient falls by exp(-cooling t/capacity) at rest without pressure."""
     disc = DiscModel(slope=0.0, fade=1e-3, temperature=20.0, capacity=2e5, cooling=1e4)
-    observer = DisturbanceObserver(fmu, slowed(gains, 0.0), disc)
+    observer = DiscObserver(fmu, system, slowed(gains, 0.0), disc)
     y, pressed = np.array([80.0, 80.0 * 0.46 / RR]), np.array([4e5, 0.0])
     observer.init(0.0, pressed, y)
-    observer.step(1.0, pressed, y)
+    # The heat of a step is that of the pressure at the sample before it.
+    for t in (1.0, 2.0):
+        observer.step(t, pressed, y)
+    muDC = column(system, "muDC")
     warmth = [
-        NOMINAL - observer.step(1.0 + 0.01 * k, np.zeros(2), y).values[5] for k in range(1, 2002)
+        NOMINAL - observer.step(2.0 + 0.01 * k, np.zeros(2), y).values[muDC] for k in range(1, 2002)
     ]
     assert warmth[0] > 1e-4
     # Explicit Euler with h/tau = 0.01/20 over one time constant: relative error 1e-3/4.
@@ -116,33 +128,36 @@ def test_a_disc_cools_to_the_air_with_its_time_constant(
 
 
 def test_what_was_learned_decays_towards_the_law_not_towards_the_constant(
-    fmu: FMU, gains: DisturbanceGains, dry_case: Case
+    fmu: FMU, system: System, gains: Gains, dry_case: Case
 ) -> None:
     """At rest the law of speed says 0.30 (1 + slope); a decay of 2/s forgets all else in 10 s."""
-    observer = DisturbanceObserver(fmu, replace(gains, T_DC=-2.0), DiscModel(slope=0.25, fade=0.0))
+    values = gains.values.copy()
+    values[gains.names.index("T_muDC")] = -2.0
+    disc = DiscModel(slope=0.25, fade=0.0)
+    observer = DiscObserver(fmu, system, gains.with_values(values), disc)
     observer.run(dry_case.time, dry_case.u, dry_case.y)
     nothing, end = np.zeros(2), dry_case.time[-1]
     observer.step(end, dry_case.u[-1], nothing)
     for k in range(1, 1001):
-        muDC = observer.step(end + 0.01 * k, nothing, nothing).values[5]
+        muDC = observer.step(end + 0.01 * k, nothing, nothing).values[column(system, "muDC")]
     # exp(-20) of what was learned, and a wheelset that creeps at some mm/s.
     assert muDC == pytest.approx(0.375, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["03_dry_120_3.6", "05_dry_120_2.7_rev"])
 def test_slow_feedback_errs_half_as_much_with_the_trend(
-    root: Path, fmu: FMU, gains: DisturbanceGains, name: str
+    root: Path, fmu: FMU, system: System, gains: Gains, name: str
 ) -> None:
     """A thirtieth of the gain on muDC cannot follow the rise of friction; the textbook trend can.
 
     Measured: 0.60 to 0.23 % in case 03, 0.59 to 0.28 % in case 05; half is asked.
     """
-    case = read_case(root / "cases" / name)
+    case = read_case(root / "cases" / name, system)
     slow = slowed(gains, 0.03)
     constant, physical = (
-        score(case, observe(case, DisturbanceObserver(fmu, slow, disc)), RR, Weights())
-        for disc in (None, DiscModel())
+        score(case, replay(case, kind(fmu, system, slow)), system).nrmse
+        for kind in (DisturbanceObserver, DiscObserver)
     )
-    assert constant.Fx_nrmse is not None
-    assert physical.Fx_nrmse is not None
-    assert physical.Fx_nrmse < 0.5 * constant.Fx_nrmse
+    assert constant is not None
+    assert physical is not None
+    assert physical < 0.5 * constant

@@ -5,7 +5,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
@@ -19,26 +19,19 @@ from fmpy.validation import validate_fmu
 from workbench.__main__ import main
 from workbench.case import Case, read_cases
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.observers import (
-    ESTIMATE,
-    DisturbanceObserver,
-    Estimator,
-    FilterNoise,
-    ParameterEstimator,
-    ParameterGains,
-)
-from workbench.tuning import format_gains, reasoned_gains
-from workbench.tuning.space import build
+from workbench.observers import Estimator, Gains, choose
+from workbench.observers.gains_file import format_gains
+from workbench.systems import load_system, open_model
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.compiler.archive import PLATFORMS
-from workbench.export import OBSERVERS, ObserverModel, build_observer, observer, write_package
+from workbench.export import ObserverModel, build_observer, observer, write_package
 
-NAMES = tuple(OBSERVERS)
-MODELS = {DisturbanceObserver.name: "MinimalObserver", ParameterEstimator.name: "FullObserver"}
+SYSTEM = load_system("wheelset")
+KINDS = choose(SYSTEM, list(SYSTEM.export.classes))
+NAMES = tuple(KINDS)
 INPUTS = ("pB", "tauR", "omegaW", "omegaR")
 # Outputs of the FMU and the columns of a Python estimate that they are.
 OUTPUTS = {
@@ -61,39 +54,45 @@ class Exported:
     python: Estimator
 
 
-def write_fmu(root: Path, folder: Path, name: str, gains: observer.Gains, fmi: int = 2) -> Path:
-    package = root / "modelica" / "WheelsetRig" / "package.mo"
-    model = ObserverModel(package, f"WheelsetRig.Observers.{OBSERVERS[name]}", gains, "")
-    path = folder / f"fmi{fmi}" / f"{OBSERVERS[name]}.fmu"
+def reasoned(name: str) -> Gains:
+    with open_model(SYSTEM, KINDS[name].role) as fmu:
+        return KINDS[name].reasoned(fmu, SYSTEM)
+
+
+def write_fmu(folder: Path, gains: Gains, fmi: int = 2) -> Path:
+    model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
+    path = folder / f"fmi{fmi}" / f"{model.model.rpartition('.')[2]}.fmu"
     build_observer(model, path, fmi, lambda _: None, platforms=["linux-x86_64"])
     return path
 
 
-def with_all_gains(name: str, gains: observer.Gains) -> observer.Gains:
+def with_all_gains(gains: Gains) -> Gains:
     """Reasoned gains with those that are zero filled in, on dy and on its integral."""
-    L = gains.L.copy()
-    if isinstance(gains, ParameterGains):
+    values = gains.values.copy()
+    if gains.estimator == "parameter_estimator":
+        L = values.reshape(2, 4)
         L[:, :2] = [[0.2, -0.3], [0.1, -2.0]]
         L[1, 2] = -1.0
     else:
+        L = values[:16].reshape(4, 4)
         L[:, 2:] = 0.3 * L[:, :2]
-    return replace(gains, L=L)
+    return gains.with_values(values)
 
 
 @pytest.fixture(scope="module", params=NAMES)
 def exported(
-    request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Exported]:
-    name = request.param
-    with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
-        gains = with_all_gains(name, reasoned_gains(name, fmu))
-        path = write_fmu(root, tmp_path_factory.mktemp(name), name, gains)
-        yield Exported(path, build(name, fmu, gains))
+    kind = KINDS[request.param]
+    with open_model(SYSTEM, kind.role) as fmu:
+        gains = with_all_gains(kind.reasoned(fmu, SYSTEM))
+        path = write_fmu(tmp_path_factory.mktemp(kind.name), gains)
+        yield Exported(path, kind(fmu, SYSTEM, gains))
 
 
 @pytest.fixture(scope="module")
 def cases(root: Path) -> list[Case]:
-    return read_cases([root / "cases"])
+    return read_cases([root / "cases"], SYSTEM)
 
 
 @contextmanager
@@ -134,7 +133,7 @@ def run_fmu(path: Path, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.nd
 
 
 def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-    columns = [list(ESTIMATE).index(name) for name in OUTPUTS.values()]
+    columns = [list(SYSTEM.columns).index(name) for name in OUTPUTS.values()]
     return estimator.run(time, u, y).values[:, columns]
 
 
@@ -170,13 +169,13 @@ def test_limits_of_friction_are_kept_and_reached(exported: Exported, dry_case: C
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_tool_without_python_of_ours_gets_the_same(
-    root: Path, tmp_path: Path, dry_case: Case, name: str, fmi: int
+    tmp_path: Path, dry_case: Case, name: str, fmi: int
 ) -> None:
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
-    with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
-        gains = reasoned_gains(name, fmu)
-        path = write_fmu(root, tmp_path, name, gains, fmi)
-        estimator = build(name, fmu, gains)
+    with open_model(SYSTEM, KINDS[name].role) as fmu:
+        gains = KINDS[name].reasoned(fmu, SYSTEM)
+        path = write_fmu(tmp_path, gains, fmi)
+        estimator = KINDS[name](fmu, SYSTEM, gains)
         expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
     assert validate_fmu(str(path)) == []
     time = np.arange(dry_case.time.size) * 0.005
@@ -215,14 +214,12 @@ def test_a_restored_state_repeats_the_steps(exported: Exported, dry_case: Case) 
         fmu.freeFMUState(state)
 
 
-def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones(root: Path) -> None:
+def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones() -> None:
     for name in NAMES:
-        with FMU(root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu") as fmu:
-            gains = reasoned_gains(name, fmu)
-        package = root / "modelica" / "WheelsetRig" / "package.mo"
-        flat = observer.flatten(package, f"WheelsetRig.Observers.{OBSERVERS[name]}")
+        gains = reasoned(name)
+        flat = observer.flatten(SYSTEM.library, ObserverModel(SYSTEM, KINDS[name], gains, "").model)
         defaults = {v.name: v.start for v in flat.parameters}
-        for parameter, value in observer.parameter_values(gains).items():
+        for parameter, value in observer.parameter_values(gains, SYSTEM).items():
             # The classes give nine digits.
             assert defaults[parameter] == pytest.approx(value, rel=1e-8, abs=1e-9), parameter
 
@@ -231,10 +228,10 @@ def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones(root: Path)
 def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder that the command writes, with gains from a file."""
     folder = tmp_path_factory.mktemp("export")
-    with FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as fmu:
-        gains = reasoned_gains(DisturbanceObserver.name, fmu)
-    halved = replace(gains, L=0.5 * gains.L)
-    (folder / "gains.toml").write_text(format_gains(DisturbanceObserver.name, halved, {"z": 0.3}))
+    gains = reasoned("disturbance_observer")
+    values = gains.values.copy()
+    values[:16] *= 0.5
+    (folder / "gains.toml").write_text(format_gains(gains.with_values(values), "", {"z": 0.3}))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
         command = ["export", "--gains", str(folder / "gains.toml"), "--out", str(folder / "out")]
@@ -314,7 +311,10 @@ def test_gains_of_an_estimator_without_a_model_are_refused(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(root)
-    (tmp_path / "gains.toml").write_text(format_gains("ekf", FilterNoise(), {}))
+    kind = choose(SYSTEM, ["ekf"])["ekf"]
+    with open_model(SYSTEM) as fmu:
+        filter_noise = kind.reasoned(fmu, SYSTEM)
+    (tmp_path / "gains.toml").write_text(format_gains(filter_noise, "", {}))
     command = ["export", "--gains", str(tmp_path / "gains.toml"), "--out", str(tmp_path / "out")]
     assert main(command) == 2
     assert (
@@ -345,11 +345,11 @@ def test_only_a_reference_with_the_connectors_goes_into_a_package(
     ssp = tmp_path / "out.ssp"
     observer_fmu = package / "out" / "DisturbanceObserver.fmu"
     with pytest.raises(InputError, match=match):
-        write_package(observer_fmu, root / "fmus" / fmu, ssp)
+        write_package(SYSTEM, observer_fmu, root / "fmus" / fmu, ssp)
     assert not ssp.exists()
 
 
 def test_a_model_without_the_readings_is_refused(package: Path, tmp_path: Path) -> None:
     fmu = package / "out" / "DisturbanceObserver.fmu"
     with pytest.raises(InputError, match="no output 'omegaWReading'"):
-        write_package(fmu, fmu, tmp_path / "out.ssp")
+        write_package(SYSTEM, fmu, fmu, tmp_path / "out.ssp")

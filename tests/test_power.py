@@ -13,31 +13,32 @@ import pytest
 from scipy.stats import binom
 
 from workbench.__main__ import main
-from workbench.diagnosis import read_effects
-from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.extension import variables
 from workbench.errors import InputError
 from workbench.fmu import FMU
-from workbench.modelica import read_library
 from workbench.power import (
-    PLANTABLE,
+    Diagnosed,
     Journal,
-    Judged,
     Named,
     Planting,
-    measure,
+    Repertoire,
+    diagnose_sets,
     plan,
     share,
     summarise,
 )
+from workbench.power.diagnosing import build_everything, library_effects
 from workbench.power.planting import Group, Kind
 from workbench.power.statistics import intervals_cover, named_all, named_right
 from workbench.report.power import format_power, write_power
-from workbench.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
+from workbench.systems import load_system
+from workbench.wheelset.planting import PLANTABLE, PlantedStops
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
-LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
-EFFECTS = read_effects(LIBRARY, "MinimalObserver")
+SYSTEM = load_system("wheelset")
+REPERTOIRE = Repertoire(PLANTABLE, library_effects(SYSTEM))
 IDENTITY = {"seed": 1}
 
 
@@ -51,10 +52,13 @@ def short(name: str, speed: float) -> Scenario:
 STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
 
 
-def said(gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = "") -> Judged:
+def said(
+    gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = ""
+) -> Diagnosed:
     """A verdict on a set: causes, or other words, or nothing."""
     verdict = other or ("found" if causes else "nothing")
-    return Judged(Planting(kind, 1, 4.0, gains), verdict, causes, None, None, 1.0)
+    effects = tuple(REPERTOIRE.plantable(name).effect for name in gains)
+    return Diagnosed(Planting(kind, 1, 4.0, gains, effects), verdict, causes, None, None, 1.0)
 
 
 def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> Named:
@@ -64,8 +68,7 @@ def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> 
 @pytest.fixture(scope="module")
 def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("fmu") / "AllEffects.fmu"
-    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "")
-    build(LIBRARY, "AllEffects", text, path, every_platform=False)
+    build_everything(SYSTEM, REPERTOIRE.effects, path)
     return path
 
 
@@ -74,7 +77,7 @@ def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside() -> None:
     assert sorted(one.effect for one in PLANTABLE if one.effect) == sorted(
-        effect.name for effect in EFFECTS
+        effect.name for effect in REPERTOIRE.effects
     )
     faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
     rig = {field.name for field in dataclasses.fields(Effects)} - faults_of_the_acquisition
@@ -98,14 +101,14 @@ def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Pa
     """Beyond them no fit could find it. A size that cannot be negative is never planted so."""
     with FMU(all_effects) as fmu:
         bounds = {v.name: (v.minimum, v.maximum) for v in fmu.description.variables}
-    for effect in EFFECTS:
+    for effect in REPERTOIRE.effects:
         one = next(one for one in PLANTABLE if one.effect == effect.name)
         low, high = bounds[variables(effect, effect.size)[0]]
         assert low is not None
         assert high is not None
         if not effect.hidden:
-            assert 4.0 * one.size(EFFECTS) <= high, effect.name
-            assert not one.signed or -4.0 * one.size(EFFECTS) >= low, effect.name
+            assert 4.0 * REPERTOIRE.size(one) <= high, effect.name
+            assert not one.signed or -4.0 * REPERTOIRE.size(one) >= low, effect.name
         assert set(one.shapes) == {name for name, _ in effect.shapes}
 
 
@@ -115,33 +118,31 @@ def test_longer_plan_holds_the_shorter_one() -> None:
     def options(groups: list[Group]) -> set[str]:
         return {one.options for group in groups for one in group}
 
-    shorter, longer = (
-        plan(EFFECTS, 2, [1.0, 4.0], 1, 2, 1),
-        plan(EFFECTS, 5, [0.5, 1.0, 4.0], 2, 3, 1),
-    )
+    shorter = plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 1)
+    longer = plan(REPERTOIRE, 5, [0.5, 1.0, 4.0], 2, 3, 1)
     assert options(shorter) < options(longer)
-    assert options(shorter).isdisjoint(options(plan(EFFECTS, 2, [1.0, 4.0], 1, 2, 2)))
+    assert options(shorter).isdisjoint(options(plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 2)))
 
 
 def test_each_simulation_has_tolerances_of_its_own() -> None:
-    groups = plan(EFFECTS, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
+    groups = plan(REPERTOIRE, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
     seeds = [group[0].seed for group in groups]
     assert len(set(seeds)) == len(seeds)
     assert all(one.seed == group[0].seed for group in groups for one in group)
 
 
 def test_plan_that_is_cut_short_has_something_of_each_kind() -> None:
-    groups = plan(EFFECTS, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
+    groups = plan(REPERTOIRE, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
     assert {group[0].kind for group in groups[:20]} == {"clean", "single", "pair", "outside"}
 
 
 def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for() -> None:
     signs: dict[str, set[float]] = {}
-    for one, *_ in plan(EFFECTS, 1, [3.0], 12, 1, 1):
+    for one, *_ in plan(REPERTOIRE, 1, [3.0], 12, 1, 1):
         if one.kind == "single":
             ((name, gain),) = one.gains.items()
-            plantable = next(p for p in PLANTABLE if p.name == name)
-            assert abs(gain) == pytest.approx(3.0 * plantable.size(EFFECTS), rel=1e-5)  # six digits
+            size = REPERTOIRE.size(REPERTOIRE.plantable(name))
+            assert abs(gain) == pytest.approx(3.0 * size, rel=1e-5)  # six digits
             signs.setdefault(name, set()).add(np.sign(gain))
     assert signs["fx_gain"] == {-1.0, 1.0}
     assert signs["cylinder_lag"] == signs["water_film"] == signs["pole_ring"] == {1.0}
@@ -189,13 +190,13 @@ def test_pair_is_found_if_each_effect_has_a_cause_of_its_own() -> None:
 def test_intervals_are_judged_by_the_law_of_the_rig() -> None:
     near, far = (2.1, 1.9, 2.3), (1.0, 0.9, 1.1)
     bedding = named("BeddingIn", loss=(-0.04, -0.05, -0.03), tau=far)
-    assert intervals_cover(said({"bedding_in": -0.04}, bedding), EFFECTS) == [True, False]
+    assert intervals_cover(said({"bedding_in": -0.04}, bedding), REPERTOIRE) == [True, False]
     # The phase of an amplitude is free in each stop, so that its sign means nothing.
     ring = named("PoleRingEccentricity", amplitude=near)
-    assert intervals_cover(said({"pole_ring": -2.0}, ring), EFFECTS) == [True]
+    assert intervals_cover(said({"pole_ring": -2.0}, ring), REPERTOIRE) == [True]
     # A twin has a size of its own, which is no claim on what was planted.
     twin = named("DriveTorqueGain", "FxGain", gain=near)
-    assert intervals_cover(said({"fx_gain": 1.0}, twin), EFFECTS) == []
+    assert intervals_cover(said({"fx_gain": 1.0}, twin), REPERTOIRE) == []
 
 
 def test_summary_counts_what_was_said(tmp_path: Path) -> None:
@@ -213,7 +214,7 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
         said({"friction_step": 0.04}, kind="outside", other="unexplained"),
         said({"drive_beat": 0.02}, kind="outside", other="failed"),
     ]
-    found = summarise(results, EFFECTS)
+    found = summarise(results, REPERTOIRE)
     shares = (
         "false_alarms",
         "right_first",
@@ -235,7 +236,7 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
     assert found["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
     assert [one["said"] for one in found["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
     assert len(found["failed"]) == 1
-    write_power(found, EFFECTS, {}, tmp_path)
+    write_power(found, REPERTOIRE.effects, {}, tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {
         "power.json",
         *(
@@ -248,9 +249,9 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
-def test_run_that_ended_early_is_reported(results: list[Judged], tmp_path: Path) -> None:
-    found = summarise(results, EFFECTS)
-    write_power(found, EFFECTS, {}, tmp_path)
+def test_run_that_ended_early_is_reported(results: list[Diagnosed], tmp_path: Path) -> None:
+    found = summarise(results, REPERTOIRE)
+    write_power(found, REPERTOIRE.effects, {}, tmp_path)
     assert f"{len(results)} sets" in format_power(found)
 
 
@@ -287,24 +288,16 @@ def test_verdicts_of_another_run_are_refused(tmp_path: Path) -> None:
 # --- all of it ---
 
 _GROUPS = [
-    (Planting("clean", 11, 0.0, {}),),
-    tuple(Planting("single", 12, x, {"fx_gain": 0.002 * x}) for x in (8.0, 0.25)),
+    (Planting("clean", 11, 0.0, {}, ()),),
+    tuple(Planting("single", 12, x, {"fx_gain": 0.002 * x}, ("FxGain",)) for x in (8.0, 0.25)),
 ]
 
 
-def run(out: Path, report: Callable[[str], None]) -> tuple[list[Judged], bool]:
-    return measure(
-        _GROUPS,
-        STOPS,
-        REFERENCE,
-        LIBRARY,
-        "MinimalObserver",
-        EFFECTS,
-        out,
-        seed=1,
-        workers=1,
-        resume=True,
-        report=report,
+def run(out: Path, report: Callable[[str], None]) -> tuple[list[Diagnosed], bool]:
+    rig = PlantedStops(tuple(STOPS), REFERENCE)
+    effects = library_effects(SYSTEM)
+    return diagnose_sets(
+        _GROUPS, SYSTEM, rig, effects, out, seed=1, workers=1, resume=True, report=report
     )
 
 
@@ -334,7 +327,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert lines[0].startswith("[   1/2] fx_gain=0.016")
     assert [one.verdict for one in results] == ["nothing", "found", "nothing"]
     assert named_right(results[1])
-    assert summarise(results, EFFECTS)["false_alarms"]["hits"] == 0
+    assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
 
 
 def _comes_true(condition: Callable[[], bool]) -> bool:

@@ -16,13 +16,14 @@ import pytest
 from workbench.__main__ import main
 from workbench.case import read_case, read_cases
 from workbench.errors import InputError
-from workbench.rig import (
+from workbench.systems import load_system
+from workbench.wheelset.rig import (
     ORDINARY_PADS,
     SCENARIOS,
     STANDARD,
     Stop,
     check_files,
-    measure,
+    sample,
     select,
     simulate,
 )
@@ -30,6 +31,7 @@ from workbench.rig import (
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1
+SYSTEM = load_system("wheelset")
 TRAIN_INERTIA, ROLLER_INERTIA, WHEELSET_INERTIA = 7840.0, 1500.0, 110.0  # kg.m2, data sheet
 ROLLER_RADIUS, BRAKE_RADIUS = 0.70, 0.30  # m, data sheet
 
@@ -223,35 +225,35 @@ def test_another_seed_gives_another_stop() -> None:
     name = "03_dry_120_3.6"
     stops = [make(name), simulate(SCENARIOS[name], SEED + 1, ORDINARY_PADS, REFERENCE)]
     assert stops[0].drawn.muDC != stops[1].drawn.muDC
-    noise = [measure(s, ORDINARY_PADS, s.time[1000:1100])["pB"] for s in stops]
+    noise = [sample(s, ORDINARY_PADS, s.time[1000:1100])["pB"] for s in stops]
     assert not np.array_equal(noise[0], noise[1])
 
 
 def test_recordings_are_cases_with_their_conditions(recordings: Path) -> None:
-    for case in read_cases([recordings]):
+    for case in read_cases([recordings], SYSTEM):
         wanted = SCENARIOS[case.name].conditions
         assert case.title == SCENARIOS[case.name].title
         # Speed and pressure are written in km/h and bar; rounding is 1e-16.
-        assert case.conditions.initial_speed == pytest.approx(wanted.initial_speed, rel=1e-12)
-        assert case.conditions.brake_pressure == pytest.approx(wanted.brake_pressure, rel=1e-12)
-        assert case.conditions.wheel_rail == wanted.wheel_rail
-        assert case.conditions.discs == wanted.discs
+        assert case.conditions["initial_speed"] == pytest.approx(wanted.initial_speed, rel=1e-12)
+        assert case.conditions["brake_pressure"] == pytest.approx(wanted.brake_pressure, rel=1e-12)
+        assert case.conditions["wheel_rail"] == wanted.wheel_rail
+        assert case.conditions["discs"] == wanted.discs
         made = json.loads((recordings / case.name / "truth.json").read_text())
         assert np.diff(case.time) == pytest.approx(0.005)
         assert 3.0 <= made["demand"] <= 5.0
         # Two seconds of standstill, to a sample.
         assert case.time[-1] - made["standstill"] == pytest.approx(2.0, abs=0.006)
         # Five sigma of the relative noise, and what drag takes in coasting and running in.
-        speed = abs(case.omegaR[0]) * ROLLER_RADIUS
-        assert speed == pytest.approx(case.conditions.initial_speed, rel=2e-3)
-        assert np.sign(case.omegaW[0]) == case.conditions.direction == wanted.direction
-        assert case.Fx is not None
+        speed = abs(case["omegaR"][0]) * ROLLER_RADIUS
+        assert speed == pytest.approx(case.conditions["initial_speed"], rel=2e-3)
+        assert np.sign(case["omegaW"][0]) == case.conditions["direction"] == wanted.direction
+        assert "Fx" in case
 
 
 def test_truth_stands_in_files_of_its_own(recordings: Path) -> None:
     folder = recordings / "10_wet_100_2.7_rev"
     truth = pd.read_csv(folder / "truth.csv")
-    case = read_case(folder)
+    case = read_case(folder, SYSTEM)
     assert np.array_equal(truth["time [s]"], case.time)
     assert truth["film2 [1]"].iloc[0] == 1.0
     assert truth["film2 [1]"].iloc[-1] < 0.1
@@ -315,7 +317,7 @@ def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
     assert first.startswith("[  1/14]")
     assert process.returncode == 130
     assert "Traceback" not in errors
-    kept = read_cases([tmp_path])
+    kept = read_cases([tmp_path], SYSTEM)
     assert 1 <= len(kept) < 14
     assert f"{len(kept)} of 14 cases" in rest
     assert not list(tmp_path.rglob("*.part"))

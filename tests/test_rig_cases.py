@@ -10,7 +10,8 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.case import read_cases
-from workbench.rig import STANDARD
+from workbench.systems import load_system
+from workbench.wheelset.rig import STANDARD
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"
@@ -26,7 +27,7 @@ COMMAND = [
 
 
 def test_cases_are_the_standard_stops_of_the_rig() -> None:
-    assert tuple(case.name for case in read_cases([CASES])) == STANDARD
+    assert tuple(case.name for case in read_cases([CASES], load_system("wheelset"))) == STANDARD
     for name in STANDARD:
         made = json.loads((CASES / name / "truth.json").read_text())
         assert (made["seed"], made["rate"]) == (1, 200)
@@ -58,13 +59,13 @@ def test_a_case_made_anew_has_the_same_bytes(tmp_path: Path) -> None:
     assert old | {"fmu_sha256": None} == new | {"fmu_sha256": None}
 
 
-def test_nothing_but_the_judge_reads_the_truth_of_the_rig() -> None:
-    """What estimates, tunes or diagnoses cannot import the judge either: its layer is above."""
+def test_nothing_but_accuracy_reads_the_truth_of_the_rig() -> None:
+    """What estimates, tunes or diagnoses cannot import it either: its layer is above."""
     package = ROOT / "workbench"
     readers = {
         path.relative_to(package).as_posix()
         for path in package.rglob("*.py")
         if re.search(r"truth\.(csv|json)", path.read_text())
     }
-    rig, judge = {"rig/files.py", "commands/rig.py"}, {"accuracy.py", "commands/accuracy.py"}
-    assert readers <= rig | judge
+    files = ("rig/files.py", "commands/rig.py", "truth.py", "commands/accuracy.py")
+    assert readers <= {f"wheelset/{name}" for name in files}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.rig import (
+from workbench.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
     Effects,
@@ -18,9 +18,9 @@ from workbench.rig import (
     simulate,
     write_recording,
 )
-from workbench.rig.brake import Brake, Valve
-from workbench.rig.pads import Pads
-from workbench.rig.wheel import OutOfRoundWheel
+from workbench.wheelset.rig.brake import Brake, Valve
+from workbench.wheelset.rig.pads import Pads
+from workbench.wheelset.rig.wheel import OutOfRoundWheel
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"

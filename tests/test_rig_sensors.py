@@ -9,7 +9,16 @@ import pandas as pd
 import pytest
 
 from workbench.case import read_case
-from workbench.rig import CONSTANT_PADS, SCENARIOS, Stop, measure, plant, simulate, write_recording
+from workbench.systems import load_system
+from workbench.wheelset.rig import (
+    CONSTANT_PADS,
+    SCENARIOS,
+    Stop,
+    plant,
+    sample,
+    simulate,
+    write_recording,
+)
 
 REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1
@@ -36,8 +45,8 @@ def recorded(stop: Stop) -> np.ndarray:
 def added(planted: str, stop: Stop) -> dict[str, np.ndarray]:
     """What an effect of the sensors adds to each channel."""
     time = recorded(stop)
-    without = measure(stop, CONSTANT_PADS, time)
-    changed = measure(stop, plant(CONSTANT_PADS, [planted]), time)
+    without = sample(stop, CONSTANT_PADS, time)
+    changed = sample(stop, plant(CONSTANT_PADS, [planted]), time)
     return {name: changed[name] - without[name] for name in CHANNELS}
 
 
@@ -60,7 +69,7 @@ def test_sensor_has_the_white_noise_of_the_data_sheet(
     stop = make(speed=160.0)
     time = stop.time[stop.time >= 0.0][::5]
     truth = stop.at(time, signal)
-    error = measure(stop, CONSTANT_PADS, time)[name] - truth
+    error = sample(stop, CONSTANT_PADS, time)[name] - truth
     # Rounding adds a variance of resolution^2/12.
     scaled = error / np.hypot(noise + relative * abs(truth), resolution / np.sqrt(12.0))
     n = scaled.size
@@ -100,7 +109,7 @@ def test_effect_of_a_sensor_shows_in_its_channels_alone(
 def test_pole_ring_ripples_with_the_phase_of_its_stop() -> None:
     stop = make()
     time = recorded(stop)
-    reading = measure(stop, plant(CONSTANT_PADS, ["pole_ring=0.01"]), time)["omegaW"]
+    reading = sample(stop, plant(CONSTANT_PADS, ["pole_ring=0.01"]), time)["omegaW"]
     t = (time > 0.5) & (time < stop.drawn.coasting)
     ripple = (reading / stop.at(time, "omegaW"))[t]
     angle = stop.at(time, "phiW")[t] + stop.phases.pole_ring
@@ -123,7 +132,7 @@ def test_apex_offset_adds_the_same_force_in_both_directions(direction: int) -> N
 def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
     stop = make()
     time = recorded(stop)
-    measured = measure(stop, plant(CONSTANT_PADS, ["fx_gain=0.015"]), time)["Fx"]
+    measured = sample(stop, plant(CONSTANT_PADS, ["fx_gain=0.015"]), time)["Fx"]
     cell = stop.at(time, "Fcell")
     slope = cell @ measured / (cell @ cell)
     # Four sigma of the noise of 80 N over the record.
@@ -152,7 +161,7 @@ def test_load_cell_drifts_in_time_in_both_directions() -> None:
 def test_spikes_are_rare_isolated_and_large() -> None:
     stop = make()
     time = recorded(stop)
-    without = measure(stop, CONSTANT_PADS, time)
+    without = sample(stop, CONSTANT_PADS, time)
     spikes = added("spikes=3", stop)
     expected = 3.0 * (time[-1] - time[0])
     struck = {name: np.flatnonzero(spikes[name]) for name in CHANNELS}
@@ -177,7 +186,7 @@ def test_dropouts_leave_out_rows_and_nothing_else(tmp_path: Path) -> None:
     assert set(kept) < set(full)
     expected = rate * stop.time[-1]
     assert len(full) - len(kept) == pytest.approx(expected, abs=4.0 * np.sqrt(expected))
-    case = read_case(tmp_path / "lossy")
+    case = read_case(tmp_path / "lossy", load_system("wheelset"))
     assert np.diff(case.time).max() > 0.009
     truth = pd.read_csv(tmp_path / "lossy" / "truth.csv")
     assert np.array_equal(truth["time [s]"], case.time)
@@ -187,8 +196,8 @@ def test_dropouts_leave_out_rows_and_nothing_else(tmp_path: Path) -> None:
 def test_load_cell_saturates_at_its_limit(direction: int) -> None:
     stop = make(direction=direction)
     time = recorded(stop)
-    without = measure(stop, CONSTANT_PADS, time)["Fx"]
-    limited = measure(stop, plant(CONSTANT_PADS, ["fx_limit=15000"]), time)["Fx"]
+    without = sample(stop, CONSTANT_PADS, time)["Fx"]
+    limited = sample(stop, plant(CONSTANT_PADS, ["fx_limit=15000"]), time)["Fx"]
     within = abs(without) <= 15e3
     assert np.array_equal(limited[within], without[within])
     assert set(limited[~within]) == {15e3 * direction}

@@ -8,18 +8,15 @@ import numpy as np
 import pytest
 
 from workbench.case import Case, read_case
-from workbench.cosim import Run, observe
+from workbench.cosim import Run, replay
 from workbench.fmu import FMU
-from workbench.observers import (
-    ESTIMATE,
-    DirectInversion,
-    DisturbanceObserver,
-    ExtendedKalmanFilter,
-    OpenLoop,
-    PeakForce,
-    stationary_gains,
-)
+from workbench.observers import Estimator, choose
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.system import System
+from workbench.systems import load_system
+from workbench.wheelset.claims import PeakForce
 
+COLUMNS = list(load_system("wheelset").columns)
 RR, NOMINAL = 0.70, 0.15
 Slide = tuple[Case, Run]
 
@@ -31,15 +28,15 @@ def fmu(minimal_path: Path) -> Iterator[FMU]:
 
 
 @pytest.fixture(scope="module")
-def peak_force(fmu: FMU) -> PeakForce:
-    return PeakForce(fmu)
+def peak_force(fmu: FMU, system: System) -> PeakForce:
+    return PeakForce(fmu, system)
 
 
 def estimates(
     muWR: list[float], force: list[float], *, speed: float = 40.0, slip: float = 0.01
 ) -> np.ndarray:
     """Rows of an estimate; force of one wheel [N], speed and slip [m/s]."""
-    rows = np.zeros((len(muWR), len(ESTIMATE)))
+    rows = np.zeros((len(muWR), len(COLUMNS)))
     for name, values in {
         "omegaR": speed / RR,
         "muWR": muWR,
@@ -47,7 +44,7 @@ def estimates(
         "Fx": np.multiply(2.0, force),
         "slip": slip,
     }.items():
-        rows[:, list(ESTIMATE).index(name)] = values
+        rows[:, COLUMNS.index(name)] = values
     return rows
 
 
@@ -91,8 +88,8 @@ def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(
 
 def test_direction_does_not_matter(peak_force: PeakForce) -> None:
     forward = estimates([0.2, 0.3], [10e3, 10e3], slip=0.1)
-    signs = np.ones(len(ESTIMATE))
-    signs[[list(ESTIMATE).index(name) for name in ("omegaR", "Fx", "slip")]] = -1.0
+    signs = np.ones(len(COLUMNS))
+    signs[[COLUMNS.index(name) for name in ("omegaR", "Fx", "slip")]] = -1.0
     np.testing.assert_array_equal(
         peak_force.utilisation(forward), peak_force.utilisation(signs * forward)
     )
@@ -117,27 +114,28 @@ def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
     assert not peak_force.claims(estimates([0.2], [20e3], speed=0.4))
 
 
+def made(fmu: FMU, system: System, name: str) -> Estimator:
+    """An estimator with reasoned gains."""
+    kind = choose(system, [name])[name]
+    return kind(fmu, system, kind.reasoned(fmu, system))
+
+
 @pytest.fixture(scope="module")
-def slide(root: Path, fmu: FMU) -> Slide:
-    case = read_case(root / "cases" / "09_wet_160_4.2_wsp")
-    return case, observe(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
+def slide(root: Path, fmu: FMU, system: System) -> Slide:
+    case = read_case(root / "cases" / "09_wet_160_4.2_wsp", system)
+    return case, replay(case, made(fmu, system, DisturbanceObserver.name))
 
 
-def test_a_dry_stop_claims_nothing(fmu: FMU, dry_case: Case) -> None:
+def test_a_dry_stop_claims_nothing(fmu: FMU, system: System, dry_case: Case) -> None:
     """An ordinary dry stop uses half of the adhesion at most: muWR is not observable in it."""
-    for estimator in (
-        OpenLoop(fmu),
-        DirectInversion(fmu),
-        DisturbanceObserver(fmu, stationary_gains(fmu)),
-        ExtendedKalmanFilter(fmu),
-    ):
-        assert not observe(dry_case, estimator).muWR_claimed.any(), estimator.name
+    for name in ("open_loop", "direct_inversion", "disturbance_observer", "ekf"):
+        assert not replay(dry_case, made(fmu, system, name)).claimed["muWR"].any(), name
 
 
 def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slide) -> None:
     """Slip beyond 2 m/s is beyond the peak of any contact (at most 1 m/s with this law)."""
     case, run = slide
-    sliding = RR * case.omegaR - 0.46 * case.omegaW > 2.0
+    sliding = RR * case["omegaR"] - 0.46 * case["omegaW"] > 2.0
     claimed = peak_force.claims(run.estimate)
     assert sliding.sum() > 50  # a quarter of a second of the recording
     assert claimed[sliding].all()
@@ -145,18 +143,22 @@ def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slid
 
 
 def test_on_a_wet_rail_a_model_of_the_dry_contact_claims_nothing(slide: Slide) -> None:
-    assert not slide[1].muWR_claimed.any()
+    assert not slide[1].claimed["muWR"].any()
 
 
 def called_dry(case: Case) -> Case:
-    return replace(case, conditions=replace(case.conditions, wheel_rail="dry"))
+    return replace(case, conditions={**case.conditions, "wheel_rail": "dry"})
 
 
-def test_the_same_recording_from_a_dry_rail_would_be_claimed(slide: Slide, fmu: FMU) -> None:
-    observer = DisturbanceObserver(fmu, stationary_gains(fmu))
-    assert observe(called_dry(slide[0]), observer).muWR_claimed.any()
+def test_the_same_recording_from_a_dry_rail_would_be_claimed(
+    slide: Slide, fmu: FMU, system: System
+) -> None:
+    observer = made(fmu, system, DisturbanceObserver.name)
+    assert replay(called_dry(slide[0]), observer).claimed["muWR"].any()
 
 
-@pytest.mark.parametrize("kind", [OpenLoop, DirectInversion])
-def test_methods_that_estimate_no_friction_claim_none(fmu: FMU, slide: Slide, kind: type) -> None:
-    assert not observe(called_dry(slide[0]), kind(fmu)).muWR_claimed.any()
+@pytest.mark.parametrize("name", ["open_loop", "direct_inversion"])
+def test_methods_that_estimate_no_friction_claim_none(
+    fmu: FMU, system: System, slide: Slide, name: str
+) -> None:
+    assert not replay(called_dry(slide[0]), made(fmu, system, name)).claimed["muWR"].any()

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 
-from workbench.commands import COMMANDS
 from workbench.errors import FMUError, InputError
+from workbench.installed import companions
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,15 +31,17 @@ def _parser(command: str) -> argparse.ArgumentParser:
     """Parser of the command line, which knows the arguments of one command only."""
     parser = argparse.ArgumentParser(
         prog="workbench",
-        description="Observers for the longitudinal dynamics of a wheelset, on FMUs.",
+        description="Observers, their tuning, and a diagnosis of models, on FMUs.",
     )
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for name, text in COMMANDS.items():
-        if name == command:
-            import_module(f"workbench.commands.{name}").add(commands)
-        else:
-            commands.add_parser(name, help=text)
+    packages = ["workbench.commands", *(f"{name}.commands" for name in companions())]
+    for package in packages:
+        for name, text in import_module(package).COMMANDS.items():
+            if name == command:
+                import_module(f"{package}.{name}").add(commands)
+            else:
+                commands.add_parser(name, help=text)
     return parser
 
 

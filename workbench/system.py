@@ -395,6 +395,20 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Export:
+    """Estimators that the library has as Modelica classes, for FMUs that run without Python.
+
+    Attributes
+    ----------
+    classes : by estimator, without the library's name.
+    start : of the reference model, beside which a package sets them.
+    """
+
+    classes: Mapping[str, str]
+    start: OperatingPoint
+
+
+@dataclass(frozen=True)
 class System:
     """A machine: its models, its signals, what is estimated, and what counts.
 
@@ -413,6 +427,7 @@ class System:
     inputs, outputs : measured; inputs drive the models, outputs correct estimates.
     judged : measured, but only there to judge by.
     reported : outputs of the model that estimates hold, with their units.
+    export : estimators as FMUs.
     companion : Python package with a virtual rig and more estimators; empty: none.
     shortest : [s] that a recording must last.
     settles : [s] in which a model comes to rest at an operating point.
@@ -445,6 +460,7 @@ class System:
     rolling: Rolling | None = None
     following: Following | None = None
     panels: tuple[View, ...] = ()
+    export: Export = Export({}, OperatingPoint({}, {}, {}))
     companion: str = ""
     shortest: float = 0.0
     settles: float = 10.0

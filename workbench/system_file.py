@@ -17,6 +17,7 @@ from workbench.system import (
     Derived,
     Estimated,
     Exclusion,
+    Export,
     Fading,
     Following,
     Influence,
@@ -52,7 +53,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         ["name", "title", "companion", "reported", "models", "parameters", "inputs", "outputs", "judged"]
         + ["derived", "estimated", "states", "feedback", "points", "conditions", "objective"]
-        + ["tuning", "diagnosis", "figures", "shortest", "sample_time"]
+        + ["tuning", "diagnosis", "figures", "export", "shortest", "sample_time"]
     )
     system = _signals(file, path)
     system = _placed(file, with_model(system, OBSERVER, system.models[OBSERVER].path))
@@ -340,6 +341,7 @@ def _placed(file: Table, system: System) -> System:
         rolling=_rolling(feedback.table("rolls")) if "rolls" in feedback else None,
         following=_following(tuning.table("follows")) if "follows" in tuning else None,
         panels=tuple(_view(table, system) for table in file.tables("figures")),
+        export=_export(file.table("export"), system),
     )
 
 
@@ -354,6 +356,15 @@ def _point(points: Table, name: str, system: System) -> OperatingPoint:
         {key: inputs.number(key, units[key]) for key in inputs.content},
         {key: Expression(held.take(key, str), f"{held.where} {key}") for key in held.content},
         {key: quantities.number(key, units[key]) for key in quantities.content},
+    )
+
+
+def _export(table: Table, system: System) -> Export:
+    table.refuse_unknown(("classes", "start"))
+    classes = table.table("classes")
+    return Export(
+        {name: classes.take(name, str) for name in classes.content},
+        _point(table, "start", system) if "start" in table else OperatingPoint({}, {}, {}),
     )
 
 

@@ -1,26 +1,12 @@
 """Systems by name or file, and their models."""
 
-from functools import cache
 from pathlib import Path
 
-from workbench import resources
 from workbench.errors import InputError, closest
 from workbench.fmu import FMU
+from workbench.installed import FILE, system_files
 from workbench.system import OBSERVER, System
 from workbench.system_file import read_system
-from workbench.tables import read_table
-
-FILE = "system.toml"
-
-
-@cache
-def installed() -> dict[str, Path]:
-    """System files that come with the workbench, by name."""
-    found = {}
-    for path in sorted(resources.modelica().glob(f"*/{FILE}")):
-        table = read_table(path, "install the workbench again", 'title = "..."')
-        found[table.text("name", path.parent.name)] = path
-    return found
 
 
 def load_system(which: str | Path) -> System:
@@ -31,7 +17,7 @@ def load_system(which: str | Path) -> System:
     InputError
         If there is none of this name, or its file has a mistake.
     """
-    known, path = installed(), Path(which)
+    known, path = system_files(), Path(which)
     if str(which) in known:
         return read_system(known[str(which)])
     if path.is_dir():
@@ -44,6 +30,25 @@ def load_system(which: str | Path) -> System:
             remedy="correct the name or path; 'workbench systems' lists what is installed",
         )
     return read_system(path)
+
+
+def model_path(system: System, role: str) -> Path:
+    """The FMU of a role.
+
+    Raises
+    ------
+    InputError
+        If the system has no model in this role, or it is not built.
+    """
+    model = system.models.get(role)
+    if model is None or model.path is None:
+        raise InputError(
+            where=f"{system.source}, [models] {role}",
+            found="no such model" if model is None else "a model without an FMU",
+            expected=f"an FMU in the role '{role}'",
+            remedy=f'write {role} = {{ class = "NAME", fmu = "FILE" }}',
+        )
+    return model.path
 
 
 def open_model(system: System, role: str = OBSERVER) -> FMU:

@@ -5,21 +5,21 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
+from workbench.benchmark.observers import opened
+from workbench.case import Case, read_case
+from workbench.observers import Estimator
+from workbench.systems import load_system
 
-from workbench.fmu import FMU
-from workbench.observers import Estimator, all_estimators, reasoned_settings
 
-
-def first_call(estimator: Estimator) -> float:
-    """Seconds of a run over two samples at 20 m/s."""
-    time_, u, y = np.array([0.0, 0.001]), np.zeros((2, 2)), np.tile([43.5, 28.6], (2, 1))
+def first_call(estimator: Estimator, case: Case) -> float:
+    """Seconds of a run over the first two samples of a recording."""
     begin = time.perf_counter()
-    estimator.run(time_, u, y)
+    estimator.run(case.time[:2], case.u[:2], case.y[:2])
     return time.perf_counter() - begin
 
 
 if __name__ == "__main__":
-    with FMU(Path(sys.argv[1])) as minimal, FMU(Path(sys.argv[2])) as full:
-        estimators = all_estimators(minimal, full, reasoned_settings(minimal, full))
-        print(json.dumps({e.name: first_call(e) for e in estimators}))
+    machine = load_system(sys.argv[1])
+    recording = read_case(Path(sys.argv[2]), machine)
+    with opened(machine, []) as estimators:
+        print(json.dumps({e.name: first_call(e, recording) for e in estimators}))

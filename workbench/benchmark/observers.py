@@ -1,6 +1,5 @@
 """Times of the observers: compiled laws beside FMPy's methods and plain C, in one run."""
 
-import functools
 import json
 import math
 import os
@@ -9,28 +8,20 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from workbench.benchmark import fmpy_loops
-from workbench.benchmark.c_loop import CLoop
 from workbench.benchmark.memory import peak_memory
+from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
 from workbench.case import Case
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers import (
-    DisturbanceObserver,
-    Estimator,
-    ExtendedKalmanFilter,
-    ParameterEstimator,
-    Settings,
-    UnscentedKalmanFilter,
-    reasoned_settings,
-)
+from workbench.fmu import Matrix, Vector
+from workbench.observers import Estimator, choose
 from workbench.pool import Pool
+from workbench.system import OBSERVER, System
+from workbench.systems import open_model
 
 RATES = (200.0, 1000.0, 5000.0)  # Hz
 LENGTH = 4  # times the recording, for the growth with length
@@ -40,6 +31,7 @@ _FEW = 3  # where one run is long
 _FMPY_STEPS = 1500
 _PROCESSES = 2
 _PROCESS_REPEATS = 5
+_FULL = "full"  # role of a larger model
 
 Samples = tuple[Vector, Matrix, Matrix]
 
@@ -71,7 +63,7 @@ class ObserverTimes:
 
 @dataclass(frozen=True)
 class ProcessTimes:
-    """All four observers over all cases at 1 kHz, in workers that have loaded their FMUs.
+    """All observers over all cases at 1 kHz, in workers that have loaded their FMUs.
 
     Attributes
     ----------
@@ -102,61 +94,58 @@ def resample(case: Case, rate: float, stretch: float = 1.0) -> Samples:
     return t, u, y
 
 
-def measure_observers(case: Case, minimal: Path, full: Path) -> list[ObserverTimes]:
-    """Time all observers on one recording; Kalman filters on both models.
+@contextmanager
+def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[list[Estimator]]:
+    """Estimators by name with reasoned gains, the standard ones if none is named.
 
     Parameters
     ----------
-    minimal, full : the two observer models, FMI 2.0, the minimal one with C sources.
+    role : of the model that all run on; empty: each on its own.
     """
     with ExitStack() as stack:
-        small, large = (stack.enter_context(FMU(path)) for path in (minimal, full))
-        settings = reasoned_settings(small, large)
-        by_fmpy, by_fmpy_large = (
-            stack.enter_context(fmpy_loops.FMPyModel(path)) for path in (minimal, full)
-        )
-        loops: list[Callable[..., object] | None] = [
-            functools.partial(fmpy_loops.disturbance_observer, by_fmpy, settings.disturbance),
-            functools.partial(fmpy_loops.parameter_estimator, by_fmpy_large, settings.parameter),
-            functools.partial(fmpy_loops.extended_kalman_filter, by_fmpy, settings.noise),
-            functools.partial(fmpy_loops.unscented_kalman_filter, by_fmpy, settings.noise),
-            None,
-            None,
-        ]
-        estimators = [
-            *_observers(small, large, settings),
-            ExtendedKalmanFilter(large, settings.noise),
-            UnscentedKalmanFilter(large, settings.noise),
-        ]
-        plain = CLoop(small, settings.disturbance)
-        return [
-            _measure(case, estimator, loop, plain if estimator is estimators[0] else None)
-            for estimator, loop in zip(estimators, loops, strict=True)
-        ]
+        ready = []
+        for kind in choose(system, names).values():
+            fmu = stack.enter_context(open_model(system, role or kind.role))
+            ready.append(kind(fmu, system, kind.reasoned(fmu, system)))
+        yield ready
 
 
-def _observers(minimal: FMU, full: FMU, settings: Settings) -> list[Estimator]:
-    return [
-        DisturbanceObserver(minimal, settings.disturbance),
-        ParameterEstimator(full, settings.parameter),
-        ExtendedKalmanFilter(minimal, settings.noise),
-        UnscentedKalmanFilter(minimal, settings.noise),
-    ]
+def tuned_names(system: System) -> list[str]:
+    """Estimators that are measured: standard ones with gains, the others do little."""
+    return [name for name, kind in choose(system, []).items() if kind.tunable]
 
 
-def _measure(
-    case: Case, estimator: Estimator, by_fmpy: Callable[..., object] | None, plain: CLoop | None
-) -> ObserverTimes:
+def time_observers(case: Case, system: System) -> list[ObserverTimes]:
+    """Time all observers on one recording; those on the observer's model on the full one too.
+
+    What they are measured against is written for FMUs of FMI 2.0 with C sources.
+    """
+    names = tuned_names(system)
+    kinds = choose(system, names)
+    times = []
+    with opened(system, names) as estimators:
+        for one in estimators:
+            with by_fmpy(one.name, one.fmu, system, one.gains) as loop:
+                plain = by_c(one.name, one.fmu, system, one.gains)
+                times.append(_time(case, one, loop, plain))
+    larger = [name for name, kind in kinds.items() if kind.role == OBSERVER]
+    if _FULL in system.models and larger:
+        with opened(system, larger, _FULL) as estimators:
+            times += [_time(case, one, None, None) for one in estimators]
+    return times
+
+
+def _time(case: Case, estimator: Estimator, loop: Loop | None, plain: Loop | None) -> ObserverTimes:
     estimator.run(*resample(case, _RATE))
-    runs: list[Callable[..., object]] = [estimator.run, *([plain.run] if plain else [])]
+    runs: list[Loop] = [estimator.run, *([plain] if plain else [])]
     step, *c = _per_step(runs, resample(case, _RATE))
     by_rate = {rate: _per_step([estimator.run], resample(case, rate), _FEW)[0] for rate in RATES}
     fmpy = None
-    if by_fmpy is not None:
+    if loop is not None:
         t, u, y = resample(case, _RATE)
         # From the middle of the recording on, where every law does its full work.
         part = slice(t.size // 3, t.size // 3 + _FMPY_STEPS)
-        fmpy = _per_step([by_fmpy], (t[part], u[part], y[part]), _FEW)[0]
+        fmpy = _per_step([loop], (t[part], u[part], y[part]), _FEW)[0]
     return ObserverTimes(
         observer=estimator.name,
         states=len(estimator.fmu.states),
@@ -169,9 +158,7 @@ def _measure(
     )
 
 
-def _per_step(
-    runs: Sequence[Callable[..., object]], samples: Samples, repeats: int = _REPEATS
-) -> list[float]:
+def _per_step(runs: Sequence[Loop], samples: Samples, repeats: int = _REPEATS) -> list[float]:
     """Median time per step [s] of each; in turns, so that they meet the same load."""
     spent: list[list[float]] = [[] for _ in runs]
     for _ in range(repeats):
@@ -182,11 +169,15 @@ def _per_step(
     return [statistics.median(times) / samples[0].size for times in spent]
 
 
-def measure_compilation(minimal: Path, full: Path) -> dict[str, float]:
+def time_compilation(system: System, case: Case) -> dict[str, float]:
     """Time of the first call of each observer [s], in a process with an empty cache."""
+    recording = str(case.source.parent)
     with tempfile.TemporaryDirectory() as cache:
         run = subprocess.run(
-            [sys.executable, "-m", "workbench.benchmark.first_calls", str(minimal), str(full)],
+            [
+                *(sys.executable, "-m", "workbench.benchmark.first_calls"),
+                *(str(system.source), recording),
+            ],
             env={**os.environ, "XDG_CACHE_HOME": cache},
             capture_output=True,
             text=True,
@@ -196,21 +187,19 @@ def measure_compilation(minimal: Path, full: Path) -> dict[str, float]:
     return seconds
 
 
-def measure_processes(cases: Sequence[Case], minimal: Path, full: Path) -> ProcessTimes:
+def time_processes(cases: Sequence[Case], system: System) -> ProcessTimes:
     """Time all cases with one worker and with two."""
-    one, memory = _time_workers(1, cases, minimal, full)
-    two, _ = _time_workers(_PROCESSES, cases, minimal, full)
+    one, memory = _time_workers(1, cases, system)
+    two, _ = _time_workers(_PROCESSES, cases, system)
     return ProcessTimes(len(cases), one, two, memory)
 
 
-def _time_workers(
-    workers: int, cases: Sequence[Case], minimal: Path, full: Path
-) -> tuple[float, int]:
+def _time_workers(workers: int, cases: Sequence[Case], system: System) -> tuple[float, int]:
     """Median time of all cases [s], and the largest memory of a worker [bytes]."""
     # The longest first, so that no worker is left with a long one at the end.
     order = sorted(range(len(cases)), key=lambda k: -cases[k].time[-1])
     spent, memory = [], 0
-    with Pool(workers, _prepared, (list(cases), minimal, full), isolated=True) as pool:
+    with Pool(workers, _prepared, (list(cases), system), isolated=True) as pool:
         pool.map(_run, order)  # until all workers are ready
         for _ in range(_PROCESS_REPEATS):
             begin = time.perf_counter()
@@ -223,11 +212,10 @@ _Prepared = tuple[list[Estimator], list[Samples]]
 
 
 @contextmanager
-def _prepared(given: tuple[Sequence[Case], Path, Path]) -> Iterator[_Prepared]:
+def _prepared(given: tuple[Sequence[Case], System]) -> Iterator[_Prepared]:
     """All observers, and the cases at 1 kHz."""
-    cases, minimal, full = given
-    with FMU(minimal) as small, FMU(full) as large:
-        estimators = _observers(small, large, reasoned_settings(small, large))
+    cases, system = given
+    with opened(system, tuned_names(system)) as estimators:
         samples = [resample(case, _RATE) for case in cases]
         for estimator in estimators:
             estimator.run(*(part[:2] for part in samples[0]))

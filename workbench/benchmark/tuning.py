@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.benchmark import fmpy_loops
 from workbench.benchmark.memory import watch_command
+from workbench.benchmark.other_ways import by_fmpy
 from workbench.case import Case
-from workbench.fmu import FMU, Vector
-from workbench.objective import Weights
-from workbench.observers import DisturbanceObserver, Estimate, ParameterEstimator
+from workbench.objective import samples
+from workbench.observers import Estimate, Estimator, choose
+from workbench.system import System
+from workbench.systems import open_model
 from workbench.tuning import (
     LIMIT,
     Candidate,
@@ -27,10 +28,8 @@ from workbench.tuning import (
     Workers,
     evaluate_all,
     evaluators,
-    from_vector,
-    reasoned_gains,
     recording,
-    to_vector,
+    tunable,
 )
 
 WORKERS = 2
@@ -104,41 +103,55 @@ class TuningMemory:
     total: int
 
 
-def measure_evaluations(case: Case, minimal: Path, full: Path) -> list[EvaluationTimes]:
-    """Time the reasoned gains of the two observers of the paper on one recording.
-
-    Parameters
-    ----------
-    minimal, full : the two observer models, FMI 2.0.
-    """
+def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
+    """Time reasoned gains on one recording, of the standard observers whose feedback is tuned."""
     times = []
-    for name, path, loop in (
-        (DisturbanceObserver.name, minimal, fmpy_loops.disturbance_observer),
-        (ParameterEstimator.name, full, fmpy_loops.parameter_estimator),
-    ):
-        job = tuning_job(name, path, [case])
-        with fmpy_loops.FMPyModel(path) as model:
-            by_fmpy = functools.partial(evaluate_by_fmpy, job, functools.partial(loop, model))
-            times.append(measure_evaluation(job, by_fmpy))
+    for kind in (kind for kind in choose(system, []).values() if kind.tunable):
+        job = tuning_job(kind, system, [case])
+        if not job.gains.design:
+            continue  # a filter makes its feedback as it goes
+        with (
+            open_model(system, kind.role) as fmu,
+            by_fmpy(kind.name, fmu, system, job.gains) as loop,
+        ):
+            if loop is not None:
+                by_loop = functools.partial(evaluate_by_loop, loop, case, system)
+                times.append(time_evaluation(job, by_loop))
     return times
 
 
-def tuning_job(estimator: str, path: Path, cases: Sequence[Case]) -> Job:
-    """What is to be judged, about the reasoned gains."""
-    with FMU(path) as fmu:
-        gains = reasoned_gains(estimator, fmu)
-    recordings = tuple(map(recording, cases))
-    return Job(estimator, path.read_bytes(), {}, gains, recordings, Weights())
+def tuning_job(kind: type[Estimator], system: System, cases: Sequence[Case]) -> Job:
+    """What is to be evaluated, about the reasoned gains."""
+    with open_model(system, kind.role) as fmu:
+        gains, model = kind.reasoned(fmu, system), fmu.path.read_bytes()
+    recordings = tuple(recording(case, system) for case in cases)
+    return Job(kind.name, system, model, gains, recordings)
 
 
-def evaluate_by_fmpy(job: Job, loop: Callable[..., Estimate], values: Vector) -> float:
-    """The z of gains, (n,), over the first recording of a job, by a loop over FMPy's methods."""
-    case = job.recordings[0]
-    estimate = loop(from_vector(job.gains, values), np.cumsum(case.steps), case.u, case.y)
-    return fmpy_loops.objective(estimate, case, job.weights)
+def evaluate_by_loop(loop: Callable[..., Estimate], case: Case, system: System) -> float:
+    """The z of a recording by a loop written another way, and numpy."""
+    return objective(loop(case.time, case.u, case.y), case, system)
 
 
-def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> EvaluationTimes:
+def objective(estimate: Estimate, case: Case, system: System) -> float:
+    """z_k, equation (12) of Schwarz et al. (2018), of deviations below the bandwidth."""
+    names, columns = list(system.objective.weights), list(system.columns)
+    estimated = np.asarray(estimate.values)[:, [columns.index(name) for name in names]]
+    deviations = estimated - np.column_stack([case[name] for name in names])
+    steps, shares = samples(case.time)
+    # Two equal poles, which together are down by 3 dB at the bandwidth.
+    corner = 2 * np.pi * system.objective.bandwidth / np.sqrt(np.sqrt(2) - 1)
+    gains = np.where(steps > 0.0, 1.0 - np.exp(-corner * steps), 1.0)
+    smooth = np.empty_like(deviations)
+    first = second = np.zeros(len(names))
+    for k, gain in enumerate(gains):
+        first = first + gain * (deviations[k] - first)
+        second = second + gain * (first - second)
+        smooth[k] = second
+    return float(shares @ np.abs(smooth) @ np.array(list(system.objective.weights.values())))
+
+
+def time_evaluation(job: Job, by_loop: Callable[[], float]) -> EvaluationTimes:
     """Time the reasoned gains over the first recording of a job, in turns with another way.
 
     Raises
@@ -146,7 +159,7 @@ def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> Evaluati
     ArithmeticError
         If the other way finds another z, because then it does other work.
     """
-    values = to_vector(job.gains)
+    values = job.gains.values
     ours, theirs = [], []
     with Evaluator(job) as evaluator:
         for _ in range(_REPEATS):
@@ -155,7 +168,7 @@ def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> Evaluati
                 evaluation = evaluator.evaluate(Candidate(values, np.inf, (0,)))
                 ours.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            z = by_fmpy(values)
+            z = by_loop()
             theirs.append(time.perf_counter() - begin)
             if not abs(z - evaluation.z) <= _AGREEMENT * evaluation.z:
                 raise ArithmeticError(
@@ -168,19 +181,24 @@ def measure_evaluation(job: Job, by_fmpy: Callable[[Vector], float]) -> Evaluati
     )
 
 
-def measure_workers(
-    cases: Sequence[Case], minimal: Path, candidates: int = CANDIDATES
+def first_tuned(system: System) -> str:
+    """The standard estimator that workers and memory are measured with."""
+    return next(name for name, kind in choose(system, []).items() if kind.tunable)
+
+
+def time_workers(
+    cases: Sequence[Case], system: System, candidates: int = CANDIDATES
 ) -> WorkerRates:
-    """Evaluate candidates of the disturbance observer by one worker, by two, and with Dask.
+    """Evaluate candidates of the first tunable estimator by one worker, by two, and with Dask.
 
     Raises
     ------
     ArithmeticError
         If they do not find the same z, or any fails, which takes less than a full evaluation.
     """
-    job = tuning_job(DisturbanceObserver.name, minimal, cases)
+    job = tuning_job(tunable(system, first_tuned(system)), system, cases)
     rng = np.random.default_rng(_SEED)
-    reasoned, order = to_vector(job.gains), tuple(range(len(cases)))
+    reasoned, order = job.gains.values, tuple(range(len(cases)))
     changed = reasoned * (1.0 + _VARIATION * rng.standard_normal((candidates, reasoned.size)))
     every = [Candidate(values, np.inf, order) for values in changed]
     with evaluators(job, 1) as alone, evaluators(job, WORKERS) as together:
@@ -229,17 +247,17 @@ def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[fl
     return [len(candidates) / statistics.median(times) for times in spent]
 
 
-def measure_memory(folders: Sequence[Path], minimal: Path) -> TuningMemory:
-    """Tune the disturbance observer with the command, as briefly as it goes.
+def observe_memory(folders: Sequence[Path], system: System) -> TuningMemory:
+    """Tune an estimator with the command, as briefly as it goes.
 
     Parameters
     ----------
     folders : of cases.
     """
-    command = [sys.executable, "-m", "workbench", "tune", DisturbanceObserver.name]
+    command = [sys.executable, "-m", "workbench", "tune", first_tuned(system)]
     brief = ["--workers", str(WORKERS), "--budget", "1", "--population", "1"]
     with tempfile.TemporaryDirectory() as out:
-        where = ["--fmu", str(minimal), "--out", out, "--cases", *map(str, folders)]
+        where = ["--out", out, "--cases", *map(str, folders)]
         peaks = watch_command([*command, *brief, *where])
     master, *others = peaks
     return TuningMemory(master, max(others), sum(peaks))
@@ -264,7 +282,7 @@ def format_tuning(
     )
     lines += [
         "FMPy: how many times as long the same evaluation takes with FMPy's methods and numpy",
-        f"candidates of the disturbance observer over {rates.cases} cases, in full: "
+        f"candidates of the first estimator over {rates.cases} cases, in full: "
         f"{rates.one:.1f} per second by one worker, {rates.two:.1f} by {WORKERS}, "
         f"{ratios['two']:.2f} times as many; {cluster}",
         f"peak memory of the command with {WORKERS} workers: {memory.master / 1e6:.0f} MB in the "

@@ -2,12 +2,10 @@
 
 COMMANDS = {
     "simulate": "run all estimators on recordings",
-    "accuracy": "judge estimators against the truth of the virtual rig",
     "tune": "find the gains whose worst case is best",
     "diagnose": "find what the simulation gets wrong, name the cause, extend the model",
     "power": "measure how often the diagnosis is right",
     "observability": "show when states and estimated quantities can be observed",
-    "rig": "make recordings on a virtual rig",
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
     "bench": "time calls into the FMUs, the observers, and the tuning",

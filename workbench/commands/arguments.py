@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from workbench.case import Case, check_names, read_cases
 from workbench.errors import InputError
+from workbench.installed import system_files
 from workbench.resources import CHECKOUT, fmus, modelica
 from workbench.resources import cases as package_cases
 from workbench.system import OBSERVER, System
@@ -38,6 +39,17 @@ def positive(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is not 1 or more")
     return value
+
+
+def add_system(parser: argparse.ArgumentParser) -> None:
+    """Add the option --system, which `load_system` reads."""
+    usual, *_ = system_files()
+    parser.add_argument(
+        "--system",
+        default=usual,
+        metavar="NAME|FILE",
+        help="an installed system, or a system file (default: %(default)s)",
+    )
 
 
 def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:

@@ -6,18 +6,20 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.commands.arguments import Commands, require_compiler
+from workbench.case import read_cases
+from workbench.commands.arguments import Commands, add_system, require_compiler
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.description import read_description
 from workbench.files import write_json
-from workbench.resources import fmus
+from workbench.resources import cases as own_cases
+from workbench.systems import load_system
 
 if TYPE_CHECKING:
     from workbench.compiler.benchmark import CallTimes
 
-_MODELS = ("MinimalObserver", "FullObserver", "Reference")
 _SEED = 1
+_CASE = 2  # of the recordings, on which single observers are timed
 
 
 def add(commands: Commands) -> None:
@@ -32,20 +34,33 @@ def add(commands: Commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     bench.add_argument("--json", type=Path, metavar="FILE", help="write the times to a JSON file")
+    add_system(bench)
+    bench.add_argument(
+        "--cases",
+        nargs="+",
+        type=Path,
+        default=[own_cases()],
+        metavar="CASE",
+        help="recordings that observers and tuning are timed on (default: the package's own)",
+    )
     bench.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     require_compiler()
-    from workbench.compiler.benchmark import measure_calls
+    from workbench.compiler.benchmark import time_calls
 
-    calls = {}
-    for model in _MODELS:
-        description = read_description(fmus() / "fmi2" / f"{model}.fmu")
-        calls[model] = measure_calls(description, _SEED)
+    system = load_system(options.system)
+    cases = read_cases(options.cases, system)
+    case = cases[min(_CASE, len(cases) - 1)]
+    calls = {
+        model.name: time_calls(read_description(model.path), _SEED)
+        for model in system.models.values()
+        if model.path is not None
+    }
     print(_format_calls(calls))
-    observers = bench_observers()
-    tuning = bench_tuning()
+    observers = bench_observers(system, cases, case)
+    tuning = bench_tuning(system, cases, case)
     if options.json:
         content: dict[str, Any] = {
             "machine": {"processor": platform.machine(), "system": platform.platform()},

@@ -1,32 +1,33 @@
 """The observers' section of `workbench bench`."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from workbench.case import read_case, read_cases
-from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
-from workbench.resources import cases
-
-CASES = cases()
-CASE = "03_dry_120_3.6"
+from workbench.case import Case
+from workbench.system import System
 
 
-def bench_observers() -> dict[str, Any]:
-    """Measure, print the table, and return the same as numbers; times in seconds."""
+def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[str, Any]:
+    """Measure, print the table, and return the same as numbers; times in seconds.
+
+    Parameters
+    ----------
+    case : of these, on which single observers are timed.
+    """
     from workbench.benchmark.observers import (
         format_observers,
-        measure_compilation,
-        measure_observers,
-        measure_processes,
+        time_compilation,
+        time_observers,
+        time_processes,
     )
 
-    models = (MINIMAL_OBSERVER, FULL_OBSERVER)
-    observers = measure_observers(read_case(CASES / CASE), *models)
-    processes = measure_processes(read_cases([CASES]), *models)
-    compilation = measure_compilation(*models)
+    observers = time_observers(case, system)
+    processes = time_processes(cases, system)
+    compilation = time_compilation(system, case)
     print(f"\n{format_observers(observers, processes, compilation)}")
     return {
-        "case": CASE,
+        "case": case.name,
         "steps": [asdict(row) for row in observers],
         "processes": asdict(processes),
         "compilation": compilation,

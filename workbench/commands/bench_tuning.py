@@ -1,28 +1,33 @@
 """The tuning's section of `workbench bench`."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from workbench.case import read_case, read_cases
-from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
-from workbench.commands.bench_observers import CASE, CASES
+from workbench.case import Case
+from workbench.system import System
 
 
-def bench_tuning() -> dict[str, Any]:
-    """Measure, print the table, and return the same as numbers; times in seconds."""
+def bench_tuning(system: System, cases: Sequence[Case], case: Case) -> dict[str, Any]:
+    """Measure, print the table, and return the same as numbers; times in seconds.
+
+    Parameters
+    ----------
+    case : of these, on which single evaluations are timed.
+    """
     from workbench.benchmark.tuning import (
         format_tuning,
-        measure_evaluations,
-        measure_memory,
-        measure_workers,
+        observe_memory,
+        time_evaluations,
+        time_workers,
     )
 
-    evaluations = measure_evaluations(read_case(CASES / CASE), MINIMAL_OBSERVER, FULL_OBSERVER)
-    workers = measure_workers(read_cases([CASES]), MINIMAL_OBSERVER)
-    memory = measure_memory([CASES], MINIMAL_OBSERVER)
+    evaluations = time_evaluations(case, system)
+    workers = time_workers(cases, system)
+    memory = observe_memory([one.source.parent for one in cases], system)
     print(f"\n{format_tuning(evaluations, workers, memory)}")
     return {
-        "case": CASE,
+        "case": case.name,
         "evaluations": [{**asdict(row), "ratios": dict(row.ratios())} for row in evaluations],
         "workers": {**asdict(workers), "ratios": dict(workers.ratios())},
         "memory": asdict(memory),

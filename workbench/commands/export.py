@@ -5,26 +5,18 @@ import hashlib
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from workbench.commands.arguments import LIBRARY, REFERENCE, Commands, nearby, require_compiler
-from workbench.errors import InputError
+from workbench.commands.arguments import Commands, add_system, require_compiler
+from workbench.errors import InputError, closest
 from workbench.files import write_json, write_whole
-from workbench.observers import (
-    DisturbanceGains,
-    DisturbanceObserver,
-    FilterNoise,
-    ParameterEstimator,
-    ParameterGains,
-)
-from workbench.tuning import DEFAULTS, gain_names, read_gains, to_vector
+from workbench.observers import Estimator, Gains, choose
+from workbench.observers.gains_file import read_gains, tuned_file
+from workbench.system import System
+from workbench.systems import load_system, model_path, open_model
 
 if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
-
-_Gains: TypeAlias = DisturbanceGains | ParameterGains
-
-_OBSERVERS = (DisturbanceObserver.name, ParameterEstimator.name)  # written in Modelica too
 
 
 def add(commands: Commands) -> None:
@@ -51,10 +43,10 @@ def add(commands: Commands) -> None:
     )
     which.add_argument(
         "--estimator",
-        choices=_OBSERVERS,
-        default=DisturbanceObserver.name,
-        help="observer with these tuned gains (default: %(default)s)",
+        metavar="NAME",
+        help="observer with these tuned gains (default: the first that the system can export)",
     )
+    add_system(export)
     export.add_argument(
         "--fmi",
         type=int,
@@ -65,9 +57,9 @@ def add(commands: Commands) -> None:
     export.add_argument(
         "--reference",
         type=Path,
-        default=nearby(REFERENCE),
         metavar="FILE",
-        help="FMU (FMI 2.0) that the package connects the observer to (default: %(default)s)",
+        help="FMU (FMI 2.0) that the package connects the observer to (default: the system's "
+        "reference model)",
     )
     export.add_argument(
         "--out",
@@ -81,13 +73,13 @@ def add(commands: Commands) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     require_compiler()
-    from workbench.compiler import source_hash
-    from workbench.export import OBSERVERS, ObserverModel, build_observer, write_package
+    from workbench.export import ObserverModel, build_observer, write_package
 
-    source = options.gains or DEFAULTS / f"{options.estimator}.toml"
-    estimator, gains, text = _gains(source)
-    name = OBSERVERS[estimator]
-    observer = ObserverModel(LIBRARY, f"{LIBRARY.parent.name}.Observers.{name}", gains, text)
+    system = load_system(options.system)
+    kind, gains, source = _gains(system, options.estimator, options.gains)
+    observer = ObserverModel(system, kind, gains, source.read_text(encoding="utf-8"))
+    reference: Path = options.reference or model_path(system, "reference")
+    name = observer.model.rpartition(".")[2]
     with tempfile.TemporaryDirectory() as scratch:
 
         def build(fmi: int) -> "BuiltFMU":
@@ -97,25 +89,14 @@ def _export(options: argparse.Namespace) -> int:
         packed = build(2)
         built = packed if options.fmi == 2 else build(3)
         ssp = Path(scratch) / f"{name}.ssp"
-        write_package(packed.path, options.reference, ssp)
-        summary = {
-            "estimator": estimator,
-            "gains": dict(zip(gain_names(gains), to_vector(gains).tolist(), strict=True)),
-            "effect": gains.effect.tolist(),
-            "fmu": _identity(built),
-            "package": {
-                "file": ssp.name,
-                "sha256": _sha256(ssp),
-                "observer": _identity(packed),
-                "reference": {"file": options.reference.name, "sha256": _sha256(options.reference)},
-            },
-            "provenance": {
-                "workbench": version("wheelset-workbench"),
-                "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
-                "source_sha256": source_hash(LIBRARY),
-                "gains": source.name,
-            },
+        write_package(system, packed.path, reference, ssp)
+        package = {
+            "file": ssp.name,
+            "sha256": _sha256(ssp),
+            "observer": _identity(packed),
+            "reference": {"file": reference.name, "sha256": _sha256(reference)},
         }
+        summary = _summary(system, gains, source, built) | {"package": package}
         # Nothing is written before everything is made.
         for file in (built.path, ssp):
             write_whole(options.out / file.name, file.read_bytes())
@@ -124,17 +105,59 @@ def _export(options: argparse.Namespace) -> int:
     return 0
 
 
-def _gains(path: Path) -> tuple[str, _Gains, str]:
-    """Name of the estimator, its gains, and the text of their file."""
-    estimator, found = read_gains(path)
-    if isinstance(found, FilterNoise):
+def _gains(
+    system: System, asked: str | None, path: Path | None
+) -> tuple[type[Estimator], Gains, Path]:
+    """The estimator, its gains, and their file."""
+    classes = system.export.classes
+    if not classes:
         raise InputError(
-            where=str(path),
-            found=f"estimator = '{estimator}'",
-            expected=f"one of {', '.join(_OBSERVERS)}, which are models in Modelica",
-            remedy="tune one of these and export its gains",
+            where=str(system.source),
+            found="no [export.classes]",
+            expected="Modelica classes of estimators, which become FMUs",
+            remedy='name one, such as disturbance_observer = "Observers.DisturbanceObserver"',
         )
-    return estimator, found, path.read_text()
+    if asked is not None and asked not in classes:
+        raise InputError(
+            where=f"--estimator {asked}",
+            found=f"an estimator without a model in Modelica{closest(asked, classes)}",
+            expected=f"one of {', '.join(classes)}",
+            remedy="choose one of these",
+        )
+    kinds = choose(system, list(classes) if path else [asked or next(iter(classes))])
+    reasoned = {}
+    for name, kind in kinds.items():
+        with open_model(system, kind.role) as fmu:
+            reasoned[name] = kind.reasoned(fmu, system)
+    if path is None:
+        (name,) = kinds
+        path = tuned_file(system, name)
+    if path is None:
+        raise InputError(
+            where=f"system '{system.name}'",
+            found="no tuned gains that come with it",
+            expected="gains.toml of 'python -m workbench tune'",
+            remedy="tune the estimator, and give the file with --gains",
+        )
+    gains = read_gains(path, reasoned)
+    return kinds[gains.estimator], gains, path
+
+
+def _summary(system: System, gains: Gains, source: Path, built: "BuiltFMU") -> dict[str, Any]:
+    from workbench.compiler import source_hash
+
+    return {
+        "estimator": gains.estimator,
+        "gains": dict(zip(gains.names, gains.values.tolist(), strict=True)),
+        **{name: values.tolist() for name, values in gains.design.items()},
+        "fmu": _identity(built),
+        "provenance": {
+            "workbench": version("wheelset-workbench"),
+            "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
+            "source_sha256": source_hash(system.library),
+            "gains": source.name,
+        },
+    }
 
 
 def _show(name: str, fmi: int, platform: str) -> None:

@@ -3,25 +3,15 @@
 import argparse
 import os
 import time
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.commands.arguments import (
-    LIBRARY,
-    REFERENCE,
-    Commands,
-    nearby,
-    positive,
-    require_compiler,
-)
-from workbench.power import measure, plan, summarise
+from workbench.commands.arguments import Commands, add_system, positive, require_compiler
+from workbench.power import Repertoire, diagnose_sets, open_virtual_rig, plan, summarise
+from workbench.power.diagnosing import library_effects
 from workbench.report.power import format_power, write_power
-from workbench.rig import select
-
-_DRY = (
-    *("01_dry_80_1.5", "02_dry_100_2.7", "03_dry_120_3.6", "04_dry_160_4.2"),
-    *("05_dry_120_2.7_rev", "06_dry_160_3.6_rev"),
-)
+from workbench.systems import load_system, model_path
 
 
 def add(commands: Commands) -> None:
@@ -68,21 +58,16 @@ def add(commands: Commands) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="stop of a set, may be repeated (default: the six dry standard ones)",
+        help="recording of a set, may be repeated (default: those that are usual for the system)",
     )
     parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
+    add_system(parser)
     for option, default_path, text in (
-        ("--fmu", nearby(REFERENCE), "multibody model, which makes the recordings"),
-        ("--library", nearby(LIBRARY), "package.mo of the Modelica library"),
-        ("--out", Path("results/power"), "where to write"),
+        ("--fmu", None, "model that makes the recordings (default: the system's 'reference')"),
+        ("--library", None, "package.mo of the Modelica library (default: the system's)"),
+        ("--out", Path("results/power"), "where to write (default: %(default)s)"),
     ):
-        parser.add_argument(
-            option,
-            type=Path,
-            default=default_path,
-            metavar="PATH",
-            help=f"{text} (default: %(default)s)",
-        )
+        parser.add_argument(option, type=Path, default=default_path, metavar="PATH", help=text)
     parser.set_defaults(run=_power)
 
 
@@ -96,34 +81,40 @@ def _size(text: str) -> float:
 
 def _power(options: argparse.Namespace) -> int:
     require_compiler()
-    scenarios = select(options.case or _DRY)
+    system = load_system(options.system)
+    if options.library:
+        system = replace(system, library=options.library)
+    reference = options.fmu or model_path(system, "reference")
+    rig = open_virtual_rig(system, options.case, reference)
+    effects = library_effects(system)
+    repertoire = Repertoire(rig.plantables, effects)
     sizes = sorted(set(options.sizes))
-    groups = plan(options.clean, sizes, options.repeats, options.pairs, options.seed)
+    groups = plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
     begin = time.perf_counter()
 
     def report(line: str) -> None:
         print(f"{time.perf_counter() - begin:7.0f} s  {line}", flush=True)
 
-    report(f"{sum(map(len, groups))} sets of {len(scenarios)} stops")
-    results, interrupted = measure(
+    report(f"{sum(map(len, groups))} sets of {len(rig.recordings)} recordings")
+    results, interrupted = diagnose_sets(
         groups,
-        scenarios,
-        options.fmu,
-        options.library,
+        system,
+        rig,
+        effects,
         options.out,
         seed=options.seed,
         workers=options.workers,
         resume=options.resume,
         report=report,
     )
-    summary = summarise(results)
+    summary = summarise(results, repertoire)
     provenance = {
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
-        "stops": [scenario.name for scenario in scenarios],
+        "stops": list(rig.recordings),
         "interrupted": interrupted,
     }
-    write_power(summary, provenance, options.out)
+    write_power(summary, effects, provenance, options.out)
     print(format_power(summary))
     print(f"data and figures: {options.out}")
     return 130 if interrupted else 0

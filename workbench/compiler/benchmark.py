@@ -62,7 +62,7 @@ class CallTimes:
         }
 
 
-def measure_calls(description: Description, seed: int) -> CallTimes:
+def time_calls(description: Description, seed: int) -> CallTimes:
     """Compile the sources of an FMI 2.0 FMU with the FMUs' own flags, and time them.
 
     Parameters

@@ -3,7 +3,7 @@
 This package needs the extra `[compiler]`.
 """
 
-from workbench.export.observer import OBSERVERS, ObserverModel, build_observer
+from workbench.export.observer import ObserverModel, build_observer
 from workbench.export.package import write_package
 
-__all__ = ["OBSERVERS", "ObserverModel", "build_observer", "write_package"]
+__all__ = ["ObserverModel", "build_observer", "write_package"]

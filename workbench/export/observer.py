@@ -9,28 +9,17 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
 
 from workbench.compiler import PLATFORMS, BuiltFMU, Law, assemble
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
-from workbench.observers import (
-    DisturbanceGains,
-    DisturbanceObserver,
-    ParameterEstimator,
-    ParameterGains,
-)
-from workbench.tuning import gain_names, to_vector
-
-Gains: TypeAlias = DisturbanceGains | ParameterGains
-
-# Modelica class of each estimator that has one.
-OBSERVERS = {
-    DisturbanceObserver.name: "DisturbanceObserver",
-    ParameterEstimator.name: "ParameterEstimator",
-}
+from workbench.errors import InputError, closest
+from workbench.observers import Estimator, Gains
+from workbench.system import System
 
 _LAW = Path(__file__).with_name("sampled.c")
+_HALF = "fadingHalf"  # parameter of the class: level of the signal that feedback fades with
+_PLANT = "plant"  # component of the class that is the model of the machine
 
 # States by the last part of their name, that of the output of Observers.Sampled and .Applied.
 _KINDS = {"held": "TAKEN", "acting": "APPLIED"}
@@ -42,16 +31,21 @@ class ObserverModel:
 
     Attributes
     ----------
-    package : `package.mo` of the Modelica library.
-    model : dotted name of the class, such as WheelsetRig.Observers.DisturbanceObserver.
+    system : whose library has the class.
+    kind : the estimator that it is.
     gains : what becomes start values of parameters.
     gains_file : text of gains.toml, kept in the FMU.
     """
 
-    package: Path
-    model: str
+    system: System
+    kind: type[Estimator]
     gains: Gains
     gains_file: str
+
+    @property
+    def model(self) -> str:
+        """Dotted name of the class."""
+        return f"{self.system.library.parent.name}.{self.system.export.classes[self.kind.name]}"
 
 
 def build_observer(
@@ -75,48 +69,55 @@ def build_observer(
     InputError
         If the sources have errors.
     """
-    space = _with_gains(make_explicit(flatten(observer.package, observer.model)), observer.gains)
-    # As in Python: the parameter estimator is quiet at standstill without it.
-    tables = _tables(space, sticks=isinstance(observer.gains, DisturbanceGains))
+    space = _with_gains(make_explicit(flatten(observer.system.library, observer.model)), observer)
     law = Law(
         source=_LAW,
-        tables={"sampled_data.h": tables},
+        tables={"sampled_data.h": _tables(space, observer)},
         described=lambda description: _sampled(description, space),
         resources={"gains.toml": observer.gains_file},
     )
     return assemble(space, observer.model, fmu, fmi, platforms, law, report)
 
 
-def parameter_values(gains: Gains) -> dict[str, float]:
-    """Values of the Modelica class's parameters; its gains are named as in gains.toml."""
-    values = dict(zip(gain_names(gains), map(float, to_vector(gains)), strict=True))
-    return values | {"effectWR": float(gains.effect[0]), "effectDC": float(gains.effect[1])}
+def parameter_values(gains: Gains, system: System) -> dict[str, float]:
+    """Values of the Modelica class's parameters.
+
+    Its gains are named as in gains.toml, constants of the design by quantity, such as `effect_mu`.
+    """
+    values = dict(zip(gains.names, map(float, gains.values), strict=True))
+    for name, constants in gains.design.items():
+        for one, value in zip(system.estimated, constants, strict=True):
+            values[f"{name}_{one.name}"] = float(value)
+    return values | ({_HALF: system.fading.half} if system.fading else {})
 
 
-def _with_gains(space: StateSpace, gains: Gains) -> StateSpace:
+def _with_gains(space: StateSpace, observer: ObserverModel) -> StateSpace:
     """The model with gains as start values of its parameters."""
-    values = parameter_values(gains)
+    values = parameter_values(observer.gains, observer.system)
     names = {variable.name for variable in space.parameters}
-    if missing := values.keys() - names:
-        raise KeyError(f"{space.name} has no parameter {', '.join(sorted(missing))}")
+    if missing := sorted(values.keys() - names):
+        raise InputError(
+            where=observer.model,
+            found=f"no parameter '{missing[0]}'{closest(missing[0], names)}",
+            expected=f"parameters {', '.join(values)}, as gains are named",
+            remedy="rename the parameter of the class, or correct [export.classes]",
+        )
     parameters = [replace(v, start=values.get(v.name, v.start)) for v in space.parameters]
     return replace(space, parameters=parameters)
 
 
-def _tables(space: StateSpace, sticks: bool) -> str:
+def _tables(space: StateSpace, observer: ObserverModel) -> str:
     """Text of sampled_data.h: what the law must know of each state."""
     inputs = {variable.name: i for i, variable in enumerate(space.inputs)}
-    states = [variable.name for variable in space.states]
-    parameters = [variable.name for variable in space.parameters]
-    speeds = [str(states.index(f"plant.{name}")) for name in ("omegaW", "omegaR")]
-    radii = [str(parameters.index(f"plant.{name}")) for name in ("rW", "rR")]
     kinds, first, low, high = [], [], [], []
     for state in space.states:
         component, _, name = state.name.rpartition(".")
         kinds.append(_KINDS.get(name, "DYNAMIC"))
-        first.append(str(inputs.get(name, -1) if component == "plant" else -1))
+        first.append(str(inputs.get(name, -1) if component == _PLANT else -1))
         low.append(_limit(state.minimum, -math.inf))
         high.append(_limit(state.maximum, math.inf))
+    rolls = _rolls(space, observer.system) if observer.kind.sticks else None
+    follower, leader, zero, lead, half = rolls or (0, 0, 0, 0.0, 0)
     return "\n".join(
         [
             f"/* What the law of {space.name} must know of each state. */",
@@ -124,12 +125,31 @@ def _tables(space: StateSpace, sticks: bool) -> str:
             f"static const int sampled_first[] = {{{', '.join(first)}}};",
             f"static const double sampled_low[] = {{{', '.join(low)}}};",
             f"static const double sampled_high[] = {{{', '.join(high)}}};",
-            f"static const int sampled_sticks = {int(sticks)};",
-            f"static const int sampled_speeds[] = {{{', '.join(speeds)}}};",
-            f"static const int sampled_radii[] = {{{', '.join(radii)}}};",
-            f"static const int sampled_fading = {parameters.index('fadingSpeed')};",
+            f"static const int sampled_sticks = {int(rolls is not None)};",
+            f"static const int sampled_follower = {follower}, sampled_leader = {leader};",
+            f"static const int sampled_zero = {zero};",
+            f"static const double sampled_lead = {lead!r};",
+            f"static const int sampled_half = {half};",
             "",
         ]
+    )
+
+
+def _rolls(space: StateSpace, system: System) -> tuple[int, int, int, float, int] | None:
+    """Places of follower, leader, what is zero, and half; None where nothing rolls along.
+
+    The fourth is the share of the leader in the signal that feedback fades with.
+    """
+    if system.rolling is None or system.fading is None:
+        return None
+    states = [variable.name for variable in space.states]
+    leader = [one.name for one in system.outputs].index(system.rolling.leader)
+    return (
+        states.index(f"{_PLANT}.{system.rolling.follower}"),
+        states.index(f"{_PLANT}.{system.rolling.leader}"),
+        [variable.name for variable in space.outputs].index(system.rolling.zero),
+        system.slopes(system.fading.signal)[leader],
+        [variable.name for variable in space.parameters].index(_HALF),
     )
 
 

@@ -1,86 +1,88 @@
 """An observer FMU beside the reference model in one package of SSP 1.0.
 
-The readings of the rig's sensors go to the observer; pressure and drive torque go to both.
+The readings of the sensors go to the observer; measured inputs go to both.
 Source: Modelica Association, System Structure and Parameterization 1.0 (2019).
 """
 
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from workbench.compiler.archive import pack
+from workbench.compiler.description import base_units
 from workbench.description import CO_SIMULATION, read_description
 from workbench.errors import InputError
-from workbench.resources import fmus
+from workbench.system import System
 
 _COMMON = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 _STRUCTURE = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 _VALUES = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 
-# Rolling at 120 km/h without slip, on rails that carry a stop; the pads differ from nominal, so
-# that there is something to estimate.
-_START = {
-    "rig.omegaW": (120 / 3.6 / 0.46, "rad/s"),
-    "rig.omegaR": (120 / 3.6 / 0.70, "rad/s"),
-    "rig.muWR": (0.40, "1"),
-    "rig.muDC": (0.33, "1"),
-}
 _START_FILE = "resources/start.ssv"
+_MACHINE, _OBSERVER = "machine", "observer"  # names of the two components
 
-# Connectors of the two components: name -> (kind, unit).
-_RIG = {
-    "pB": ("input", "Pa"),
-    "tauR": ("input", "N.m"),
-    "omegaWReading": ("output", "rad/s"),
-    "omegaRReading": ("output", "rad/s"),
-    "FxReading": ("output", "N"),
-    "slip": ("output", "m/s"),
-}
-_OBSERVER = {
-    "pB": ("input", "Pa"),
-    "tauR": ("input", "N.m"),
-    "omegaW": ("input", "rad/s"),
-    "omegaR": ("input", "rad/s"),
-    "Fx": ("output", "N"),
-    "slip": ("output", "m/s"),
-    "muWR": ("output", "1"),
-    "muDC": ("output", "1"),
-    "omegaWEstimate": ("output", "rad/s"),
-    "omegaREstimate": ("output", "rad/s"),
-}
-_SYSTEM = {
-    "pB": ("input", "Pa"),
-    "tauR": ("input", "N.m"),
-    "Fx": ("output", "N"),
-    "slip": ("output", "m/s"),
-    **{f"{name}Estimate": _OBSERVER[name] for name in ("Fx", "slip", "muWR", "muDC")},
-}
-# From (component, connector) to (component, connector); the system itself has no name.
-_CONNECTIONS = (
-    *(("", name, to, name) for name in ("pB", "tauR") for to in ("rig", "observer")),
-    ("rig", "omegaWReading", "observer", "omegaW"),
-    ("rig", "omegaRReading", "observer", "omegaR"),
-    ("rig", "FxReading", "", "Fx"),
-    ("rig", "slip", "", "slip"),
-    *(("observer", name, "", f"{name}Estimate") for name in ("Fx", "slip", "muWR", "muDC")),
-)
-# Exponents of the base units and factor.
-_UNITS: Mapping[str, Mapping[str, str]] = {
-    "1": {},
-    "N": {"kg": "1", "m": "1", "s": "-2"},
-    "N.m": {"kg": "1", "m": "2", "s": "-2"},
-    "Pa": {"kg": "1", "m": "-1", "s": "-2"},
-    "m/s": {"m": "1", "s": "-1"},
-    "rad/s": {"rad": "1", "s": "-1"},
-}
+Connectors: TypeAlias = Mapping[str, tuple[str, str]]  # (kind, unit) by name
+# From (component, connector) to (component, connector); the whole has no name.
+Connection: TypeAlias = tuple[str, str, str, str]
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What is connected to what.
+
+    Attributes
+    ----------
+    machine, observer, whole : connectors of the two components, and of both together.
+    connections : of these.
+    """
+
+    machine: Connectors
+    observer: Connectors
+    whole: Connectors
+    connections: tuple[Connection, ...]
+
+
+def wiring(system: System) -> Wiring:
+    """Connectors and connections by the signals of a system.
+
+    An observer gives its estimate of an output `y` as `yEstimate`, and other estimates under their
+    own names; the package gives estimates as `nameEstimate`, beside the truth of the machine.
+    """
+    inputs = {one.name: ("input", one.unit) for one in system.inputs}
+    outputs = {one.name: ("input", one.unit) for one in system.outputs}
+    estimates = {**system.reported, **{one.name: one.unit for one in system.estimated}}
+    seen = {f"{one.name}Estimate": one.unit for one in system.outputs}
+    readings = {one.reading: one.unit for one in (*system.outputs, *system.judged)}
+    shown = {one.name: (one.reading, one.unit) for one in system.judged}
+    shown |= {name: (name, unit) for name, unit in system.reported.items() if name not in shown}
+    truth = {reading: unit for reading, unit in shown.values()}
+    return Wiring(
+        machine=inputs | _given({**readings, **truth}),
+        observer=inputs | outputs | _given({**estimates, **seen}),
+        whole=inputs
+        | _given({name: unit for name, (_, unit) in shown.items()})
+        | _given({f"{name}Estimate": unit for name, unit in estimates.items()}),
+        connections=(
+            *(("", name, to, name) for name in inputs for to in (_MACHINE, _OBSERVER)),
+            *((_MACHINE, one.reading, _OBSERVER, one.name) for one in system.outputs),
+            *((_MACHINE, reading, "", name) for name, (reading, _) in shown.items()),
+            *((_OBSERVER, name, "", f"{name}Estimate") for name in estimates),
+        ),
+    )
+
+
+def _given(units: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    return {name: ("output", unit) for name, unit in units.items()}
 
 
 for _prefix, _namespace in (("ssc", _COMMON), ("ssd", _STRUCTURE), ("ssv", _VALUES)):
     ET.register_namespace(_prefix, _namespace)
 
 
-def write_package(observer: Path, reference: Path, ssp: Path) -> None:
+def write_package(system: System, observer: Path, reference: Path, ssp: Path) -> None:
     """Write an SSP package of an observer and the reference model, whole or not at all.
 
     Parameters
@@ -92,19 +94,21 @@ def write_package(observer: Path, reference: Path, ssp: Path) -> None:
     InputError
         If an FMU is not of FMI 2.0 for Co-Simulation, or lacks a connector.
     """
-    _check(reference, _RIG)
-    _check(observer, _OBSERVER)
+    wired = wiring(system)
+    _check(reference, wired.machine)
+    _check(observer, wired.observer)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         (folder / "resources").mkdir()
         for fmu in (observer, reference):
             (folder / "resources" / fmu.name).write_bytes(fmu.read_bytes())
-        (folder / _START_FILE).write_text(_start_values())
-        (folder / "SystemStructure.ssd").write_text(_structure(observer.name, reference.name))
+        (folder / _START_FILE).write_text(_start_values(system))
+        structure = _structure(wired, observer.name, reference.name)
+        (folder / "SystemStructure.ssd").write_text(structure)
         pack(folder, ssp)
 
 
-def _check(fmu: Path, connectors: Mapping[str, tuple[str, str]]) -> None:
+def _check(fmu: Path, connectors: Connectors) -> None:
     """Refuse an FMU that the package cannot connect."""
     description = read_description(fmu)
     causality = {variable.name: variable.causality for variable in description.variables}
@@ -119,29 +123,32 @@ def _check(fmu: Path, connectors: Mapping[str, tuple[str, str]]) -> None:
         where=str(fmu),
         found=found,
         expected=f"FMI 2.0, Co-Simulation, with {', '.join(connectors)}",
-        remedy=f"take {fmus() / 'fmi2' / 'Reference.fmu'}, or a model with the same variables",
+        remedy="take the reference model of the system, or one with the same variables",
     )
 
 
-def _structure(observer: str, reference: str) -> str:
+def _structure(wired: Wiring, observer: str, reference: str) -> str:
     """Text of SystemStructure.ssd."""
     root = ET.Element(
         f"{{{_STRUCTURE}}}SystemStructureDescription", version="1.0", name="ObserverBesideReference"
     )
-    text = "Rig and observer: pressure and drive torque in, forces and frictions out"
-    system = _add(root, "System", name="stop", description=text)
-    _add_connectors(system, _SYSTEM)
-    bindings = _add(system, "ParameterBindings")
+    text = "Machine and observer: measured inputs in, truth and estimates out"
+    whole = _add(root, "System", name="whole", description=text)
+    _add_connectors(whole, wired.whole)
+    bindings = _add(whole, "ParameterBindings")
     _add(bindings, "ParameterBinding", source=_START_FILE)
-    elements = _add(system, "Elements")
-    for name, fmu, connectors in (("rig", reference, _RIG), ("observer", observer, _OBSERVER)):
+    elements = _add(whole, "Elements")
+    for name, fmu, connectors in (
+        (_MACHINE, reference, wired.machine),
+        (_OBSERVER, observer, wired.observer),
+    ):
         source = f"resources/{fmu}"
         component = _add(
             elements, "Component", name=name, source=source, implementation="CoSimulation"
         )
         _add_connectors(component, connectors)
-    connections = _add(system, "Connections")
-    for start_element, start, end_element, end in _CONNECTIONS:
+    connections = _add(whole, "Connections")
+    for start_element, start, end_element, end in wired.connections:
         ends = {
             "startElement": start_element,
             "startConnector": start,
@@ -149,19 +156,24 @@ def _structure(observer: str, reference: str) -> str:
             "endConnector": end,
         }
         _add(connections, "Connection", **{key: value for key, value in ends.items() if value})
-    _add_units(_add(root, "Units"))
+    every = {**wired.machine, **wired.observer, **wired.whole}.values()
+    _add_units(_add(root, "Units"), {unit for _, unit in every})
     _add(root, "DefaultExperiment", startTime="0.0", stopTime="20.0")
     return _text(root)
 
 
-def _start_values() -> str:
+def _start_values(system: System) -> str:
     """Text of the file of start values."""
+    start = system.export.start
+    values = {name: float(formula(system.values)) for name, formula in start.held.items()}
+    values |= dict(start.quantities)
+    units = {name: system.unit(name) for name in values}
     root = ET.Element(f"{{{_VALUES}}}ParameterSet", version="1.0", name="start")
     parameters = ET.SubElement(root, f"{{{_VALUES}}}Parameters")
-    for name, (value, unit) in _START.items():
-        parameter = ET.SubElement(parameters, f"{{{_VALUES}}}Parameter", name=name)
-        ET.SubElement(parameter, f"{{{_VALUES}}}Real", value=repr(value), unit=unit)
-    _add_units(ET.SubElement(root, f"{{{_VALUES}}}Units"))
+    for name, value in values.items():
+        parameter = ET.SubElement(parameters, f"{{{_VALUES}}}Parameter", name=f"{_MACHINE}.{name}")
+        ET.SubElement(parameter, f"{{{_VALUES}}}Real", value=repr(value), unit=units[name])
+    _add_units(ET.SubElement(root, f"{{{_VALUES}}}Units"), set(units.values()))
     return _text(root)
 
 
@@ -169,17 +181,20 @@ def _add(parent: ET.Element, tag: str, **attributes: str) -> ET.Element:
     return ET.SubElement(parent, f"{{{_STRUCTURE}}}{tag}", attributes)
 
 
-def _add_connectors(parent: ET.Element, connectors: Mapping[str, tuple[str, str]]) -> None:
+def _add_connectors(parent: ET.Element, connectors: Connectors) -> None:
     group = _add(parent, "Connectors")
     for name, (kind, unit) in connectors.items():
         connector = _add(group, "Connector", name=name, kind=kind)
         ET.SubElement(connector, f"{{{_COMMON}}}Real", unit=unit)
 
 
-def _add_units(parent: ET.Element) -> None:
-    for name, exponents in _UNITS.items():
+def _add_units(parent: ET.Element, units: Set[str]) -> None:
+    for name in sorted(units):
+        exponents, factor = base_units(name)
+        assert factor == 1.0, name  # units of a system's signals are SI
         unit = ET.SubElement(parent, f"{{{_COMMON}}}Unit", name=name)
-        ET.SubElement(unit, f"{{{_COMMON}}}BaseUnit", dict(exponents))
+        powers = {base: str(power) for base, power in exponents.items()}
+        ET.SubElement(unit, f"{{{_COMMON}}}BaseUnit", powers)
 
 
 def _text(root: ET.Element) -> str:

@@ -8,7 +8,7 @@
  * over the time h since the sample before, which is the size of the communication step before.
  * States of kind TAKEN get their value before the step and keep it, also in df/dx; states of kind
  * APPLIED have no inertia, M = 0. States stay within their limits. Where sampled_sticks, a step may
- * not reverse the slip close to standstill. Source of the method:
+ * not reverse the sign of an output close to standstill. Source of the method:
  * P. Deuflhard, E. Hairer, J. Zugck (1987), Numerische Mathematik 51, 501-516.
  */
 #include "integrator.h"
@@ -19,8 +19,10 @@
 enum { DYNAMIC, TAKEN, APPLIED };
 
 /* sampled_kind, sampled_first (number of the input that the first sample is in, or -1),
- * sampled_low, sampled_high: NX values each. sampled_sticks; sampled_speeds (states of wheelset and
- * roller), sampled_radii (their parameters), sampled_fading (parameter, a rolling velocity). */
+ * sampled_low, sampled_high: NX values each. sampled_sticks; if so, sampled_follower and
+ * sampled_leader (states), sampled_zero (output that is zero while the follower rolls along),
+ * sampled_lead (of the leader in the signal that says how fast it goes), sampled_half (parameter:
+ * level of that signal). */
 #include "sampled_data.h"
 
 int first_violated(double t, const double *x, const double *u, const double *p, double *holds) {
@@ -80,20 +82,28 @@ static void limit(Rosenbrock *r) {
     }
 }
 
-/* Speed of a wheelset that rolls minus that of this one. */
-static double slipping(const double *x, const double *p) {
-    const double ratio = p[sampled_radii[1]] / p[sampled_radii[0]];
-    return ratio * x[sampled_speeds[1]] - x[sampled_speeds[0]];
+/* The output that is zero while the follower rolls along, at these speeds of both; it is linear. */
+static double reading(const Rosenbrock *r, double t, double follower, double leader,
+                      const double *u, const double *p) {
+    double x[NX], w[NW];
+    memcpy(x, r->x, sizeof x);
+    x[sampled_follower] = follower;
+    x[sampled_leader] = leader;
+    return model_algebraics(t, x, u, p, w) != 0 ? NAN : w[sampled_zero];
 }
 
-/* Lets the wheelset roll where a step has reversed its slip close to standstill: creep is saturated
- * there from 1 mm/s on, and a tangent to the saturated force leads to the other side, and back in
- * the next step. */
-static void stick(double *x, const double *p, double before) {
-    const double speed = p[sampled_radii[1]] * x[sampled_speeds[1]];
-    const double after = slipping(x, p);
-    if (fabs(speed) < p[sampled_fading] && before * after < 0.0) {
-        x[sampled_speeds[0]] += after;
+/* Lets the follower roll where a step has reversed its slip close to standstill: what drives it is
+ * saturated there at the least slip, and a tangent to that leads to the other side, and back in the
+ * next step. `follower` and `leader` are their speeds before the step. */
+static void stick(Rosenbrock *r, double t, double follower, double leader, const double *u,
+                  const double *p) {
+    double *x = r->x;
+    if (fabs(sampled_lead * x[sampled_leader]) < p[sampled_half]) {
+        const double ratio = -reading(r, t, 0.0, 1.0, u, p) / reading(r, t, 1.0, 0.0, u, p);
+        const double rolling = ratio * x[sampled_leader];
+        if ((ratio * leader - follower) * (rolling - x[sampled_follower]) < 0.0) {
+            x[sampled_follower] = rolling;
+        }
     }
 }
 
@@ -150,7 +160,7 @@ static Outcome take_sample(Rosenbrock *r, double t, double h, const double *u, c
     if (!solve(r->matrix, r->f)) {
         return OUTCOME_STEP_TOO_SMALL;
     }
-    const double before = slipping(r->x, p);
+    const double follower = r->x[sampled_follower], leader = r->x[sampled_leader];
     for (int n = 0; n < NX; n++) {
         r->x[n] += r->f[n];
         if (!isfinite(r->x[n])) {
@@ -159,7 +169,7 @@ static Outcome take_sample(Rosenbrock *r, double t, double h, const double *u, c
         }
     }
     if (sampled_sticks) {
-        stick(r->x, p, before);
+        stick(r, t, follower, leader, u, p);
     }
     limit(r);
     if (!settle(r, APPLIED, t, u, p)) {

@@ -83,6 +83,7 @@ class Estimator(ABC):
     adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
+    sticks : whether a follower rolls where a step would reverse its slip close to standstill.
 
     Raises
     ------
@@ -99,6 +100,7 @@ class Estimator(ABC):
     adapts: ClassVar[bool] = False
     meaning: ClassVar[str] = ""
     tuned_as: ClassVar[str] = ""
+    sticks: ClassVar[bool] = False
     _law: ClassVar[Any]
     _loop: ClassVar[Any]
 

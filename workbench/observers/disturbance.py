@@ -183,6 +183,7 @@ class DisturbanceObserver(Estimator):
         "L: rows states, then corrections of quantities; columns dy, integral of dy. T [1/s]: "
         "rate at which a deviation decays"
     )
+    sticks = True
     _law = staticmethod(law)
     _loop = staticmethod(_loop)
 

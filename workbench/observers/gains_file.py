@@ -72,14 +72,15 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     """
     reasoned = kind.reasoned(fmu, system)
     name = kind.tuned_as or kind.name
-    path = _companion_file(system, name)
+    path = tuned_file(system, name)
     if path is None:
         return reasoned
     tuned_on = _content(path).get("provenance", {}).get("fmu", {}).get("model")
     return read_gains(path, {name: reasoned}) if tuned_on == fmu.name else reasoned
 
 
-def _companion_file(system: System, name: str) -> Path | None:
+def tuned_file(system: System, name: str) -> Path | None:
+    """The file of tuned gains that a system's companion brings for an estimator, if it does."""
     if not system.companion:
         return None
     (folder,) = import_module(system.companion).__path__

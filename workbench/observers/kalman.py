@@ -253,6 +253,7 @@ class ExtendedKalmanFilter(Estimator):
     rank = 40
     adapts = True
     meaning = "standard deviations of samples, and random walks"
+    sticks = True
     _law = staticmethod(ekf_law)
     _loop = staticmethod(_loop)
 

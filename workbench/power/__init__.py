@@ -1,23 +1,27 @@
-"""Power of the diagnosis: how often it is right, by Monte Carlo over the virtual rig.
+"""Power of the diagnosis: how often it is right, by Monte Carlo over a virtual rig.
 
-plan -> sets of stops by the reference model -> verdicts -> statistics
+plan -> sets of recordings by the virtual rig -> verdicts -> statistics
 """
 
-from workbench.power.journal import Journal, Judged, Named
-from workbench.power.planting import PLANTABLE, Plantable, Planting, plan
-from workbench.power.run import measure
+from workbench.power.journal import Diagnosed, Journal, Named
+from workbench.power.planting import Findable, Plantable, Planting, Repertoire, plan
+from workbench.power.run import diagnose_sets
 from workbench.power.statistics import CLEAR, VISIBLE, share, summarise
+from workbench.power.virtual_rig import VirtualRig, open_virtual_rig
 
 __all__ = [
     "CLEAR",
-    "PLANTABLE",
     "VISIBLE",
+    "Diagnosed",
+    "Findable",
     "Journal",
-    "Judged",
     "Named",
     "Plantable",
     "Planting",
-    "measure",
+    "Repertoire",
+    "VirtualRig",
+    "diagnose_sets",
+    "open_virtual_rig",
     "plan",
     "share",
     "summarise",

@@ -1,4 +1,4 @@
-"""Verdicts on sets of stops, one line of a file each, which a killed run leaves whole."""
+"""Verdicts on sets of recordings, one line of a file each, which a killed run leaves whole."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from typing import Any
 from workbench.diagnosis import Diagnosis
 from workbench.errors import InputError
 from workbench.files import write_whole
-from workbench.power.planting import BY_NAME, Planting
+from workbench.power.planting import Planting, Repertoire
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One set of stops, diagnosed.
+class Diagnosed:
+    """What was said of one set of recordings.
 
     Attributes
     ----------
@@ -62,7 +62,9 @@ class Judged:
         return self.causes[0].effect if self.causes else self.verdict
 
 
-def judged(planting: Planting, diagnosis: Diagnosis, seconds: float) -> Judged:
+def diagnosed(
+    planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire, seconds: float
+) -> Diagnosed:
     """Keep what statistics need of a diagnosis."""
     causes = tuple(
         Named(
@@ -77,15 +79,17 @@ def judged(planting: Planting, diagnosis: Diagnosis, seconds: float) -> Judged:
     )
     gain = diagnosis.gain
     before, after = (None, None) if gain is None else (gain.before, gain.after)
-    clearness = _clearness(planting, diagnosis)
-    return Judged(planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness)
+    clearness = _clearness(planting, diagnosis, repertoire)
+    return Diagnosed(
+        planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
+    )
 
 
-def _clearness(planting: Planting, diagnosis: Diagnosis) -> float | None:
+def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire) -> float | None:
     if len(planting.gains) != 1:
         return None
     ((name, gain),) = planting.gains.items()
-    planted = BY_NAME[name]
+    planted = repertoire.plantable(name)
     sigmas = [
         score.sigma
         for score in diagnosis.scores
@@ -113,14 +117,14 @@ class Journal:
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any], *, resume: bool) -> None:
-        self.results: list[Judged] = []
+        self.results: list[Diagnosed] = []
         self._path = path
         if resume and path.exists():
             self._read(identity)
         lines = [json.dumps(identity), *(_line(one) for one in self.results)]
         write_whole(path, "".join(f"{line}\n" for line in lines))
 
-    def append(self, result: Judged) -> None:
+    def append(self, result: Diagnosed) -> None:
         """Add a verdict; it is on the disk when this returns."""
         self.results.append(result)
         with self._path.open("a") as file:
@@ -146,16 +150,16 @@ class Journal:
             raise InputError(
                 where=str(self._path),
                 found=f"verdicts of another run (other: {other})",
-                expected="the same seed, stops, FMUs and code",
+                expected="the same seed, recordings, FMUs and code",
                 remedy="give another --out, or run without --resume",
             )
 
 
-def _line(result: Judged) -> str:
+def _line(result: Diagnosed) -> str:
     return json.dumps(asdict(result))
 
 
-def _result(content: dict[str, Any]) -> Judged:
+def _result(content: dict[str, Any]) -> Diagnosed:
     causes = tuple(
         Named(
             one["effect"],
@@ -164,4 +168,6 @@ def _result(content: dict[str, Any]) -> Judged:
         )
         for one in content["causes"]
     )
-    return Judged(**{**content, "planting": Planting(**content["planting"]), "causes": causes})
+    planted = content["planting"]
+    planting = Planting(**{**planted, "effects": tuple(planted["effects"])})
+    return Diagnosed(**{**content, "planting": planting, "causes": causes})

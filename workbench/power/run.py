@@ -1,4 +1,4 @@
-"""Sets of stops, made by the reference model and diagnosed, in worker processes."""
+"""Sets of recordings, made by a virtual rig and diagnosed, in worker processes."""
 
 import hashlib
 import tempfile
@@ -8,21 +8,18 @@ from concurrent.futures import Future, as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from workbench import diagnosis, rig
+from workbench import diagnosis
 from workbench.case import read_cases
-from workbench.diagnosis import CATALOGUE
-from workbench.diagnosis.evidence import Court
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.verdict import judge
-from workbench.fmu import CoSimulation
+from workbench.diagnosis import Effect
 from workbench.pool import Pool, WorkerError
-from workbench.power.journal import Journal, Judged, judged
-from workbench.power.planting import Group
-from workbench.rig import Scenario, Stop, simulate, write_recording
+from workbench.power.diagnosing import build_everything, diagnose_set
+from workbench.power.journal import Diagnosed, Journal, diagnosed
+from workbench.power.planting import Group, Repertoire
+from workbench.power.virtual_rig import VirtualRig
+from workbench.system import System
 
-_RATE = 200  # [Hz] of the recordings
 _JOURNAL = "sets.jsonl"
 
 
@@ -32,36 +29,41 @@ class Setup:
 
     Attributes
     ----------
-    scenarios : the stops of a set.
-    reference : multibody model, a Co-Simulation FMU, which makes the recordings.
+    rig : makes the recordings.
     everything : FMU of the observer model with every effect at zero, which diagnoses them.
+    effects : that it has.
     """
 
-    scenarios: tuple[Scenario, ...]
-    reference: Path
+    system: System
+    rig: VirtualRig
     everything: Path
+    effects: tuple[Effect, ...]
+
+    @property
+    def repertoire(self) -> Repertoire:
+        """What can be planted, and what can be found."""
+        return Repertoire(self.rig.plantables, self.effects)
 
 
-def measure(
+def diagnose_sets(
     groups: Sequence[Group],
-    scenarios: Sequence[Scenario],
-    reference: Path,
-    package: Path,
+    system: System,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
     out: Path,
     *,
     seed: int,
     workers: int,
     resume: bool,
     report: Callable[[str], None],
-) -> tuple[list[Judged], bool]:
-    """Make and diagnose sets of stops.
+) -> tuple[list[Diagnosed], bool]:
+    """Make and diagnose sets of recordings.
 
     Parameters
     ----------
-    groups : as planned; sets that are judged already are left out.
-    scenarios : the stops of a set.
-    reference : multibody model that makes the recordings.
-    package : `package.mo` of the Modelica library that diagnoses them.
+    groups : as planned; sets that are diagnosed already are left out.
+    rig : makes the recordings.
+    effects : of the system's library, which may be found.
     out : folder of the verdicts, and where a run resumes from.
     seed : of the plan.
     report : takes a line on each set.
@@ -76,20 +78,16 @@ def measure(
     InputError
         If a model is not what it should be, or verdicts of another run are there.
     """
-    with CoSimulation(reference):
-        pass  # a file that is no FMU is refused here, once
     with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(tuple(scenarios), reference, Path(scratch) / "AllEffects.fmu")
-        text = source("AllEffects", CATALOGUE, {}, {}, "Observer model with every effect, at zero")
-        build(package, "AllEffects", text, setup.everything, every_platform=False)
+        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
+        build_everything(system, effects, setup.everything)
         identity = {
             "seed": seed,
-            "scenarios": [repr(scenario) for scenario in scenarios],
-            "reference": _hash([reference]),
+            **rig.identity,
             "observer": _hash([setup.everything]),
-            "code": _hash(sorted(f for m in (diagnosis, rig) for f in _sources(m.__path__))),
+            "effects": [repr(effect) for effect in effects],
+            "code": _hash(sorted(f for p in diagnosis.__path__ for f in Path(p).glob("*.py"))),
         }
-        out.mkdir(parents=True, exist_ok=True)
         journal = Journal(out / _JOURNAL, identity, resume=resume)
         known = {one.planting.options for one in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
@@ -104,11 +102,11 @@ def _run(
     journal: Journal,
     report: Callable[[str], None],
 ) -> bool:
-    """Judge all groups; returns whether the run was interrupted."""
+    """Diagnose all groups; returns whether the run was interrupted."""
     total = sum(map(len, groups))
     begin, done = time.perf_counter(), 0
 
-    def collect(task: Future[list[Judged]]) -> None:
+    def collect(task: Future[list[Diagnosed]]) -> None:
         nonlocal done
         for result in _results(task, open_tasks.pop(task)):
             journal.append(result)
@@ -133,43 +131,34 @@ def _run(
     return False
 
 
-def _results(task: "Future[list[Judged]]", group: Group) -> list[Judged]:
+def _results(task: "Future[list[Diagnosed]]", group: Group) -> list[Diagnosed]:
     """What became of a group; a crash must not end a run of hours, and is counted."""
     try:
         return task.result()
     except WorkerError as error:
-        return [Judged(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
+        return [Diagnosed(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
 
 
-def _evaluate(setup: Setup, group: Group) -> list[Judged]:
+def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
     """Simulate once, then record and diagnose each set of a group, in a process of its own."""
-    results: list[Judged] = []
-    stops: list[Stop] = []
+    results: list[Diagnosed] = []
+    simulated: Any = None
     for planting in group:
         begin = time.perf_counter()
         try:
-            effects = planting.effects
-            if not stops:
-                stops = [
-                    simulate(scenario, planting.seed, effects, setup.reference)
-                    for scenario in setup.scenarios
-                ]
+            if simulated is None:
+                simulated = setup.rig.simulate(planting.seed, planting.gains)
             with tempfile.TemporaryDirectory() as folder:
-                for stop in stops:
-                    write_recording(stop, effects, _RATE, Path(folder) / stop.scenario.name)
-                cases = read_cases([Path(folder)])
-            with Court(setup.everything, {}, cases, 1) as court:
-                found = judge(Fit(court, CATALOGUE), CATALOGUE, lambda _: None)
+                setup.rig.write(simulated, planting.gains, Path(folder))
+                cases = read_cases([Path(folder)], setup.system)
+            found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
         except Exception as error:  # one set must not end a run of hours; it is counted
             seconds = time.perf_counter() - begin
-            results.append(Judged(planting, "failed", (), None, None, seconds, repr(error)))
+            results.append(Diagnosed(planting, "failed", (), None, None, seconds, repr(error)))
         else:
-            results.append(judged(planting, found, time.perf_counter() - begin))
+            seconds = time.perf_counter() - begin
+            results.append(diagnosed(planting, found, setup.repertoire, seconds))
     return results
-
-
-def _sources(folders: Sequence[str]) -> list[Path]:
-    return [path for folder in folders for path in Path(folder).glob("*.py")]
 
 
 def _hash(paths: Sequence[Path]) -> str:

@@ -2,20 +2,16 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
 from itertools import permutations
 from typing import Any
 
 from scipy.stats import binomtest
 
-from workbench.diagnosis import Effect
-from workbench.power.journal import Judged
-from workbench.power.planting import BY_NAME, PLANTABLE
-from workbench.rig import Effects
+from workbench.power.journal import Diagnosed
+from workbench.power.planting import Repertoire
 
 VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
 CLEAR = 4.0  # standard deviations that a size must have to be more than noise
-_UNITS = {one.name: one.metadata["unit"] for one in fields(Effects)}
 
 
 def share(outcomes: Iterable[bool]) -> dict[str, Any]:
@@ -36,14 +32,14 @@ def share(outcomes: Iterable[bool]) -> dict[str, Any]:
     return {"hits": hits, "of": of, "share": hits / of, "low": float(low), "high": float(high)}
 
 
-def named_right(result: Judged) -> bool:
+def named_right(result: Diagnosed) -> bool:
     """Whether what was planted, or a group that it is in, is named first."""
     return bool(result.causes) and any(
-        BY_NAME[name].effect in result.causes[0].group for name in result.planting.gains
+        effect in result.causes[0].group for effect in result.planting.effects
     )
 
 
-def above_noise(result: Judged) -> bool:
+def above_noise(result: Diagnosed) -> bool:
     """Whether anything was seen, or could have been: the planted size is clear of its scatter.
 
     The scatter is the least that any estimate from these stops has, by the noise of their sensors,
@@ -52,56 +48,48 @@ def above_noise(result: Judged) -> bool:
     return result.verdict != "nothing" or (result.clearness or 0.0) > CLEAR
 
 
-def named_all(result: Judged) -> bool:
+def named_all(result: Diagnosed) -> bool:
     """Whether each effect that was planted has a cause of its own that is it, or its group."""
-    planted = [BY_NAME[name].effect for name in result.planting.gains]
+    planted = result.planting.effects
     return any(
         all(effect in cause.group for effect, cause in zip(planted, chosen, strict=True))
         for chosen in permutations(result.causes, len(planted))
     )
 
 
-def intervals_cover(result: Judged, effects: Sequence[Effect]) -> list[bool]:
+def intervals_cover(result: Diagnosed, repertoire: Repertoire) -> list[bool]:
     """For each interval of the planted effect, if it was named first: whether it holds the truth.
 
     A size within the interval of its twin is no claim, and is not judged.
     """
     ((name, gain),) = result.planting.gains.items()
-    plantable = BY_NAME[name]
+    plantable = repertoire.plantable(name)
     if result.first != plantable.effect:
         return []
-    label = next(one.label for one in effects if one.name == plantable.effect)
+    label = repertoire.label(plantable.effect)
     true = {**plantable.shapes, label: abs(gain) if label == "amplitude" else gain}
     stated = result.causes[0].parameters
     return [low <= true[key] <= high for key, (_, low, high) in stated.items() if key in true]
 
 
-def summarise(results: Sequence[Judged], effects: Sequence[Effect]) -> dict[str, Any]:
+def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
     """All statistics of a run, as they are written to power.json.
 
     A share has `hits`, `of`, `share` and the 95 % interval `low` to `high`. Sizes are multiples of
     the size that matters. A diagnosis that failed counts as neither right nor "nothing".
     """
-    hidden = {effect.name for effect in effects if effect.hidden}
-    kinds: dict[str, list[Judged]] = {"clean": [], "single": [], "pair": [], "outside": []}
+    kinds: dict[str, list[Diagnosed]] = {"clean": [], "single": [], "pair": [], "outside": []}
     for result in results:
         kinds[result.planting.kind].append(result)
-    by_name: dict[str, list[Judged]] = {}
+    by_name: dict[str, list[Diagnosed]] = {}
     for result in kinds["single"] + kinds["outside"]:
         by_name.setdefault(next(iter(result.planting.gains)), []).append(result)
-    known = [one for one in PLANTABLE if one.effect and one.name in by_name]
     visible = [
         result
-        for one in known
-        if one.effect not in hidden
-        for result in by_name[one.name]
-        if result.planting.multiple >= VISIBLE
+        for one in repertoire.plantables
+        if one.effect and one.effect not in repertoire.hidden
+        for result in _large(by_name.get(one.name, []))
     ]
-    confusion = {"none": kinds["clean"]} | {
-        one.effect or one.name: _large(by_name[one.name])
-        for one in PLANTABLE
-        if one.name in by_name
-    }
     return {
         "sets": len(results),
         "failed": [
@@ -114,46 +102,13 @@ def summarise(results: Sequence[Judged], effects: Sequence[Effect]) -> dict[str,
         "right_first_above_noise": share(map(named_right, filter(above_noise, visible))),
         "right_alone": share(named_right(one) and len(one.causes) == 1 for one in visible),
         "pairs": _pairs(kinds["pair"], by_name),
-        "unexplained": share(
-            one.verdict == "unexplained"
-            for one in kinds["outside"]
-            if one.planting.multiple >= VISIBLE
-        ),
-        "coverage": share(
-            held for one in kinds["single"] for held in intervals_cover(one, effects)
-        ),
-        "effects": {
-            one.effect: {
-                "rig": one.name,
-                "size": one.size(effects),
-                "unit": _UNITS[one.name],
-                "hidden": one.effect in hidden,
-                "right_first": {
-                    size: share(map(named_right, some))
-                    for size, some in _by_size(by_name[one.name]).items()
-                },
-                "coverage": share(
-                    held
-                    for result in by_name[one.name]
-                    for held in intervals_cover(result, effects)
-                ),
-            }
-            for one in known
-        },
-        "outside": {
-            one.name: {
-                "size": one.size(effects),
-                "unit": _UNITS[one.name],
-                "verdicts": {
-                    size: dict(Counter(result.verdict for result in some))
-                    for size, some in _by_size(by_name[one.name]).items()
-                },
-            }
-            for one in PLANTABLE
-            if not one.effect and one.name in by_name
-        },
+        "unexplained": share(one.verdict == "unexplained" for one in _large(kinds["outside"])),
+        "coverage": _coverage(kinds["single"], repertoire),
+        "effects": _by_effect(by_name, repertoire),
+        "outside": _outside(by_name, repertoire),
         "confusion": {
-            row: dict(Counter(one.first for one in some)) for row, some in confusion.items()
+            row: dict(Counter(one.first for one in some))
+            for row, some in _confused(kinds["clean"], by_name, repertoire).items()
         },
         "wrong": [
             {"rig": one.planting.options, "said": [cause.effect for cause in one.causes]}
@@ -163,7 +118,59 @@ def summarise(results: Sequence[Judged], effects: Sequence[Effect]) -> dict[str,
     }
 
 
-def _pairs(pairs: Sequence[Judged], by_name: dict[str, list[Judged]]) -> dict[str, Any]:
+def _coverage(results: Iterable[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
+    """Share of intervals that hold what was planted."""
+    return share(held for one in results for held in intervals_cover(one, repertoire))
+
+
+def _by_effect(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+    """What was said of each effect of the library that was planted."""
+    return {
+        one.effect: {
+            "rig": one.name,
+            "size": repertoire.size(one),
+            "unit": one.unit,
+            "hidden": one.effect in repertoire.hidden,
+            "right_first": {
+                size: share(map(named_right, some))
+                for size, some in _by_size(by_name[one.name]).items()
+            },
+            "coverage": _coverage(by_name[one.name], repertoire),
+        }
+        for one in repertoire.plantables
+        if one.effect and one.name in by_name
+    }
+
+
+def _outside(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+    """What was said of each effect that the library does not have."""
+    return {
+        one.name: {
+            "size": repertoire.size(one),
+            "unit": one.unit,
+            "verdicts": {
+                size: dict(Counter(result.verdict for result in some))
+                for size, some in _by_size(by_name[one.name]).items()
+            },
+        }
+        for one in repertoire.plantables
+        if not one.effect and one.name in by_name
+    }
+
+
+def _confused(
+    clean: list[Diagnosed], by_name: dict[str, list[Diagnosed]], repertoire: Repertoire
+) -> dict[str, list[Diagnosed]]:
+    """Sets of each row of the confusion matrix."""
+    rows = {
+        one.effect or one.name: _large(by_name[one.name])
+        for one in repertoire.plantables
+        if one.name in by_name
+    }
+    return {"none": clean, **rows}
+
+
+def _pairs(pairs: Sequence[Diagnosed], by_name: dict[str, list[Diagnosed]]) -> dict[str, Any]:
     """Shares of pairs; those `seen_alone` have effects that mostly are found alone, as large."""
 
     def seen(name: str, multiple: float) -> bool:
@@ -180,10 +187,10 @@ def _pairs(pairs: Sequence[Judged], by_name: dict[str, list[Judged]]) -> dict[st
     }
 
 
-def _large(results: Sequence[Judged]) -> list[Judged]:
+def _large(results: Sequence[Diagnosed]) -> list[Diagnosed]:
     return [one for one in results if one.planting.multiple >= VISIBLE]
 
 
-def _by_size(results: Sequence[Judged]) -> dict[str, list[Judged]]:
+def _by_size(results: Sequence[Diagnosed]) -> dict[str, list[Diagnosed]]:
     sizes = sorted({one.planting.multiple for one in results})
     return {f"{size:g}": [r for r in results if r.planting.multiple == size] for size in sizes}

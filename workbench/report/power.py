@@ -1,6 +1,6 @@
 """Power of the diagnosis: figures, file and table."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from workbench.diagnosis import CATALOGUE
 from workbench.files import write_json
-from workbench.power import CLEAR, VISIBLE
+from workbench.power import CLEAR, VISIBLE, Findable
 from workbench.report.diagnosis_figures import draw_heat
 from workbench.report.figures import LIGHT, STYLE, save_figure
 
@@ -18,14 +17,25 @@ _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 
-def write_power(summary: Mapping[str, Any], provenance: Mapping[str, Any], out: Path) -> None:
-    """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage."""
+def write_power(
+    summary: Mapping[str, Any],
+    effects: Sequence[Findable],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage.
+
+    Parameters
+    ----------
+    effects : of the library, in whose order they stand.
+    """
     write_json(out / "power.json", {"provenance": provenance, **summary})
-    effects = summary["effects"]
+    names = [effect.name for effect in effects]
+    measured = summary["effects"]
     with mpl.rc_context(STYLE | {"font.size": 8}):
-        figures = {"confusion": _confusion(summary["confusion"])} if summary["sets"] else {}
-        if effects:
-            figures |= {"power": _curves(effects), "coverage": _coverage(summary)}
+        figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
+        if measured:
+            figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
         for name, figure in figures.items():
             save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
 
@@ -44,7 +54,7 @@ def _curves(effects: Mapping[str, Any]) -> Figure:
         low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
         axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
         axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
-        hidden = ", hidden in stops" if one["hidden"] else ""
+        hidden = ", hidden" if one["hidden"] else ""
         axes.set_title(f"{name}\n1 = {_size(one)}{hidden}", fontsize=6.5)
         axes.set_xticks(places, list(one["right_first"]))
         axes.set_ylim(-5.0, 105.0)
@@ -54,10 +64,10 @@ def _curves(effects: Mapping[str, Any]) -> Figure:
     return sheet
 
 
-def _confusion(confusion: Mapping[str, Mapping[str, int]]) -> Figure:
+def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> Figure:
     """Planted by named, each row in percent."""
     said = {name for row in confusion.values() for name in row}
-    order = ["nothing", *(effect.name for effect in CATALOGUE), "unexplained", "failed"]
+    order = ["nothing", *names, "unexplained", "failed"]
     columns = [name for name in order if name in said or name in confusion]
     table = np.array(
         [
@@ -105,7 +115,7 @@ def format_power(summary: Mapping[str, Any]) -> str:
     sizes = sorted({float(s) for one in effects.values() for s in one["right_first"]})
     header = f"{'effect':<30}{'1 is':>12}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
     lines = [
-        f"{summary['sets']} sets of stops, {len(summary['failed'])} failed",
+        f"{summary['sets']} sets of recordings, {len(summary['failed'])} failed",
         f"false alarms on clean sets          {_text(summary['false_alarms'])}",
         f"right cause or its group first      {_text(summary['right_first'])}   from {VISIBLE:g} "
         "times the size that matters",

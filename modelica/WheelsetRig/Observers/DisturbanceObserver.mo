@@ -1,7 +1,7 @@
 within WheelsetRig.Observers;
 model DisturbanceObserver "Minimal model, its frictions states that are corrected by measured speeds"
-  extends PartialObserver(effectWR=49.386538, effectDC=-111.068182);
-  parameter Real L11(unit="1/s") = 4.14191568 "From dy of the wheelset to der(omegaW)";
+  extends PartialObserver(effect_muWR=49.3865394, effect_muDC=-111.068182);
+  parameter Real L11(unit="1/s") = 4.14191574 "From dy of the wheelset to der(omegaW)";
   parameter Real L12(unit="1/s") = 141.40357 "From dy of the roller to der(omegaW)";
   parameter Real L13(unit="1/s2") = 0.0 "From the integral of dy of the wheelset to der(omegaW)";
   parameter Real L14(unit="1/s2") = 0.0 "From the integral of dy of the roller to der(omegaW)";
@@ -17,8 +17,8 @@ model DisturbanceObserver "Minimal model, its frictions states that are correcte
   parameter Real L42(unit="1/rad") = -228.993134 "From dy of the roller to der(muDC)";
   parameter Real L43(unit="1/(rad.s)") = 0.0 "From the integral of dy of the wheelset to der(muDC)";
   parameter Real L44(unit="1/(rad.s)") = 0.0 "From the integral of dy of the roller to der(muDC)";
-  parameter Real T_WR(unit="1/s", max=0.0) = -0.02 "Rate at which muWR returns to nominal";
-  parameter Real T_DC(unit="1/s", max=0.0) = -0.02 "Rate at which muDC returns to nominal";
+  parameter Real T_muWR(unit="1/s", max=0.0) = -0.02 "Rate at which muWR returns to nominal";
+  parameter Real T_muDC(unit="1/s", max=0.0) = -0.02 "Rate at which muDC returns to nominal";
 
   output Units.FrictionCoefficient muWR(start=plant.muWR, fixed=true, min=0.03, max=0.55)
     "Friction wheel-rail at zero slip velocity, estimated";
@@ -48,15 +48,15 @@ equation
   feedback[2] = L21*dy[1] + L22*dy[2] + L23*integral[1] + L24*integral[2];
   feedback[3] = L31*dy[1] + L32*dy[2] + L33*integral[1] + L34*integral[2];
   feedback[4] = L41*dy[1] + L42*dy[2] + L43*integral[1] + L44*integral[2];
-  der(muWR) = T_WR*(muWR - plant.muWR) + fade*authorityWR.held*feedback[3];
-  der(muDC) = T_DC*(muDC - plant.muDC) + fade*authorityDC.held*feedback[4];
+  der(muWR) = T_muWR*(muWR - plant.muWR) + fade*authorityWR.held*feedback[3];
+  der(muDC) = T_muDC*(muDC - plant.muDC) + fade*authorityDC.held*feedback[4];
   annotation (
     experiment(StopTime=40.0, Interval=0.005),
     Documentation(info="<html>
 <p><code>der([omega; mu]) = f + L*[dy; integral of dy]</code>, with rows <code>omegaW, omegaR, muWR,
 muDC</code> and columns <code>dy</code> (2), integral of <code>dy</code> (2); <code>f</code> is the
 observer model for the speeds, and for the frictions the return to nominal with rates
-<code>T_WR</code>, <code>T_DC</code>.</p>
+<code>T_muWR</code>, <code>T_muDC</code>.</p>
 <p>The default gains are those of the stationary Kalman filter of the model linearised at 22 m/s
 and 1.5 bar.</p>
 <h4>References</h4>

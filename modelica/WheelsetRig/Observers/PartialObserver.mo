@@ -1,11 +1,11 @@
 within WheelsetRig.Observers;
 partial model PartialObserver "What every observer takes, gives and weighs its feedback with"
   parameter Real samplePeriod(unit="s", min=1e-6) = 0.005 "Time from sample to sample; an exported FMU takes its communication step";
-  parameter Units.AngularAcceleration effectWR(start=50.0)
+  parameter Units.AngularAcceleration effect_muWR(start=50.0)
     "Effect of muWR on der(omegaW) from which on it has full authority, other than zero";
-  parameter Units.AngularAcceleration effectDC(start=-100.0)
+  parameter Units.AngularAcceleration effect_muDC(start=-100.0)
     "Effect of muDC on der(omegaW) from which on it has full authority, other than zero";
-  parameter Units.Velocity fadingSpeed(min=1e-6) = 0.5
+  parameter Units.Velocity fadingHalf(min=1e-6) = 0.5
     "Rolling velocity at which feedback is down to half";
 
   input Units.Pressure pB "Brake cylinder pressure, measured";
@@ -25,10 +25,10 @@ protected
   Units.Velocity v "Rolling velocity, measured";
   Real fade(unit="1") "Share of the feedback: none at rest, all of it at speed";
   Sampled authorityWR(
-    value=noEvent(max(-1.0, min(1.0, actualWR/effectWR))), period=samplePeriod);
+    value=noEvent(max(-1.0, min(1.0, actualWR/effect_muWR))), period=samplePeriod);
   Sampled authorityDC(
-    value=noEvent(max(-1.0, min(1.0, actualDC/effectDC))), period=samplePeriod);
+    value=noEvent(max(-1.0, min(1.0, actualDC/effect_muDC))), period=samplePeriod);
 equation
   dy = {omegaW - omegaWEstimate, omegaR - omegaREstimate};
-  fade = v^2/(v^2 + fadingSpeed^2);
+  fade = v^2/(v^2 + fadingHalf^2);
 end PartialObserver;

@@ -1,19 +1,19 @@
 """Recordings of the virtual rig as files."""
 
 import dataclasses
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
-from workbench.rig.effects import Effects
-from workbench.rig.run import RATE, TRUTH, Stop
-from workbench.rig.scenarios import Scenario
-from workbench.rig.sensors import measure, received
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.run import RATE, TRUTH, Stop
+from workbench.wheelset.rig.scenarios import Scenario
+from workbench.wheelset.rig.sensors import received, sample
 
 # Column of the recording, unit, factor from SI, digits that hold the resolution.
 _COLUMNS = {
@@ -67,7 +67,7 @@ def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every
     """
     recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
     time = stop.time[recorded]
-    channels = measure(stop, effects, time)
+    channels = sample(stop, effects, time)
     kept = received(stop, effects, time)
     measured = {
         f"{name} [{unit}]": (channels[name][kept] * factor, f"%.{digits}f")
@@ -109,15 +109,16 @@ def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
 
 def _case(scenario: Scenario) -> str:
     c = scenario.conditions
-    content = {
-        "title": scenario.title,
-        "conditions": {
-            "initial_speed": f"{c.initial_speed * 3.6:g} km/h",
-            "brake_pressure": f"{c.brake_pressure / 1e5:g} bar",
-            "wheel_rail": c.wheel_rail,
-            "discs": c.discs,
-            "direction": c.direction,
-        },
-        "measurement": {"file": "measured.csv"},
-    }
-    return tomli_w.dumps(content)
+    return f"""\
+title = "{scenario.title}"
+
+[conditions]
+initial_speed = "{c.initial_speed * 3.6:g} km/h"
+brake_pressure = "{c.brake_pressure / 1e5:g} bar"
+wheel_rail = "{c.wheel_rail}"
+discs = {json.dumps(c.discs)}
+direction = {c.direction}
+
+[measurement]
+file = "measured.csv"
+"""

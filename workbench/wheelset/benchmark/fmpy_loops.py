@@ -14,11 +14,11 @@ import numpy as np
 from fmpy import extract, instantiate_fmu, read_model_description
 
 from workbench.fmu import Matrix, Vector
-from workbench.objective import BANDWIDTH, Weights
-from workbench.observers import ESTIMATE, DisturbanceGains, Estimate, FilterNoise, ParameterGains
-from workbench.observers.contract import FADING_SPEED, FRICTION_RANGE
-from workbench.observers.kalman import POINT_DISTANCE, TANGENT_SHARE
-from workbench.tuning.cost import Recording
+from workbench.observers import Estimate, Gains
+from workbench.observers.unscented import POINT_DISTANCE, TANGENT_SHARE
+from workbench.system import System
+
+FADING_SPEED = 0.5  # [m/s] at which half of the feedback is left
 
 
 class FMPyModel:
@@ -27,9 +27,10 @@ class FMPyModel:
     Parameters
     ----------
     path : model with states omegaW, omegaR, inputs pB, tauR, dmuWR, dmuDC, outputs Fx, slip.
+    system : the wheelset.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, system: System) -> None:
         description = read_model_description(str(path))
         variables = {v.name: v for v in description.modelVariables}
         rates = [unknown.variable for unknown in description.derivatives]
@@ -44,7 +45,11 @@ class FMPyModel:
         self.radius = float(variables["rR"].start)
         self.ratio = self.radius / float(variables["rW"].start)
         self.nominal = np.array([float(variables[name].start) for name in ("muWR", "muDC")])
-        self.low, self.high = (FRICTION_RANGE - self.nominal[:, None]).T
+        self.low = np.array([one.low for one in system.estimated]) - self.nominal
+        self.high = np.array([one.high for one in system.estimated]) - self.nominal
+        self.spread = np.array([one.spread for one in system.estimated])
+        # What a good model leaves out of a state in a second, a share of its nominal value.
+        self.walk = 2e-4 * np.array([abs(float(state.nominal or 1.0)) for state in states])
         self.measured = references("pB", "tauR")
         self.corrections = references("dmuWR", "dmuDC")
         self.outputs = references("Fx", "slip")
@@ -125,7 +130,7 @@ def _without_sigma(values: list[Vector]) -> Estimate:
 
 
 def disturbance_observer(
-    model: FMPyModel, gains: DisturbanceGains, time: Vector, u: Matrix, y: Matrix
+    model: FMPyModel, gains: Gains, time: Vector, u: Matrix, y: Matrix
 ) -> Estimate:
     """Equations (8) to (10) of Schwarz et al. (2018), linearly implicit; minimal model.
 
@@ -135,7 +140,7 @@ def disturbance_observer(
     u, y : (n, 2) measured inputs and outputs.
     """
     model.start(u[0], y[0])
-    decay = np.array([gains.T_WR, gains.T_DC])
+    gain, decay, effect = gains.values[:-2].reshape(4, 4), gains.values[-2:], gains.design["effect"]
     z, integral = np.array([*y[0], 0.0, 0.0]), np.zeros(2)
     assert model.speeds == [0, 1]
     rows = [model.estimate(z[:2], z[2:])]
@@ -146,9 +151,9 @@ def disturbance_observer(
         A = np.zeros((4, 4))
         A[:2] = model.jacobian()
         A[2, 2], A[3, 3] = decay
-        authority = np.clip(A[0, 2:] / gains.effect, -1.0, 1.0)
+        authority = np.clip(A[0, 2:] / effect, -1.0, 1.0)
         share = _fading(model.radius * y[k, 1]) * np.array([1.0, 1.0, *authority])
-        L = share[:, None] * gains.L
+        L = share[:, None] * gain
         feedback = L[:, :2] + h * L[:, 2:]
         system = np.eye(4) - h * A
         system[:, :2] += h * feedback
@@ -162,10 +167,11 @@ def disturbance_observer(
 
 
 def parameter_estimator(
-    model: FMPyModel, gains: ParameterGains, time: Vector, u: Matrix, y: Matrix
+    model: FMPyModel, gains: Gains, time: Vector, u: Matrix, y: Matrix
 ) -> Estimate:
     """Equation (7) of Schwarz et al. (2018), linearly implicit; see `disturbance_observer`."""
     n, speeds = model.n, model.speeds
+    gain, effect = gains.values.reshape(2, 4), gains.design["effect"]
     x = model.start(u[0], y[0])
     integral, friction = np.zeros(2), np.zeros(2)
     rows = [model.estimate(x, friction)]
@@ -174,8 +180,8 @@ def parameter_estimator(
         model.fmu.setReal(model.measured, u[k])
         rates, J = model.derivatives(), model.jacobian()
         A, B = J[:, :n], J[:, n:]
-        authority = np.clip(B[speeds[0]] / gains.effect, -1.0, 1.0)
-        L = (_fading(model.radius * y[k, 1]) * authority)[:, None] * gains.L
+        authority = np.clip(B[speeds[0]] / effect, -1.0, 1.0)
+        L = (_fading(model.radius * y[k, 1]) * authority)[:, None] * gain
         feedback = L[:, :2] + h * L[:, 2:]
         system = np.eye(n) - h * A
         system[:, speeds] += h * B @ feedback
@@ -228,19 +234,21 @@ def _sigma(model: FMPyModel, P: Matrix) -> Vector:
 
 
 def _filter(
-    model: FMPyModel, noise: FilterNoise, time: Vector, u: Matrix, y: Matrix, *, points: bool
+    model: FMPyModel, noise: Gains, time: Vector, u: Matrix, y: Matrix, *, points: bool
 ) -> Estimate:
     n = model.n
     z = np.concatenate([model.start(u[0], y[0]), np.zeros(2)])
-    walk = np.array([noise.model] * n + [noise.muWR, noise.muDC])
+    of_states = noise["model"] * model.walk
+    walk = np.array([*of_states, noise["muWR"], noise["muDC"]])
     spread = POINT_DISTANCE * np.sqrt(n + 2)
 
     def measurement(sample: Vector) -> Matrix:
-        levels = [noise.omegaW + noise.omegaW_relative * abs(sample[0]), noise.omegaR]
+        wheelset = noise["omegaW"] + noise["omegaW_relative"] * abs(sample[0])
+        levels = [wheelset, noise["omegaR"]]
         fade = max(_fading(model.radius * sample[1]), 1e-3)
         return np.diag((np.array(levels) / fade) ** 2)
 
-    P = np.diag([noise.model**2] * n + [noise.initial_friction**2] * 2)
+    P = np.diag(np.array([*of_states, *(noise["initial"] * model.spread)]) ** 2)
     P[np.ix_(model.speeds, model.speeds)] = measurement(y[0])
     values, sigmas, nis = [model.estimate(z[:n], z[n:])], [_sigma(model, P)], [np.nan]
     for k in range(1, len(time)):
@@ -270,30 +278,14 @@ def _filter(
 
 
 def extended_kalman_filter(
-    model: FMPyModel, noise: FilterNoise, time: Vector, u: Matrix, y: Matrix
+    model: FMPyModel, noise: Gains, time: Vector, u: Matrix, y: Matrix
 ) -> Estimate:
     """Extended Kalman filter; see `disturbance_observer`."""
     return _filter(model, noise, time, u, y, points=False)
 
 
 def unscented_kalman_filter(
-    model: FMPyModel, noise: FilterNoise, time: Vector, u: Matrix, y: Matrix
+    model: FMPyModel, noise: Gains, time: Vector, u: Matrix, y: Matrix
 ) -> Estimate:
     """Unscented Kalman filter with its covariance in full; see `disturbance_observer`."""
     return _filter(model, noise, time, u, y, points=True)
-
-
-def objective(estimate: Estimate, case: Recording, weights: Weights) -> float:
-    """z_k, equation (12) of Schwarz et al. (2018), of deviations below 5 Hz."""
-    columns = [list(ESTIMATE).index(name) for name in ("omegaW", "omegaR", "Fx")]
-    deviations = estimate.values[:, columns] - case.judged
-    # Two equal poles, which together are down by 3 dB at the bandwidth.
-    corner = 2 * np.pi * BANDWIDTH / np.sqrt(np.sqrt(2) - 1)
-    gains = np.where(case.steps > 0.0, 1.0 - np.exp(-corner * case.steps), 1.0)
-    smooth = np.empty_like(deviations)
-    first = second = np.zeros(3)
-    for k, gain in enumerate(gains):
-        first = first + gain * (deviations[k] - first)
-        second = second + gain * (first - second)
-        smooth[k] = second
-    return float(case.shares @ np.abs(smooth) @ weights.vector)

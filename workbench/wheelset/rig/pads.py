@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from workbench.case import Surface
-from workbench.rig.effects import Effects
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.scenarios import Surface
 
 FRICTION = 0.30  # at 22 m/s, 100 degC and 35 kN
 

@@ -9,10 +9,11 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.commands.arguments import REFERENCE, Commands, nearby, positive
+from workbench.commands.arguments import Commands, add_system, positive
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
-from workbench.rig import (
+from workbench.systems import load_system, model_path
+from workbench.wheelset.rig import (
     CONSTANT_PADS,
     ORDINARY_PADS,
     SCENARIOS,
@@ -68,6 +69,12 @@ def add(commands: Commands) -> None:
         help="friction of dry pads: with speed, temperature and force, or constant as in the "
         "nominal model (default: %(default)s)",
     )
+    _add_making(rig)
+    rig.set_defaults(run=_rig)
+
+
+def _add_making(rig: argparse.ArgumentParser) -> None:
+    """Add what says how recordings are made and written."""
     rig.add_argument(
         "--rate",
         type=positive,
@@ -85,10 +92,10 @@ def add(commands: Commands) -> None:
     rig.add_argument(
         "--fmu",
         type=Path,
-        default=nearby(REFERENCE),
         metavar="FILE",
-        help="multibody model, with Co-Simulation (default: %(default)s)",
+        help="multibody model, with Co-Simulation (default: the reference model of the system)",
     )
+    add_system(rig)
     rig.add_argument(
         "--workers",
         type=positive,
@@ -96,7 +103,6 @@ def add(commands: Commands) -> None:
         metavar="N",
         help="processes (default: one per processor, %(default)s)",
     )
-    rig.set_defaults(run=_rig)
 
 
 def _epilog() -> str:
@@ -136,14 +142,13 @@ def _rig(options: argparse.Namespace) -> int:
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
-    with CoSimulation(options.fmu):
+    fmu = options.fmu or model_path(load_system(options.system), "reference")
+    with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
     done = 0
     interrupted = False
-    order = _Order(
-        effects, options.seed, options.rate, options.truth_every, options.fmu, options.out
-    )
+    order = _Order(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
     # A stop that is under way at Ctrl-C is finished and kept, in a process even if it is alone.
     workers = min(options.workers, len(scenarios))
     with Pool(workers, nullcontext, order, isolated=True) as pool:

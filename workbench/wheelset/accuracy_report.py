@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
 from workbench.files import write_json, write_whole
+from workbench.wheelset.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
 
 _QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
 _CELL = 8  # characters, that of "+100.0 %"

@@ -2,12 +2,33 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
-from workbench.case import Conditions, Surface
 from workbench.errors import InputError, closest
 
+Surface: TypeAlias = Literal["dry", "wet"]
+
 _DRY_FRICTION, _WET_FRICTION = 0.40, 0.30  # at zero slip velocity
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is set before a stop, as the system file declares it.
+
+    Attributes
+    ----------
+    initial_speed : [m/s].
+    brake_pressure : [Pa].
+    wheel_rail : surface of the rails.
+    discs : surface of each disc.
+    direction : of travel, 1 or -1.
+    """
+
+    initial_speed: float
+    brake_pressure: float
+    wheel_rail: Surface
+    discs: tuple[Surface, ...]
+    direction: Literal[1, -1]
 
 
 @dataclass(frozen=True)
@@ -44,6 +65,12 @@ class Scenario:
         """Brake pressure that is asked for [Pa], a time [s] after the first demand."""
         asked = [pressure for begin, pressure in self.steps if braking >= begin]
         return asked[-1] if asked else self.conditions.brake_pressure
+
+    def friction(self, braking: float) -> float:
+        """Friction of the contact at zero slip velocity, a time [s] after the first demand."""
+        patch = self.patch
+        low = patch is not None and patch.begin <= braking < patch.end
+        return patch.muWR if patch is not None and low else self.muWR
 
     @property
     def number(self) -> int:

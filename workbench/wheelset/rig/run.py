@@ -9,12 +9,18 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import CoSimulation, Vector
-from workbench.rig.brake import DEAD_TIME, PROTECTION_PERIOD, Brake, Valve, WheelSlideProtection
-from workbench.rig.drive import Drive, Losses
-from workbench.rig.effects import Effects
-from workbench.rig.pads import FRICTION, Pads
-from workbench.rig.scenarios import Scenario
-from workbench.rig.wheel import CleanedContact, OutOfRoundWheel
+from workbench.wheelset.rig.brake import (
+    DEAD_TIME,
+    PROTECTION_PERIOD,
+    Brake,
+    Valve,
+    WheelSlideProtection,
+)
+from workbench.wheelset.rig.drive import Drive, Losses
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.pads import FRICTION, Pads
+from workbench.wheelset.rig.scenarios import Scenario
+from workbench.wheelset.rig.wheel import CleanedContact, OutOfRoundWheel
 
 RATE = 1000  # [Hz] of the co-simulation
 
@@ -165,6 +171,31 @@ def _parameters(
     return changed
 
 
+_Parts = tuple[Drive, Brake, Pads, OutOfRoundWheel, CleanedContact, WheelSlideProtection]
+
+
+def _parts(
+    nominal: Mapping[str, float],
+    parameters: Mapping[str, float],
+    scenario: Scenario,
+    drawn: Drawn,
+    phases: Phases,
+    effects: Effects,
+    omegaR: float,
+) -> _Parts:
+    """What stands beside the multibody model."""
+    rW = parameters["rW"]
+    dt = 1.0 / RATE
+    losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
+    drive = Drive(nominal["JR"], losses, omegaR, dt)
+    brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
+    pads = Pads(effects, drawn.muDC, scenario.conditions.discs, phases.disc_thickness, dt)
+    wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
+    contact = CleanedContact(effects.adhesion_recovery, dt)
+    protection = WheelSlideProtection(scenario.conditions.initial_speed)
+    return drive, brake, pads, wheel, contact, protection
+
+
 def _brake_to_standstill(
     fmu: CoSimulation, scenario: Scenario, drawn: Drawn, phases: Phases, effects: Effects
 ) -> tuple[list[tuple[float, ...]], float]:
@@ -174,21 +205,14 @@ def _brake_to_standstill(
     parameters = _parameters(nominal, scenario, drawn, effects)
     rW, rR = parameters["rW"], parameters["rR"]
     kappa, p0 = nominal["actuation.kappa"], parameters["actuation.p0"]
-    drag = parameters["wheelsetLoss.c0"]
-    conditions, patch = scenario.conditions, scenario.patch
-    velocity = conditions.initial_speed * conditions.direction
+    velocity = scenario.conditions.initial_speed * scenario.conditions.direction
     omegaW, omegaR, phiW, Fx = velocity / rW, velocity / rR, 0.0, 0.0
     states = [fmu.states.index(name) for name in ("omegaW", "omegaR", "wheelset.phi")]
     fmu.start({"omegaW": omegaW, "omegaR": omegaR}, parameters)
 
+    parts = _parts(nominal, parameters, scenario, drawn, phases, effects, omegaR)
+    drive, brake, pads, wheel, contact, protection = parts
     dt = 1.0 / RATE
-    losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
-    drive = Drive(nominal["JR"], losses, omegaR, dt)
-    brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
-    pads = Pads(effects, drawn.muDC, conditions.discs, phases.disc_thickness, dt)
-    wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
-    contact = CleanedContact(effects.adhesion_recovery, dt)
-    protection = WheelSlideProtection(conditions.initial_speed)
     valve = Valve.FILL
     every = round(PROTECTION_PERIOD * RATE)
     rows: list[tuple[float, ...]] = []
@@ -212,27 +236,16 @@ def _brake_to_standstill(
         turn = phiW + 0.5 * dt * omegaW  # in the middle of the time for which inputs are held
         mu = pads.friction(speed, force, turn)
         tauR = drive.step(omegaR, stopped=standstill is not None)
-        low = patch is not None and patch.begin <= braking < patch.end
-        muWR = (patch.muWR if patch is not None and low else scenario.muWR) * drawn.muWR
-        muWR *= contact.friction
+        muWR = scenario.friction(braking) * drawn.muWR * contact.friction
         # A torque on the wheelset enters the model as a change of its loss.
         push = math.copysign(1.0, omegaW) * wheel.torque(omegaW, turn, Fx)
-        inputs.values[:] = (
-            brake.pads,
-            tauR,
-            muWR - parameters["muWR"],
-            ratio,
-            drag - push,
-            *(value / FRICTION for value in mu),
-        )
+        drag = parameters["wheelsetLoss.c0"] - push
+        held = (brake.pads, tauR, muWR - parameters["muWR"], ratio, drag)
+        inputs.values[:] = (*held, *(value / FRICTION for value in mu))
         fmu.set(inputs, inputs.values)
         Fx, FcellL, FcellR, slip, *powers = fmu.get(outputs).tolist()
-        rows.append(
-            (
-                *(Fx, FcellL + FcellR, slip, omegaW, omegaR, tauR, brake.cylinder, brake.pads),
-                *(muWR, *mu, *pads.temperature, *pads.film, phiW),
-            )
-        )
+        motion = (Fx, FcellL + FcellR, slip, omegaW, omegaR, tauR, brake.cylinder, brake.pads)
+        rows.append((*motion, muWR, *mu, *pads.temperature, *pads.film, phiW))
         pads.heat(powers, speed, force)
         contact.rub(0.5 * abs(Fx * slip))
         rim, omegaR, phiW = fmu.step(dt)[states].tolist()

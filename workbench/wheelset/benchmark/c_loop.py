@@ -13,8 +13,8 @@ import numpy as np
 from workbench.compiler.archive import FLAGS, PLATFORMS
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers import DisturbanceGains
-from workbench.observers.contract import FADING_SPEED, FRICTION_RANGE, INPUTS, OUTPUTS, WIDTH
+from workbench.observers import Gains
+from workbench.system import System
 
 _SOURCE = Path(__file__).parent / "c_loop.c"
 
@@ -25,7 +25,8 @@ class CLoop:
     Parameters
     ----------
     fmu : minimal model, FMI 2.0, with C sources.
-    gains : see DisturbanceGains.
+    system : the wheelset.
+    gains : of the disturbance observer.
 
     Raises
     ------
@@ -33,24 +34,26 @@ class CLoop:
         If the sources do not compile.
     """
 
-    def __init__(self, fmu: FMU, gains: DisturbanceGains) -> None:
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         assert fmu.states == ("omegaW", "omegaR")
-        nominal = np.array([fmu.defaults[name] for name in ("muWR", "muDC")])
-        low, high = (FRICTION_RANGE - nominal[:, None]).T
-        rates = [gains.T_WR, gains.T_DC]
+        assert system.fading is not None
+        nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
+        low = np.array([one.low for one in system.estimated]) - nominal
+        high = np.array([one.high for one in system.estimated]) - nominal
         rR, rW = (fmu.defaults[name] for name in ("rR", "rW"))
-        tail = [rR, rR / rW, FADING_SPEED]
-        self._settings = np.concatenate(
-            [gains.L.ravel(), rates, gains.effect, low, high, nominal, tail]
-        )
-        self._references = fmu.variables([*INPUTS, *OUTPUTS]).references.astype(np.intc)
+        tail = [rR, rR / rW, system.fading.half]
+        effect = gains.design["effect"]
+        self._settings = np.concatenate([gains.values, effect, low, high, nominal, tail])
+        names = [*(one.name for one in system.inputs), *system.corrections, *system.reported]
+        self._references = fmu.variables(names).references.astype(np.intc)
+        self._width = len(system.columns)
         self._run = _compile(fmu.path)
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Matrix:
         """Estimates, (n, 8); arguments as of `Estimator.run`."""
         steps = np.diff(time, prepend=time[0])
         arrays = [np.ascontiguousarray(a) for a in (steps, u, y)]
-        rows = np.empty((time.size, WIDTH))
+        rows = np.empty((time.size, self._width))
         every = (*arrays, self._settings, self._references, rows)
         if self._run(time.size, *(ctypes.c_void_p(a.ctypes.data) for a in every)):
             raise ArithmeticError("c_loop.c: the implicit step has no solution at this point")

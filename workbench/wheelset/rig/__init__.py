@@ -3,11 +3,11 @@
 Nothing here reads an estimator, and no estimator reads the truth that is written here.
 """
 
-from workbench.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
-from workbench.rig.files import check_files, write_recording
-from workbench.rig.run import TRUTH, Drawn, Phases, Stop, simulate
-from workbench.rig.scenarios import SCENARIOS, STANDARD, Scenario, select
-from workbench.rig.sensors import MEASURED, measure, received
+from workbench.wheelset.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
+from workbench.wheelset.rig.files import check_files, write_recording
+from workbench.wheelset.rig.run import TRUTH, Drawn, Phases, Stop, simulate
+from workbench.wheelset.rig.scenarios import SCENARIOS, STANDARD, Conditions, Scenario, select
+from workbench.wheelset.rig.sensors import MEASURED, received, sample
 
 __all__ = [
     "CONSTANT_PADS",
@@ -16,15 +16,16 @@ __all__ = [
     "SCENARIOS",
     "STANDARD",
     "TRUTH",
+    "Conditions",
     "Drawn",
     "Effects",
     "Phases",
     "Scenario",
     "Stop",
     "check_files",
-    "measure",
     "plant",
     "received",
+    "sample",
     "select",
     "simulate",
     "write_recording",

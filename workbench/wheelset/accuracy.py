@@ -6,29 +6,23 @@ The truth is what no sensor reads and no estimator sees; the rig writes it besid
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.case import Case
-from workbench.cosim import Outcome, Run, observe
-from workbench.errors import InputError
+from workbench.case import Case, sign
+from workbench.cosim import Ending, Run, replay
 from workbench.fmu import Vector
-from workbench.objective import LOWEST_SPEED, braking_window, low_pass
+from workbench.objective import judged_window, low_pass
 from workbench.observers import Estimator
-from workbench.recording import read_columns
-from workbench.rig import TRUTH
+from workbench.system import System
+from workbench.wheelset.truth import BUILT_UP, Truth, lowest_speed, rolling_speed
 
 # Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
 NOISE = 0.03
 
-_DISCS = ("muDC1", "muDC2", "muDC3")
-_READ = ("Fx", "slip", "omegaR", "pads", *_DISCS)
-_PADS_TOUCH = 25e3  # [Pa] 0.25 bar balance the return springs, data sheet
 _BUILDING_UP = 2.0  # [s] after the first contact
-_BUILT_UP = (3.0, 6.0)  # [s] after the first contact
 _SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
 _SLIDE = 4.0  # [s] by then wheel-slide protection has ended it, or the wheel is locked
 _BEFORE_FALL = 0.1  # [s] the force is not falling yet
@@ -37,40 +31,19 @@ _AVERAGED = 0.05  # [s] longer than a period of the rig's structure, 15..35 Hz
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
-    """What no sensor reads, at the times of a recording.
-
-    Attributes
-    ----------
-    Fx : (n,) contact force [N].
-    slip : (n,) velocity [m/s].
-    omegaR : (n,) speed of the roller [rad/s].
-    muDC : (n,) friction of the pads [1]. The mean of the discs is what an axle can show; they are
-        pressed with the same force.
-    contact : [s] when the pads first touch the discs.
-    """
-
-    Fx: Vector
-    slip: Vector
-    omegaR: Vector
-    muDC: Vector
-    contact: float
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
+class KnownStop:
     """A stop whose truth is known, and what estimators make of it.
 
     Attributes
     ----------
     runs : by the name of the estimator.
-    roller_radius : [m], nominal.
+    system : whose estimators they are.
     """
 
     case: Case
     truth: Truth
     runs: Mapping[str, Run]
-    roller_radius: float
+    system: System
 
     def between(self, begin: float, end: float) -> NDArray[np.bool_]:
         """Samples between two times [s] after the first contact, (n,)."""
@@ -79,23 +52,27 @@ class Judged:
 
     def force(self, name: str) -> Vector:
         """Estimated force [N], (n,), positive if it brakes."""
-        return self.case.conditions.direction * self.runs[name].signal("Fx")
+        return sign(self.case, self.system) * self.runs[name].signal("Fx")
 
     @property
     def true_force(self) -> Vector:
         """True force [N], (n,), positive if it brakes."""
-        return self.case.conditions.direction * self.truth.Fx
+        return sign(self.case, self.system) * self.truth.Fx
 
     def force_error(self, name: str) -> Vector:
         """Estimated minus true force below 5 Hz [N], (n,), positive if it is too large."""
-        return low_pass(self.case.time, self.force(name) - self.true_force)
+        return self.smooth(self.force(name) - self.true_force)
+
+    def smooth(self, signal: Vector) -> Vector:
+        """The part of a signal that counts, below 5 Hz, (n,)."""
+        return low_pass(self.case.time, signal, self.system.objective.bandwidth)
 
     @property
     def slide(self) -> NDArray[np.bool_]:
         """Samples in which the wheel slides for the first time, (n,); none if it never does."""
-        speed = self.roller_radius * np.abs(self.truth.omegaR)
-        slip = self.case.conditions.direction * self.truth.slip
-        sliding = (slip > _SLIDING * speed) & (speed > LOWEST_SPEED)
+        speed = rolling_speed(self.system, self.truth.omegaR)
+        slip = sign(self.case, self.system) * self.truth.slip
+        sliding = (slip > _SLIDING * speed) & (speed > lowest_speed(self.system))
         begin = float(self.case.time[np.argmax(sliding)])
         return np.logical_and(sliding, self.case.time < begin + _SLIDE)
 
@@ -220,96 +197,30 @@ class Worst:
     value: float
 
 
-def read_truth(case: Case, roller_radius: float) -> Truth:
-    """Read the truth beside a recording, at the times of the recording.
-
-    Parameters
-    ----------
-    roller_radius : [m], nominal.
-
-    Raises
-    ------
-    InputError
-        If there is none, or the stop ends before the force is built up.
-    """
-    path = case.source.parent / "truth.csv"
-    if not path.exists():
-        raise InputError(
-            where=str(case.source.parent),
-            found="no truth.csv beside the recording",
-            expected="a case of the virtual rig, which writes the truth that estimators are "
-            "judged by",
-            remedy="make cases with 'python -m workbench rig --out DIR' and judge these; what has "
-            "no truth is for 'python -m workbench simulate'",
-        )
-    columns = _read_si(path)
-    # The rig may have kept the truth of every Nth sample only.
-    signals = {name: np.interp(case.time, columns["time"], columns[name]) for name in _READ}
-    contact = _first_contact(case, signals, roller_radius)
-    muDC: Vector = np.mean([signals[name] for name in _DISCS], axis=0)
-    return Truth(signals["Fx"], signals["slip"], signals["omegaR"], muDC, contact)
+def observe_stop(
+    case: Case, truth: Truth, estimators: Sequence[Estimator], system: System
+) -> KnownStop:
+    """Run estimators on a recording whose truth is known."""
+    runs = {estimator.name: replay(case, estimator) for estimator in estimators}
+    return KnownStop(case, truth, runs, system)
 
 
-def _read_si(path: Path) -> dict[str, Vector]:
-    """Columns of truth.csv, which the rig writes in SI units, (m,) each."""
-    units = {"time": "s"} | {name: TRUTH[name] for name in _READ}
-    columns = read_columns(path, list(units))
-    for name, unit in units.items():
-        if columns[name].unit != unit:
-            raise InputError(
-                where=f"{path}, line 1, column '{name}'",
-                found=f"unit [{columns[name].unit}]",
-                expected=f"[{unit}], as the rig writes it",
-                remedy="make the case anew with 'python -m workbench rig'",
-            )
-    return {name: column.values for name, column in columns.items()}
-
-
-def _first_contact(case: Case, signals: Mapping[str, Vector], roller_radius: float) -> float:
-    """Time of the first contact [s]."""
-    touching = signals["pads"] > _PADS_TOUCH
-    contact = float(case.time[np.argmax(touching)])
-    fast = roller_radius * np.abs(signals["omegaR"]) > LOWEST_SPEED
-    if not (touching & fast & (case.time >= contact + _BUILT_UP[0])).any():
-        raise InputError(
-            where=str(case.source.parent / "truth.csv"),
-            found="a stop that ends before its force is built up",
-            expected=f"{_BUILT_UP[0]:g} s or more from the first contact of the pads to "
-            f"{LOWEST_SPEED:g} m/s",
-            remedy="leave this case out, or make one that begins faster",
-        )
-    return contact
-
-
-def judge(
-    case: Case, truth: Truth, estimators: Sequence[Estimator], roller_radius: float
-) -> Judged:
-    """Run estimators on a recording whose truth is known.
-
-    Parameters
-    ----------
-    roller_radius : [m], nominal.
-    """
-    runs = {estimator.name: observe(case, estimator) for estimator in estimators}
-    return Judged(case, truth, runs, roller_radius)
-
-
-def stop_accuracy(stop: Judged) -> StopAccuracy:
+def stop_accuracy(stop: KnownStop) -> StopAccuracy:
     """All quantities of all estimators in one stop."""
     return StopAccuracy(
         name=stop.case.name,
         title=stop.case.title,
-        wet="wet" in stop.case.conditions.discs,
+        wet="wet" in np.atleast_1d(stop.case.conditions["discs"]),
         slides=bool(stop.slide.any()),
         estimators={name: accuracy(stop, name) for name in stop.runs},
     )
 
 
-def accuracy(stop: Judged, name: str) -> Accuracy:
+def accuracy(stop: KnownStop, name: str) -> Accuracy:
     """All quantities of one estimator in one stop."""
     run = stop.runs[name]
-    if run.outcome is not Outcome.OK:
-        return Accuracy(failure=f"{run.outcome.value} {run.message}".strip())
+    if run.ending is not Ending.OK:
+        return Accuracy(failure=f"{run.ending.value} {run.message}".strip())
     slides = bool(stop.slide.any())
     too_high, too_low = contact_errors(stop, name)
     # A friction that never moves, as that of the nominal model, is no estimate.
@@ -328,53 +239,53 @@ def accuracy(stop: Judged, name: str) -> Accuracy:
     )
 
 
-def force_error(stop: Judged, name: str) -> float:
+def force_error(stop: KnownStop, name: str) -> float:
     """Error of the force below 5 Hz, rms over mean, from first pressure to 1 m/s [1]."""
-    window = braking_window(stop.case, stop.roller_radius)
+    window = judged_window(stop.case, stop.system)
     return _rms(stop.force_error(name)[window]) / float(np.abs(stop.truth.Fx[window]).mean())
 
 
-def slide_error(stop: Judged, name: str) -> float:
+def slide_error(stop: KnownStop, name: str) -> float:
     """Error of the force below 5 Hz, rms over mean, inside the slide [1]."""
     return _rms(stop.force_error(name)[stop.slide]) / _sliding_force(stop)
 
 
-def slide_error_all_frequencies(stop: Judged, name: str) -> float:
+def slide_error_all_frequencies(stop: KnownStop, name: str) -> float:
     """Error of the force inside the slide sample by sample, ringing included [1]."""
     return _rms((stop.force(name) - stop.true_force)[stop.slide]) / _sliding_force(stop)
 
 
-def _sliding_force(stop: Judged) -> float:
+def _sliding_force(stop: KnownStop) -> float:
     """Mean force inside the slide [N]."""
-    return float(low_pass(stop.case.time, stop.true_force)[stop.slide].mean())
+    return float(stop.smooth(stop.true_force)[stop.slide].mean())
 
 
 def _rms(values: Vector) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def minimum_error(stop: Judged, name: str) -> float:
+def minimum_error(stop: KnownStop, name: str) -> float:
     """Lowest estimated over lowest true force of the slide below 5 Hz, minus 1 [1]."""
     around = stop.around_slide(0.5, _SLIDE)
-    true = low_pass(stop.case.time, stop.true_force)
+    true = stop.smooth(stop.true_force)
     estimated = true + stop.force_error(name)
     return float(estimated[around].min() / true[around].min()) - 1.0
 
 
-def rise_delay(stop: Judged, name: str) -> float:
+def rise_delay(stop: KnownStop, name: str) -> float:
     """Delay at nine tenths of the force that is reached 2 s after the first contact [s]."""
     level = 0.9 * float(stop.true_force[stop.between(1.9, 2.1)].mean())
     return _delay(stop, name, level, stop.truth.contact)
 
 
-def fall_delay(stop: Judged, name: str) -> float:
+def fall_delay(stop: KnownStop, name: str) -> float:
     """Delay at nine tenths of the fall of the force in the slide [s]."""
     falling = stop.around_slide(_BEFORE_FALL, _FALL - _BEFORE_FALL)
     high, low = float(stop.true_force[falling][0]), float(stop.true_force[falling].min())
     return _delay(stop, name, high - 0.9 * (high - low), float(stop.case.time[falling][0]))
 
 
-def _delay(stop: Judged, name: str, level: float, begin: float) -> float:
+def _delay(stop: KnownStop, name: str, level: float, begin: float) -> float:
     """Time [s] by which an estimate reaches a force [N] later than the truth; inf if never."""
     late = arrival(stop.case.time, stop.force(name), level, begin)
     return late - arrival(stop.case.time, stop.true_force, level, begin)
@@ -402,21 +313,21 @@ def arrival(time: Vector, force: Vector, level: float, begin: float) -> float:
     return float(time[crossed][0] - begin) if crossed.any() else math.inf
 
 
-def contact_errors(stop: Judged, name: str) -> tuple[float, float]:
+def contact_errors(stop: KnownStop, name: str) -> tuple[float, float]:
     """How far the force is too high and too low within 2 s of the first contact [1].
 
     As shares of the force that is being built up, below 5 Hz. An error to both sides is an
     oscillation; to one side it is none: of wet discs an observer learns only as they are pressed.
     """
     error = stop.force_error(name)[stop.between(0.0, _BUILDING_UP)]
-    force = np.abs(stop.truth.Fx[stop.between(*_BUILT_UP)]).mean()
+    force = np.abs(stop.truth.Fx[stop.between(*BUILT_UP)]).mean()
     return float(error.max() / force), float(-error.min() / force)
 
 
-def friction_error(stop: Judged, name: str) -> float:
+def friction_error(stop: KnownStop, name: str) -> float:
     """Largest error of the pads' friction below 5 Hz, from 1 s after the first contact to 1 m/s."""
-    error = low_pass(stop.case.time, stop.runs[name].signal("muDC") - stop.truth.muDC)
-    moving = stop.roller_radius * np.abs(stop.case.omegaR) > LOWEST_SPEED
+    error = stop.smooth(stop.runs[name].signal("muDC") - stop.truth.muDC)
+    moving = rolling_speed(stop.system, stop.case["omegaR"]) > lowest_speed(stop.system)
     return float(np.abs(error[stop.between(1.0, np.inf) & moving]).max())
 
 

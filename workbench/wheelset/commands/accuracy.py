@@ -2,27 +2,23 @@
 
 import argparse
 import time
+from contextlib import ExitStack
 from importlib.metadata import version
 
-from workbench.accuracy import StopAccuracy, judge, read_truth, stop_accuracy
 from workbench.case import read_cases
-from workbench.commands.arguments import (
-    FULL_OBSERVER,
-    MINIMAL_OBSERVER,
-    Commands,
-    add_recordings,
-    nearby,
-)
-from workbench.fmu import FMU
-from workbench.observers import ESTIMATORS, make_estimators
-from workbench.report.accuracy import format_accuracy, write_accuracies, write_accuracy
-from workbench.resources import cases
-from workbench.tuning import default_settings
+from workbench.commands.arguments import Commands, add_recordings, add_system, nearby
+from workbench.observers import choose, estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.resources import cases as own_cases
+from workbench.systems import load_system, open_model
+from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
+from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
+from workbench.wheelset.truth import read_truth
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
-    own = nearby(cases())
+    own = nearby(own_cases())
     accuracy = commands.add_parser(
         "accuracy",
         description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
@@ -42,42 +38,43 @@ def add(commands: Commands) -> None:
         "--estimator",
         action="append",
         default=[],
-        choices=ESTIMATORS,
         metavar="NAME",
-        help=f"judge this one, may be repeated (default: all): {', '.join(ESTIMATORS)}",
+        help="judge this one, may be repeated (default: all)",
     )
+    add_system(accuracy)
     accuracy.set_defaults(run=_accuracy)
 
 
 def _accuracy(options: argparse.Namespace) -> int:
-    cases = read_cases(options.cases)
-    chosen = [name for name in ESTIMATORS if name in (options.estimator or ESTIMATORS)]
+    system = load_system(options.system)
+    chosen = choose(system, options.estimator or list(estimators(system)))
+    cases = read_cases(options.cases, system)
+    # All of them before the first run, so that one that is missing is told at once.
+    truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []
     begin = time.perf_counter()
-    with FMU(MINIMAL_OBSERVER) as minimal, FMU(FULL_OBSERVER) as full:
-        roller_radius = minimal.defaults["rR"]
-        # All of them before the first run, so that one that is missing is told at once.
-        truths = [read_truth(case, roller_radius) for case in cases]
-        settings, tuned = default_settings(minimal, full)
-        estimators = make_estimators(chosen, minimal, full, settings)
+    with ExitStack() as stack:
+        roles = dict.fromkeys(kind.role for kind in chosen.values())
+        models = {role: stack.enter_context(open_model(system, role)) for role in roles}
+        gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}
+        ready = [kind(models[kind.role], system, gains[name]) for name, kind in chosen.items()]
         provenance = {
             "workbench": version("wheelset-workbench"),
             "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
             "fmus": [
                 {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
-                for fmu in (minimal, full)
+                for fmu in models.values()
             ],
-            "tuned": {name: file for name, file in tuned.items() if name in chosen},
+            "gains": {name: one.source for name, one in gains.items() if one.names},
         }
         print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
         for case, truth in zip(cases, truths, strict=True):
-            stops.append(stop_accuracy(judge(case, truth, estimators, roller_radius)))
+            stops.append(stop_accuracy(observe_stop(case, truth, ready, system)))
             print(
                 f"[{len(stops):>3}/{len(cases)}] {case.name:<28} "
                 f"{time.perf_counter() - begin:5.1f} s",
                 flush=True,
             )
-    options.out.mkdir(parents=True, exist_ok=True)
     write_accuracies(stops, options.out / "accuracy.csv")
     write_accuracy(stops, provenance, options.out / "accuracy.json")
     print(format_accuracy(stops))

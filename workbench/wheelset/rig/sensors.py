@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.fmu import Vector
-from workbench.rig.effects import Effects
-from workbench.rig.run import Stop
+from workbench.wheelset.rig.effects import Effects
+from workbench.wheelset.rig.run import Stop
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ _BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
 _NOISE, _SPIKES, _DROPOUTS = 1, 7, 12
 
 
-def measure(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
-    """Sample all channels.
+def sample(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
+    """Take samples of all channels.
 
     Channels have noise of their own, so that what happens to one leaves the others alone. The
     noise is that of a sample at any rate. There is no filter: structure modes lie below 200 Hz
@@ -89,7 +89,7 @@ def received(stop: Stop, effects: Effects, time: Vector) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    time : as in `measure`.
+    time : as in `sample`.
     """
     return ~_struck(effects.dropouts, time, _rng(stop, _DROPOUTS))
 

@@ -1,0 +1,37 @@
+"""Loops that a system's companion has written another way, to measure the compiled laws against."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+
+from workbench.fmu import FMU
+from workbench.observers import Estimate, Gains
+from workbench.system import System
+
+Loop = Callable[..., object]  # of time, u and y, as Estimator.run
+
+
+@contextmanager
+def by_fmpy(
+    estimator: str, fmu: FMU, system: System, gains: Gains
+) -> Iterator[Callable[..., Estimate] | None]:
+    """The loop of an estimator with FMPy's methods and numpy; None where there is none."""
+    module = _companion(system)
+    if module is None or estimator not in module.LOOPS:
+        yield None
+        return
+    with module.by_fmpy(estimator, fmu, system, gains) as loop:
+        yield loop
+
+
+def by_c(estimator: str, fmu: FMU, system: System, gains: Gains) -> Loop | None:
+    """The loop of an estimator in C without FMI; None where there is none."""
+    module = _companion(system)
+    return module.by_c(estimator, fmu, system, gains) if module else None
+
+
+def _companion(system: System) -> ModuleType | None:
+    name = f"{system.companion}.benchmark"
+    return import_module(name) if system.companion and find_spec(name) else None

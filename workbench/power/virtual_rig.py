@@ -1,0 +1,63 @@
+"""What a system's companion provides for recordings in which something is planted."""
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Protocol
+
+from workbench.errors import InputError
+from workbench.power.planting import Plantable
+from workbench.system import System
+
+
+class VirtualRig(Protocol):
+    """Makes sets of recordings; it is sent to worker processes.
+
+    A companion has one in its module `planting`, which it opens by
+    `virtual_rig(names, model) -> VirtualRig`: the recordings that a set is made of, the usual ones
+    if none is named, and the FMU that makes them. Wrong names or files it refuses there.
+    """
+
+    @property
+    def plantables(self) -> tuple[Plantable, ...]:
+        """What can be planted."""
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings of a set."""
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """All that recordings depend on besides a seed and what is planted, for JSON."""
+
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> Any:
+        """What happens in the recordings of a set; effects that are sensed may change after it."""
+
+    def write(self, simulated: Any, gains: Mapping[str, float], folder: Path) -> None:
+        """Write what sensors make of it, as case folders."""
+
+
+def open_virtual_rig(system: System, names: Sequence[str], model: Path) -> VirtualRig:
+    """The virtual rig of a system.
+
+    Parameters
+    ----------
+    names : of the recordings of a set; the usual ones if none is named.
+    model : FMU that makes them.
+
+    Raises
+    ------
+    InputError
+        If the system has none, or it refuses what is asked.
+    """
+    module = f"{system.companion}.planting"
+    if not system.companion or find_spec(module) is None:
+        raise InputError(
+            where=str(system.source),
+            found="no companion that can plant effects",
+            expected="a Python package with a module 'planting', which makes recordings",
+            remedy='name it as companion = "...", or choose a system that has one',
+        )
+    found: VirtualRig = import_module(module).virtual_rig(names, model)
+    return found
