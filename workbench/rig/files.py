@@ -1,11 +1,11 @@
 """Recordings of the virtual rig as files."""
 
 import dataclasses
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
@@ -109,15 +109,16 @@ def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
 
 def _case(scenario: Scenario) -> str:
     c = scenario.conditions
-    content = {
-        "title": scenario.title,
-        "conditions": {
-            "initial_speed": f"{c.initial_speed * 3.6:g} km/h",
-            "brake_pressure": f"{c.brake_pressure / 1e5:g} bar",
-            "wheel_rail": c.wheel_rail,
-            "discs": c.discs,
-            "direction": c.direction,
-        },
-        "measurement": {"file": "measured.csv"},
-    }
-    return tomli_w.dumps(content)
+    return f"""\
+title = "{scenario.title}"
+
+[conditions]
+initial_speed = "{c.initial_speed * 3.6:g} km/h"
+brake_pressure = "{c.brake_pressure / 1e5:g} bar"
+wheel_rail = "{c.wheel_rail}"
+discs = {json.dumps(c.discs)}
+direction = {c.direction}
+
+[measurement]
+file = "measured.csv"
+"""
