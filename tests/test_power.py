@@ -23,7 +23,7 @@ from workbench.power import (
     Judged,
     Named,
     Planting,
-    measure,
+    measure_power,
     plan,
     share,
     summarise,
@@ -295,7 +295,7 @@ _GROUPS = [
 
 
 def run(out: Path, report: Callable[[str], None]) -> tuple[list[Judged], bool]:
-    return measure(
+    return measure_power(
         _GROUPS, STOPS, REFERENCE, PACKAGE, out, seed=1, workers=1, resume=True, report=report
     )
 

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from workbench.commands.arguments import Commands, positive, require_compiler
-from workbench.power import measure, plan, summarise
+from workbench.power import measure_power, plan, summarise
 from workbench.report.power import format_power, write_power
 from workbench.rig import select
 
@@ -101,7 +101,7 @@ def _power(options: argparse.Namespace) -> int:
         print(f"{time.perf_counter() - begin:7.0f} s  {line}", flush=True)
 
     report(f"{sum(map(len, groups))} sets of {len(scenarios)} stops")
-    results, interrupted = measure(
+    results, interrupted = measure_power(
         groups,
         scenarios,
         options.fmu,

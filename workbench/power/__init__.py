@@ -5,7 +5,7 @@ plan -> sets of stops by the reference model -> verdicts -> statistics
 
 from workbench.power.journal import Journal, Judged, Named
 from workbench.power.planting import PLANTABLE, Plantable, Planting, plan
-from workbench.power.run import measure
+from workbench.power.run import measure_power
 from workbench.power.statistics import CLEAR, VISIBLE, share, summarise
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "Named",
     "Plantable",
     "Planting",
-    "measure",
+    "measure_power",
     "plan",
     "share",
     "summarise",

@@ -42,7 +42,7 @@ class Setup:
     everything: Path
 
 
-def measure(
+def measure_power(
     groups: Sequence[Group],
     scenarios: Sequence[Scenario],
     reference: Path,
