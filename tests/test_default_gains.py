@@ -21,12 +21,13 @@ from workbench.observers import (
     ParameterGains,
     reasoned_settings,
 )
+from workbench.pool import Pool
 from workbench.tuning import (
     DEFAULTS,
+    Evaluator,
     Job,
-    Pool,
     default_settings,
-    judge_gains,
+    evaluate_gains,
     read_gains,
     reasoned_gains,
     recordings,
@@ -46,7 +47,7 @@ def models(root: Path) -> Iterator[tuple[FMU, FMU]]:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
-    root: Path, inline: Callable[[Job], Pool], name: str
+    root: Path, inline: Callable[[Job], Pool[Evaluator]], name: str
 ) -> None:
     path = root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu"
     claimed = tomllib.loads((DEFAULTS / f"{name}.toml").read_text())["provenance"]
@@ -56,7 +57,7 @@ def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
     judged = recordings(cases, claimed["radius_error"])
     job = Job(name, path.read_bytes(), {}, reasoned, judged, Weights())
     tuned = read_gains(DEFAULTS / f"{name}.toml")[1]
-    after, before = judge_gains(inline(job), job, [to_vector(tuned), to_vector(reasoned)])
+    after, before = evaluate_gains(inline(job), job, [to_vector(tuned), to_vector(reasoned)])
     # The last digits depend on the processor.
     assert_allclose(after, [claimed["z_k"][one.name] for one in judged], rtol=1e-6)
     assert after.max() == pytest.approx(claimed["z"], rel=1e-6)

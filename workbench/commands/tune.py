@@ -89,6 +89,13 @@ def add(commands: Commands) -> None:
         help="observer model (default: that of the estimator)",
     )
     add_map(parser)
+    _add_search(parser)
+    _add_work(parser)
+    parser.set_defaults(run=_tune)
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    """Add what decides about the gains."""
     parser.add_argument(
         "--budget",
         type=positive,
@@ -107,6 +114,31 @@ def add(commands: Commands) -> None:
         "--seed", type=positive, default=1, help="of the search (default: %(default)s)"
     )
     parser.add_argument(
+        "--scale-error",
+        "--radius-error",
+        type=float,
+        metavar="PERCENT",
+        help="judge each case again with an output's scale off by this much, alternately to both "
+        "sides, so that gains do not rely on what nobody knows as well; 0: only as recorded "
+        "(default: as the system says)",
+    )
+    parser.add_argument(
+        "--folds",
+        type=int,
+        default=0,
+        metavar="K",
+        help="also tune K times without a K-th of the cases, and judge on these",
+    )
+    parser.add_argument(
+        "--full-evaluation",
+        action="store_true",
+        help="do not drop candidates that have lost; the result is the same",
+    )
+
+
+def _add_work(parser: argparse.ArgumentParser) -> None:
+    """Add who does the work, and what is shown and kept of it."""
+    parser.add_argument(
         "--workers",
         type=positive,
         default=os.cpu_count() or 1,
@@ -119,34 +151,13 @@ def add(commands: Commands) -> None:
         help="scheduler of a Dask cluster to work on instead; needs the extra [cluster]",
     )
     parser.add_argument(
-        "--scale-error",
-        "--radius-error",
-        type=float,
-        metavar="PERCENT",
-        help="judge each case again with an output's scale off by this much, alternately to both "
-        "sides, so that gains do not rely on what nobody knows as well; 0: only as recorded "
-        "(default: as the system says)",
-    )
-    parser.add_argument(
         "--timeout",
         type=positive,
         default=int(LIMIT),
         metavar="SECONDS",
         help="a candidate that takes longer ends its worker (default: %(default)s)",
     )
-    parser.add_argument(
-        "--folds",
-        type=int,
-        default=0,
-        metavar="K",
-        help="also tune K times without a K-th of the cases, and judge on these",
-    )
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
-    parser.add_argument(
-        "--full-evaluation",
-        action="store_true",
-        help="do not drop candidates that have lost; the result is the same",
-    )
     parser.add_argument(
         "--live", action="store_true", help="draw convergence.png anew every 5 s while searching"
     )
@@ -156,7 +167,6 @@ def add(commands: Commands) -> None:
         metavar="DIR",
         help="where to write (default: results/tune/ESTIMATOR)",
     )
-    parser.set_defaults(run=_tune)
 
 
 def _tune(options: argparse.Namespace) -> int:
