@@ -68,8 +68,13 @@ class Expression:
     @cached_property
     def names(self) -> frozenset[str]:
         """Names of what the formula is made of."""
-        found: set[str] = set()
-        self._walk(self._tree, lambda name: found.add(name) or 1.0)
+        found: list[str] = []
+
+        def note(name: str) -> float:
+            found.append(name)
+            return 1.0
+
+        self._walk(self._tree, note)
         return frozenset(found)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:

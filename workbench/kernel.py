@@ -1,8 +1,8 @@
 """The hot loop's view of an FMU: its own C functions, called from compiled Python.
 
-numba compiles the laws of the observers once; which FMU they run on is an argument, an `Instance` with
-the addresses of the FMU's functions, so that another FMU needs no compilation. Everything here may
-also be called from ordinary Python.
+numba compiles the laws of the observers once; which FMU they run on is an argument, an `Instance`
+with the addresses of the FMU's functions, so that another FMU needs no compilation. Everything here
+may also be called from ordinary Python.
 """
 
 import hashlib

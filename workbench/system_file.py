@@ -51,7 +51,17 @@ def read_system(path: Path) -> System:
     """
     file = read_table(path, "give a system file, or the name of an installed one", 'title = "..."')
     file.refuse_unknown(
-        ["name", "title", "companion", "reported", "models", "parameters", "inputs", "outputs", "judged"]
+        [
+            "name",
+            "title",
+            "companion",
+            "reported",
+            "models",
+            "parameters",
+            "inputs",
+            "outputs",
+            "judged",
+        ]
         + ["derived", "estimated", "states", "feedback", "points", "conditions", "objective"]
         + ["tuning", "diagnosis", "figures", "export", "shortest", "sample_time"]
     )
@@ -83,9 +93,7 @@ def with_model(system: System, role: str, path: Path | None) -> System:
 
 
 def _values(description: Description) -> dict[str, float]:
-    return {
-        v.name: float(v.start) for v in description.variables if v.real and v.start is not None
-    }
+    return {v.name: float(v.start) for v in description.variables if v.real and v.start is not None}
 
 
 def check_model(system: System, model: Description) -> None:
@@ -281,7 +289,9 @@ def _estimated(table: Table) -> tuple[Estimated, ...]:
                 memory=own.number("memory", "s", math.inf),
                 useful=own.number("useful", unit, 0.1 * reach),
                 acts_on=own.text("acts_on", ""),
-                claimed={key: own.table("claimed").take(key, str) for key in own.table("claimed").content},
+                claimed={
+                    key: own.table("claimed").take(key, str) for key in own.table("claimed").content
+                },
             )
         )
     return tuple(found)
@@ -291,7 +301,9 @@ def _conditions(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown(("label", "unit", "least", "above", "choices", "count", "parameters", "sign"))
+        own.refuse_unknown(
+            ("label", "unit", "least", "above", "choices", "count", "parameters", "sign")
+        )
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -314,7 +326,9 @@ def _conditions(table: Table) -> tuple[Condition, ...]:
                 choices=tuple(choices),
                 count=own.take("count", int) if "count" in own else 0,
                 parameters={
-                    choice: {key: float(value) for key, value in parameters.take(choice, dict).items()}
+                    choice: {
+                        key: float(value) for key, value in parameters.take(choice, dict).items()
+                    }
                     for choice in parameters.content
                 },
                 sign="sign" in own and own.take("sign", bool),

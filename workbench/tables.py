@@ -11,7 +11,13 @@ from workbench.recording import read_text
 from workbench.units import quantity
 
 _T = TypeVar("_T")
-_KINDS = {str: "a text", int: "a whole number", dict: "a table", list: "a list", bool: "true or false"}
+_KINDS = {
+    str: "a text",
+    int: "a whole number",
+    dict: "a table",
+    list: "a list",
+    bool: "true or false",
+}
 
 
 class Table:
@@ -57,7 +63,9 @@ class Table:
     def table(self, key: str) -> "Table":
         """A table within; empty where there is none."""
         content = self.take(key, dict) if key in self.content else {}
-        return Table(content, f"{self.where} {key}" if "[" in self.where else f"{self.where}, [{key}]")
+        return Table(
+            content, f"{self.where} {key}" if "[" in self.where else f"{self.where}, [{key}]"
+        )
 
     def tables(self, key: str) -> list["Table"]:
         """A list of tables within."""

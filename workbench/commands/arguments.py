@@ -71,17 +71,6 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
     )
 
 
-def add_system(parser: argparse.ArgumentParser) -> None:
-    """Add the option --system, which `chosen_system` reads."""
-    parser.add_argument(
-        "--system",
-        default=SYSTEM,
-        metavar="NAME|FILE",
-        help="system that the recordings are of: an installed one, or a system file (default: "
-        "%(default)s)",
-    )
-
-
 def add_models(parser: argparse.ArgumentParser) -> None:
     """Add the FMUs and their names of variables, which `chosen_system` reads."""
     for option, name in (("--fmu", "observer"), ("--full-fmu", "full observer")):

@@ -3,54 +3,55 @@
 import argparse
 import os
 import time
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 from workbench.case import read_cases
 from workbench.commands.arguments import (
-    LIBRARY,
-    MINIMAL_OBSERVER,
     Commands,
     add_recordings,
-    nearby,
+    add_system,
     positive,
     require_compiler,
 )
 from workbench.diagnosis import choose, diagnose, read_effects
-from workbench.fmu import FMU
 from workbench.modelica import read_library
 from workbench.report.diagnosis import (
     format_diagnosis,
     summarise_diagnosis,
     write_diagnosis,
 )
+from workbench.system import OBSERVER
+from workbench.system_file import with_model
+from workbench.systems import load_system, open_model
 
-_BASE = "MinimalObserver"
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "diagnose",
-        description="Compare recorded stops with the observer model: show where the simulation is "
-        "wrong, name the physical cause, say what cannot be told apart, extend the Modelica model, "
-        "and measure the gain on stops that were held out. Writes a page to read (index.html), "
-        "summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs the extra "
+        description="Compare recordings with the observer model: show where the simulation is "
+        "wrong, name the physical cause, say what cannot be told apart, extend the Modelica "
+        "model, and measure the gain on recordings that were held out. Writes a page to read "
+        "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs the extra "
         "[compiler]. Ctrl-C ends the search for more causes and keeps those that were found. Exit "
         "status 0 for any verdict.",
         epilog="examples:\n"
-        "  python -m workbench diagnose my_stops --out results/mine\n"
-        "  python -m workbench diagnose my_stops --effects BrakeFade CylinderLag\n"
-        "  python -m workbench diagnose new_stops --model results/mine/model/Extended.fmu\n"
+        "  python -m workbench diagnose my_recordings --out results/mine\n"
+        "  python -m workbench diagnose my_recordings --effects BrakeFade CylinderLag\n"
+        "  python -m workbench diagnose new_recordings --model results/mine/model/Extended.fmu\n"
+        "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
         "  python -m workbench diagnose --list",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/diagnose")
+    add_system(parser)
     parser.add_argument(
         "--model",
         type=Path,
-        default=nearby(MINIMAL_OBSERVER),
         metavar="FMU",
-        help="minimal observer model, or an extension of it (default: %(default)s)",
+        help="observer model, or an extension of it (default: the system's)",
     )
     parser.add_argument(
         "--effects",
@@ -65,9 +66,8 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--library",
         type=Path,
-        default=nearby(LIBRARY),
         metavar="FILE",
-        help="package.mo of the Modelica library (default: %(default)s)",
+        help="package.mo of the Modelica library (default: the system's)",
     )
     parser.add_argument(
         "--platforms",
@@ -86,34 +86,33 @@ def add(commands: Commands) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> int:
-    library = read_library(options.library)
-    effects = choose(options.effects, read_effects(library, _BASE))
+    system = load_system(options.system)
+    if options.library is not None:
+        system = replace(system, library=options.library)
+    if options.model is not None:
+        system = with_model(system, OBSERVER, options.model)
+    library = read_library(system.library)
+    effects = choose(options.effects, read_effects(library, system.models[OBSERVER].name))
     if options.list:
         print("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return 0
     require_compiler()
-    cases = read_cases(options.cases)
+    cases = read_cases(options.cases, system)
     begin = time.perf_counter()
 
     def report(line: str) -> None:
         print(f"{time.perf_counter() - begin:6.1f} s  {line}", flush=True)
 
-    report(f"{len(cases)} stops")
+    report(f"{len(cases)} recordings")
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
-        cases,
-        effects,
-        library,
-        _BASE,
-        options.model,
-        options.out,
-        options.workers,
-        report,
+        *(system, cases, library, effects, options.out, options.workers, report),
         every_platform=options.platforms == "all",
     )
-    with FMU(options.model) as model:
+    with open_model(system) as model:
         provenance = {
             "workbench": version("wheelset-workbench"),
+            "system": system.name,
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
             "effects": [effect.name for effect in effects],
         }

@@ -197,7 +197,7 @@ def _given(everything: Path, system: System) -> dict[str, float]:
             raise InputError(
                 where=str(diagnosed.path),
                 found=f"no parameter '{missing[0]}'",
-                expected=f"the FMU of {system.models[OBSERVER].name}, or of a model that extends it",
+                expected=f"the FMU of {system.models[OBSERVER].name}, or of one that extends it",
                 remedy="give such an FMU with --model",
             )
         return {

@@ -126,7 +126,11 @@ class Simulator:
         return Evidence(errors, rest, jacobian)
 
     def derivatives(
-        self, number: int, values: Mapping[str, float], columns: Sequence[Variation], about: Evidence
+        self,
+        number: int,
+        values: Mapping[str, float],
+        columns: Sequence[Variation],
+        about: Evidence,
     ) -> Matrix:
         """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
 

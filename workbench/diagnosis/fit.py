@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, Unless, Where
-from workbench.diagnosis.evidence import Variation, Item, Result, Simulations, delay
+from workbench.diagnosis.evidence import Item, Result, Simulations, Variation, delay
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
@@ -54,8 +54,10 @@ class Fit:
 
     @cached_property
     def local(self) -> dict[str, float]:
-        """What differs between recordings, by name: relative standard deviation of a parameter, or
-        that of a state at the start, in its unit."""
+        """Standard deviation of what differs between recordings, by name.
+
+        Relative of a parameter, in its unit of a state at the start.
+        """
         spreads = self._simulations.system.spreads
         return {**self._compare.tolerances, **spreads}
 
@@ -158,7 +160,9 @@ class Fit:
         case = self._simulations.cases[k]
         values = {**self._simulations.given, **self._set_by(case)}
         values |= {name: point.levels[name, _SENSOR] for name in self._modes}
-        values |= {name: point.levels[name, self._choice(name, case)] for name in self._compare.levels}
+        values |= {
+            name: point.levels[name, self._choice(name, case)] for name in self._compare.levels
+        }
         for j, (name, spread) in enumerate(self.local.items()):
             values[name] = self._middle(point, name, k) + (
                 self._spread(point, name, k, spread) * point.deviations[k, j]

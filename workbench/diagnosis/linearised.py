@@ -87,9 +87,7 @@ class Linearised:
     @property
     def spread(self) -> Vector:
         """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        spread: Vector = 1.0 + self.lasting * np.maximum(
-            0.0, self._squares[1] - _NOISE
-        )
+        spread: Vector = 1.0 + self.lasting * np.maximum(0.0, self._squares[1] - _NOISE)
         return spread
 
     def weighed(self, inflation: Vector) -> float:

@@ -205,9 +205,7 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
         errors = system.r + system.J @ z + system.P @ system.local(z)
         shape = one.linearised.evidence[k].errors.shape
         whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
-        result[k] = (
-            whitened**2 if fast else lasting(whitened, one.linearised.lasting)
-        ).mean()
+        result[k] = (whitened**2 if fast else lasting(whitened, one.linearised.lasting)).mean()
     return result
 
 

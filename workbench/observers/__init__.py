@@ -42,9 +42,7 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
                 remedy="correct the name",
             )
     return {
-        name: kind
-        for name, kind in known.items()
-        if (name in names if names else kind.standard)
+        name: kind for name, kind in known.items() if (name in names if names else kind.standard)
     }
 
 
@@ -52,7 +50,9 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
 def _estimators(package: str) -> tuple[type[Estimator], ...]:
     """Estimators that the modules of a package define."""
     parent = import_module(package)
-    modules = [import_module(f"{package}.{one.name}") for one in pkgutil.iter_modules(parent.__path__)]
+    modules = [
+        import_module(f"{package}.{one.name}") for one in pkgutil.iter_modules(parent.__path__)
+    ]
     return tuple(kind for module in modules for kind in _defined(module))
 
 

@@ -345,7 +345,7 @@ def explained(model, layout, j, places, change):  # type: ignore[no-untyped-def]
 @inlined
 def all_states(layout):  # type: ignore[no-untyped-def]
     """Whether every output is a state, so that none need be read from the model."""
-    for at in layout.seen:
+    for at in layout.seen:  # noqa: SIM110  a compiled loop has no generators
         if at < 0:
             return False
     return True
@@ -401,9 +401,9 @@ def stick(layout, x, before):  # type: ignore[no-untyped-def]
     ----------
     before : `slipping` before the step.
     """
-    if layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half:
-        if before * slipping(layout, x) < 0.0:
-            x[layout.follower] = layout.ratio * x[layout.leader]
+    rolls = layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
+    if rolls and before * slipping(layout, x) < 0.0:
+        x[layout.follower] = layout.ratio * x[layout.leader]
 
 
 @inlined

@@ -300,7 +300,7 @@ class DisturbanceObserver(Estimator):
     ) -> SearchSpace:
         """Bounds by the loops that gains close; a deviation does not grow by itself."""
         model = linearised(fmu, system).of(corrected_states(fmu, system))
-        s, q = model.B.shape
+        q = len(system.estimated)
         # A gain of an output on a state: the state's own share in it, or their sizes.
         sizes = np.abs(model.C) @ model.nominal
         own = np.abs(model.C).T

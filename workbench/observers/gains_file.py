@@ -34,7 +34,7 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     """
     content = _content(path)
     estimator = content.get("estimator")
-    if estimator not in reasoned:
+    if not isinstance(estimator, str) or estimator not in reasoned:
         raise _wrong(path, f"estimator = {estimator!r}", f"one of {', '.join(reasoned)}")
     blank = reasoned[estimator]
     given = _table(content, "gains", path)

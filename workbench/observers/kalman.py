@@ -18,7 +18,6 @@ from workbench.observers.contract import (
     correct,
     fading,
     measure,
-    output,
     report,
     slipping,
     stick,

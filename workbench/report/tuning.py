@@ -19,6 +19,7 @@ _REASONED, _TUNED = "0", "2"  # styles of curves
 _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of the cases [px]
 _CURVE = {"left": 58, "width": 850, "height": 220, "top": 16}  # of the convergence [px]
 
+
 def sentence(summary: Mapping[str, Any]) -> str:
     """The result in one sentence."""
     z, before = summary["z"], summary["z_reasoned"]
@@ -67,11 +68,11 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
             f"On cases they have not seen, tuned gains are not better than the reasoned ones in "
             f"{len(missed)} of {len(folds)} folds: {'; '.join(_why(summary, f) for f in missed)}."
         )
-    for name, one in summary.get("beside", {}).items():
+    for one in summary.get("beside", {}).values():
         if one["z"] is not None and one["z"] < summary["z"]:
             news.append(
-                f"Better without any tuning: {one['label']}, z = {one['z']:.4g}. It makes its gains "
-                "anew at every sample, where these are the same at every one."
+                f"Better without any tuning: {one['label']}, z = {one['z']:.4g}. It makes its "
+                "gains anew at every sample, where these are the same at every one."
             )
     falls = {name: fall for name, e in summary["sensitivity"].items() if (fall := _fall(e))}
     if falls:
@@ -133,10 +134,7 @@ def _gains(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
             remarks.append("does not matter")
         if effect is not None and _fall(effect):
             remarks.append("not converged")
-        rows.append(
-            {**gain, "name": name, "effect": effect}
-            | {"remark": ", ".join(remarks)}
-        )
+        rows.append({**gain, "name": name, "effect": effect} | {"remark": ", ".join(remarks)})
     return rows
 
 
@@ -272,7 +270,7 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
         verdict = "better" if tuned < reasoned else "not better"
         lines.append(
             f"not seen: {', '.join(fold['cases'])}: z {tuned:.4f}, {verdict} than reasoned "
-            f"{reasoned:.4f}; seen: {fold['z']:.4f}; error of {summary['judged']} {error:.2%}, reasoned "
-            f"{untuned:.2%}"
+            f"{reasoned:.4f}; seen: {fold['z']:.4f}; error of {summary['judged']} {error:.2%}, "
+            f"reasoned {untuned:.2%}"
         )
     return "\n".join(lines)

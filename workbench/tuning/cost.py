@@ -226,9 +226,7 @@ class Evaluator:
                 steps, y = case.steps[part], case.y[part]
                 estimate = estimator.advance(steps, case.u[part], y)
                 deviations = estimate.values[:, self._judged] - case.judged[part]
-                z = integrate(
-                    z, low_pass, deviations, shares, steps, case.shares[part], pole
-                )
+                z = integrate(z, low_pass, deviations, shares, steps, case.shares[part], pole)
                 if not z <= limit:
                     break
         except FMUError:

@@ -28,6 +28,7 @@ from workbench.tuning.validation import (
 )
 from workbench.tuning.workers import Workers
 
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What is tuned, and where it is searched.

@@ -70,7 +70,8 @@ def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
         "beside": {
             name: {
                 "label": estimators(job.system)[name].label,
-                "z": _finite(float(z_k.max())), "worst": list(after)[int(z_k.argmax())],
+                "z": _finite(float(z_k.max())),
+                "worst": list(after)[int(z_k.argmax())],
             }
             for name, z_k in tuned.beside.items()
         },
