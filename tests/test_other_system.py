@@ -1,4 +1,4 @@
-"""A machine of another kind, by its system file alone: simulated, drawn and tested like any other."""
+"""A machine of another kind, by its system file alone, is simulated, drawn and tested alike."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +28,7 @@ from workbench.systems import load_system, open_model
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler  # noqa: E402  (needs the extra)
+from workbench import compiler  # needs the extra
 
 MODEL = """
 within ;
@@ -133,7 +133,7 @@ def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
 
 @pytest.fixture(scope="module")
 def result(boiler: System, case: Case) -> CaseResult:
-    (result,) = simulate(prepare(boiler, choose(boiler, []), {}), [case])
+    (result,) = simulate(prepare(boiler, choose(boiler, [])), [case])
     return result
 
 

@@ -354,7 +354,7 @@ from workbench.systems import load_system
 system = load_system("wheelset")
 window = LiveWindow(system)
 case = read_case(Path(sys.argv[1]), system)
-simulation = prepare(system, choose(system, ["open_loop", "direct_inversion"]), {})
+simulation = prepare(system, choose(system, ["open_loop", "direct_inversion"]))
 with simulation.estimators() as estimators:
     window.show(case, list(estimators.values()))
     lines = plt.gcf().axes[0].get_lines()

@@ -75,7 +75,7 @@ def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[
 def uncertain(dry_case: Case, system: System) -> CaseResult:
     """Two estimators, the second with a standard deviation of Fx in the first half."""
     chosen = choose(system, ["open_loop", "direct_inversion"])
-    result = prepare(system, chosen, {}).run(dry_case)
+    result = prepare(system, chosen).run(dry_case)
     run = result.runs["direct_inversion"]
     sigma = np.full_like(run.estimate, np.nan)
     sigma[: len(sigma) // 2, list(system.columns).index("Fx")] = 1e3  # [N]
