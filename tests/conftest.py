@@ -75,16 +75,10 @@ def dry_case(system: System) -> Case:
 
 
 @pytest.fixture(scope="session")
-def stop_beginnings() -> list[Case]:
+def stop_beginnings(system: System) -> list[Case]:
     """6 s each of three stops: first pressure and what follows."""
-    part = slice(700, 1900)
-    beginnings = []
-    for name in ("03_dry_120_3.6", "08_wet_120_3.6", "10_wet_100_2.7_rev"):
-        case = read_case(ROOT / "cases" / name)
-        signals = {s: getattr(case, s)[part] for s in ("time", "pB", "tauR", "omegaW", "omegaR")}
-        assert case.Fx is not None
-        beginnings.append(replace(case, **signals, Fx=case.Fx[part]))
-    return beginnings
+    names = ("03_dry_120_3.6", "08_wet_120_3.6", "10_wet_100_2.7_rev")
+    return [read_case(ROOT / "cases" / n, system).part(slice(700, 1900)) for n in names]
 
 
 @pytest.fixture(scope="session")

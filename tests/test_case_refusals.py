@@ -5,7 +5,7 @@ import pickle
 import pytest
 from numpy.testing import assert_array_equal
 
-from workbench.case import read_case, read_cases
+from workbench.case import read_cases
 from workbench.errors import InputError
 
 from .case_folders import (
@@ -15,6 +15,7 @@ from .case_folders import (
     assert_refused,
     german,
     in_unit,
+    read,
     with_field,
     with_line,
     write,
@@ -41,7 +42,7 @@ from .case_folders import (
     ],
 )
 def test_units_that_do_not_fit_are_refused(tmp_path, name, unit, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, in_unit(name, unit))))
+    assert_refused(match, lambda: read(write(tmp_path, in_unit(name, unit))))
 
 
 @pytest.mark.parametrize(
@@ -61,13 +62,13 @@ def test_units_that_do_not_fit_are_refused(tmp_path, name, unit, match):
     ],
 )
 def test_a_field_that_is_no_finite_number_is_refused(tmp_path, field, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, with_field(7, "pB", field))))
+    assert_refused(match, lambda: read(write(tmp_path, with_field(7, "pB", field))))
 
 
 def test_the_first_of_several_bad_fields_is_named(tmp_path):
     lines = with_field(9, "time", "x")
     lines[4] = lines[4].replace("-48.25", "y")
-    assert_refused("line 5, column 'omegaW'", lambda: read_case(write(tmp_path, lines)))
+    assert_refused("line 5, column 'omegaW'", lambda: read(write(tmp_path, lines)))
 
 
 @pytest.mark.parametrize(
@@ -82,13 +83,13 @@ def test_the_first_of_several_bad_fields_is_named(tmp_path):
 def test_points_among_decimal_commas_are_refused(tmp_path, old, new, match):
     lines = german(LINES)
     lines[3] = lines[3].replace(old, new)
-    assert_refused(match, lambda: read_case(write(tmp_path, lines)))
+    assert_refused(match, lambda: read(write(tmp_path, lines)))
 
 
 def test_quoted_decimal_commas_between_commas_are_refused(tmp_path):
     quoted = ['"' + line.replace(";", '","') + '"' for line in german(LINES)]
     match = "line 2, column 'time': found '0,0', which is ambiguous"
-    assert_refused(match, lambda: read_case(write(tmp_path, quoted)))
+    assert_refused(match, lambda: read(write(tmp_path, quoted)))
 
 
 @pytest.mark.parametrize("mark", [",", "."])
@@ -96,9 +97,9 @@ def test_numbers_that_may_all_have_thousands_separators_are_refused(tmp_path, ma
     rows = [f"{k};0;1{mark}234;-48;-32;-120" for k in range(ROWS)]
     lines = [LINES[0].replace(",", ";"), *rows]
     match = "line 2, column 'tauR': found '1.234' and no number that tells"
-    assert_refused(match, lambda: read_case(write(tmp_path / "a", lines)))
+    assert_refused(match, lambda: read(write(tmp_path / "a", lines)))
     lines[5] = lines[5].replace("-48", f"-48{mark}25")  # this number can only have decimals
-    assert_array_equal(read_case(write(tmp_path / "b", lines)).tauR, 1.234)
+    assert_array_equal(read(write(tmp_path / "b", lines))["tauR"], 1.234)
 
 
 @pytest.mark.parametrize(
@@ -125,7 +126,7 @@ def test_numbers_that_may_all_have_thousands_separators_are_refused(tmp_path, ma
     ],
 )
 def test_a_line_that_breaks_the_format_is_refused(tmp_path, line, text, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, with_line(line, text))))
+    assert_refused(match, lambda: read(write(tmp_path, with_line(line, text))))
 
 
 @pytest.mark.parametrize(
@@ -140,12 +141,12 @@ def test_a_line_that_breaks_the_format_is_refused(tmp_path, line, text, match):
             "line 3: found byte 0xB0, as in Latin-1.*To do: save the file as UTF-8",
         ),
         ("\n".join(LINES[:20]), "found 19 samples over 1.8 s; expected at least 20 .*noise"),
-        ("\n".join(LINES[:21]), "found 20 samples over 1.9 s; expected .*a brake stop"),
+        ("\n".join(LINES[:21]), "found 20 samples over 1.9 s; expected .*noise, over 2 s"),
         ("\n".join([*LINES[:5], *LINES[24:]]), "found 6 samples over 2.4 s"),
     ],
 )
 def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
-    assert_refused(match, lambda: read_case(write(tmp_path, csv)))
+    assert_refused(match, lambda: read(write(tmp_path, csv)))
 
 
 # case.toml
@@ -162,7 +163,7 @@ def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
         ("direction = -1", "direktion = -1", r"\[conditions\]: .*'direktion' \(closest: 'dir"),
         ("file", "fil", r"\[measurement\]: found unknown key 'fil' \(closest: 'file'\)"),
         ("direction = -1", "", r"\[conditions\]: found no 'direction'"),
-        ("direction = -1", "direction = 0", "direction: found 0; expected 1 .* or -1"),
+        ("direction = -1", "direction = 0", "direction: found 0; expected 1 or -1"),
         ("direction = -1", "direction = true", "direction: found True; expected a whole number"),
         ("direction = -1", 'direction = "1"', "direction: found '1'; expected a whole number"),
         ('"80 km/h"', "80", "initial_speed: found 80; expected a text"),
@@ -170,8 +171,8 @@ def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
         ('"80 km/h"', '"80,5 km/h"', "found '80,5 km/h'; expected a number with a decimal point"),
         ('"80 km/h"', '"80 bar"', r"initial_speed: found \[bar\], a unit of another dimension"),
         ('"80 km/h"', '"80 kmh"', r"found unknown unit \[kmh\].*m/s or km/h"),
-        ('"80 km/h"', '"-80 km/h"', "expected a speed above zero.*'direction' holds the sign"),
-        ('"1.5 bar"', '"-1.5 bar"', "brake_pressure: found '-1.5 bar'; expected .*zero or more"),
+        ('"80 km/h"', '"-80 km/h"', "expected above 0 m/s.*'direction' holds the sign"),
+        ('"1.5 bar"', '"-1.5 bar"', "brake_pressure: found '-1.5 bar'; expected no less than 0 Pa"),
         ('= "dry"', '= "damp"', "wheel_rail: found 'damp'; expected 'dry' or 'wet'"),
         ('"dry", "wet"', '"dry", "Wet"', r"discs\[1\]: found 'Wet'; expected 'dry' or 'wet'"),
         ('"dry", "wet"', '"dry", 1', r"discs\[1\]: found 1;"),
@@ -185,7 +186,7 @@ def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
 def test_a_wrong_entry_of_the_conditions_is_refused(tmp_path, old, new, match):
     assert old in TOML
     folder = write(tmp_path, toml=TOML.replace(old, new, 1))
-    assert_refused(match, lambda: read_case(folder))
+    assert_refused(match, lambda: read(folder))
 
 
 @pytest.mark.parametrize(
@@ -200,7 +201,7 @@ def test_a_wrong_entry_of_the_conditions_is_refused(tmp_path, old, new, match):
 )
 def test_a_wrong_name_of_a_column_is_refused(tmp_path, columns, match):
     folder = write(tmp_path, toml=f"{TOML}[measurement.columns]\n{columns}\n")
-    assert_refused(match, lambda: read_case(folder))
+    assert_refused(match, lambda: read(folder))
 
 
 @pytest.mark.parametrize("table", ["conditions", "measurement"])
@@ -210,40 +211,38 @@ def test_a_table_that_is_missing_or_no_table_is_refused(tmp_path, table):
     end = next((i for i in range(begin + 1, len(lines)) if lines[i][0] == "["), len(lines))
     rest = "\n".join(lines[:begin] + lines[end:])
     missing = write(tmp_path / "a", toml=rest)
-    assert_refused(f"found no '{table}'", lambda: read_case(missing))
+    assert_refused(f"found no '{table}'", lambda: read(missing))
     number = write(tmp_path / "b", toml=f"{table} = 1\n{rest}")
-    assert_refused(f"{table}: found 1; expected a table", lambda: read_case(number))
+    assert_refused(f"{table}: found 1; expected a table", lambda: read(number))
 
 
 def test_a_toml_file_in_another_encoding_is_refused(tmp_path):
     toml = TOML.replace("title = ", "title = 'ä' #").encode("latin-1")
-    assert_refused(
-        "case.toml, line 1: found byte 0xE4", lambda: read_case(write(tmp_path, toml=toml))
-    )
+    assert_refused("case.toml, line 1: found byte 0xE4", lambda: read(write(tmp_path, toml=toml)))
 
 
 # Folders
 
 
-def test_two_cases_of_one_name_are_refused(tmp_path):
+def test_two_cases_of_one_name_are_refused(tmp_path, system):
     first, second = write(tmp_path / "x" / "01_a"), write(tmp_path / "y" / "01_a")
     match = "y/01_a: found a second case '01_a' beside .*x/01_a"
-    assert_refused(match, lambda: read_cases([first, second]))
+    assert_refused(match, lambda: read_cases([first, second], system))
 
 
-def test_a_numbered_folder_without_case_toml_is_refused_not_skipped(tmp_path):
+def test_a_numbered_folder_without_case_toml_is_refused_not_skipped(tmp_path, system):
     write(tmp_path / "01_a")
     (tmp_path / "02_b").mkdir()
-    assert_refused("02_b/case.toml: found no such file", lambda: read_cases([tmp_path]))
+    assert_refused("02_b/case.toml: found no such file", lambda: read_cases([tmp_path], system))
 
 
-def test_a_path_without_a_case_is_refused(tmp_path):
+def test_a_path_without_a_case_is_refused(tmp_path, system):
     file = tmp_path / "file"
     file.touch()
-    assert_refused("found no case.toml", lambda: read_cases([tmp_path]))
-    assert_refused("file: found a file;", lambda: read_cases([file]))
-    assert_refused("none: found no such folder", lambda: read_cases([tmp_path / "none"]))
-    assert_refused("none/case.toml: found no such file", lambda: read_case(tmp_path / "none"))
+    assert_refused("found no case.toml", lambda: read_cases([tmp_path], system))
+    assert_refused("file: found a file;", lambda: read_cases([file], system))
+    assert_refused("none: found no such folder", lambda: read_cases([tmp_path / "none"], system))
+    assert_refused("none/case.toml: found no such file", lambda: read(tmp_path / "none"))
 
 
 def test_input_errors_survive_the_way_between_processes():

@@ -8,18 +8,17 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_array_equal
 
-from workbench.case import MODEL_VARIABLES, Case, read_case
+from workbench.case import Case, read_case
 from workbench.commands.arguments import model_names
-from workbench.cosim import Outcome, observe
+from workbench.cosim import Ending, replay
+from workbench.description import read_description
 from workbench.errors import InputError
 from workbench.fmu import FMU
-from workbench.observers import (
-    DisturbanceObserver,
-    ExtendedKalmanFilter,
-    OpenLoop,
-    stationary_gains,
-)
-from workbench.observers.contract import check_model
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.observers.open_loop import OpenLoop
+from workbench.system import System
+from workbench.system_file import check_model
 
 NAMES = {
     "omegaW": "speedWheelset",
@@ -64,13 +63,12 @@ def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def start_of_stop(dry_case: Case) -> Case:
     """Coasting, first contact and the first second of braking."""
-    signals = ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
-    return replace(dry_case, **{name: getattr(dry_case, name)[:1000] for name in signals})
+    return dry_case.part(slice(1000))
 
 
 @pytest.mark.parametrize("kind", [OpenLoop, DisturbanceObserver, ExtendedKalmanFilter])
 def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
-    root: Path, renamed_path: Path, start_of_stop: Case, kind: type
+    root: Path, renamed_path: Path, start_of_stop: Case, system: System, kind: type
 ) -> None:
     estimates = []
     with (
@@ -78,16 +76,17 @@ def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
         FMU(renamed_path, NAMES) as theirs,
     ):
         for fmu in (ours, theirs):
-            gains = (stationary_gains(fmu),) if kind is DisturbanceObserver else ()
-            run = observe(start_of_stop, kind(fmu, *gains))
-            assert run.outcome is Outcome.OK
+            run = replay(start_of_stop, kind(fmu, system, kind.reasoned(fmu, system)))
+            assert run.ending is Ending.OK
             estimates.append(run.estimate)
     assert_array_equal(*estimates)
 
 
-def test_a_model_with_other_names_is_refused_without_mapping(renamed_path: Path) -> None:
-    with FMU(renamed_path) as fmu, pytest.raises(InputError, match=r"no variable 'omegaW'.*--map"):
-        check_model(fmu)
+def test_a_model_with_other_names_is_refused_without_mapping(
+    renamed_path: Path, system: System
+) -> None:
+    with pytest.raises(InputError, match=r"no variable 'pB'.*--map"):
+        check_model(system, read_description(renamed_path))
 
 
 def test_a_name_that_the_fmu_does_not_have_is_refused_with_the_closest(minimal_path: Path) -> None:
@@ -105,6 +104,10 @@ def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_pa
         assert "fmu.Fx" in mapped.outputs
 
 
+def open_loop(fmu: FMU, system: System) -> OpenLoop:
+    return OpenLoop(fmu, system, OpenLoop.reasoned(fmu, system))
+
+
 @pytest.mark.parametrize(
     ("names", "match"),
     [
@@ -114,55 +117,70 @@ def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_pa
     ],
 )
 def test_a_variable_of_the_wrong_kind_is_refused(
-    minimal_path: Path, names: dict[str, str], match: str
+    minimal_path: Path, system: System, names: dict[str, str], match: str
 ) -> None:
     with FMU(minimal_path, names) as fmu, pytest.raises(InputError, match=match):
-        check_model(fmu)
+        open_loop(fmu, system.with_names(names))
+
+
+def with_units(fmu: FMU, units: dict[str, str | None]) -> FMU:
+    """The same model, as if it declared other units."""
+    variables = [replace(v, unit=units.get(v.name, v.unit)) for v in fmu.description.variables]
+    fmu.description = replace(fmu.description, variables=tuple(variables))
+    return fmu
 
 
 @pytest.mark.parametrize(
     ("ours", "unit"),
     [("pB", "bar"), ("tauR", "kN.m"), ("omegaR", "rpm"), ("Fx", "kN"), ("slip", "km/h")],
 )
-def test_another_unit_is_refused_and_both_are_named(minimal: FMU, ours: str, unit: str) -> None:
-    minimal.units[ours] = unit
-    match = rf"'{ours}': found unit \[{unit}\]; expected \[{MODEL_VARIABLES[ours]}\]"
-    for use in (check_model, OpenLoop, stationary_gains):
-        with pytest.raises(InputError, match=match):
-            use(minimal)
+def test_another_unit_is_refused_and_both_are_named(
+    minimal: FMU, system: System, ours: str, unit: str
+) -> None:
+    other = with_units(minimal, {ours: unit})
+    match = rf"'{ours}': found unit \[{unit}\]; expected \[{system.unit(ours)}\]"
+    with pytest.raises(InputError, match=match):
+        check_model(system, other.description)
+    with pytest.raises(InputError, match=match):
+        open_loop(other, system)
 
 
-def test_a_variable_without_a_unit_is_taken_as_si(minimal: FMU) -> None:
-    minimal.units.clear()
-    check_model(minimal)
+def test_a_variable_without_a_unit_is_taken_as_si(minimal: FMU, system: System) -> None:
+    bare = with_units(minimal, dict.fromkeys(minimal.units))
+    check_model(system, bare.description)
 
 
-def copy(case: Path, folder: Path, text: str) -> Case:
+def copy(case: Path, folder: Path, text: str, system: System) -> Case:
     """A case with more text in its case.toml."""
     shutil.copytree(case, folder)
     toml = folder / "case.toml"
     toml.write_text(f"{toml.read_text()}\n{text}\n")
-    return read_case(folder)
+    return read_case(folder, system)
 
 
 def test_names_come_from_cases_and_from_the_command_line_which_wins(
-    root: Path, tmp_path: Path
+    root: Path, tmp_path: Path, system: System
 ) -> None:
     folder = root / "cases" / "03_dry_120_3.6"
     text = '[model.names]\npB = "pressure"\ntauR = "torque"'
-    cases = [copy(folder, tmp_path / name, text) for name in ("a", "b")]
+    cases = [copy(folder, tmp_path / name, text, system) for name in ("a", "b")]
     assert cases[0].names == {"pB": "pressure", "tauR": "torque"}
-    assert model_names(["pB=brakePressure"], cases) == {"pB": "brakePressure", "tauR": "torque"}
-    assert model_names([]) == read_case(folder).names == {}
+    assert model_names(["pB=brakePressure"], system, cases) == {
+        "pB": "brakePressure",
+        "tauR": "torque",
+    }
+    assert model_names([], system) == read_case(folder, system).names == {}
 
 
-def test_cases_that_contradict_each_other_need_the_command_line(root: Path, tmp_path: Path) -> None:
+def test_cases_that_contradict_each_other_need_the_command_line(
+    root: Path, tmp_path: Path, system: System
+) -> None:
     folder = root / "cases" / "03_dry_120_3.6"
-    cases = [copy(folder, tmp_path / n, f'[model.names]\npB = "{n}"') for n in ("a", "b")]
+    cases = [copy(folder, tmp_path / n, f'[model.names]\npB = "{n}"', system) for n in ("a", "b")]
     match = r"b/case.toml, \[model.names\] pB: found 'b', in a case before it 'a'"
     with pytest.raises(InputError, match=match):
-        model_names([], cases)
-    assert model_names(["pB=c"], cases) == {"pB": "c"}
+        model_names([], system, cases)
+    assert model_names(["pB=c"], system, cases) == {"pB": "c"}
 
 
 @pytest.mark.parametrize(
@@ -175,10 +193,10 @@ def test_cases_that_contradict_each_other_need_the_command_line(root: Path, tmp_
     ],
 )
 def test_a_wrong_name_in_a_case_is_refused(
-    root: Path, tmp_path: Path, text: str, match: str
+    root: Path, tmp_path: Path, system: System, text: str, match: str
 ) -> None:
     with pytest.raises(InputError, match=match):
-        copy(root / "cases" / "03_dry_120_3.6", tmp_path / "case", text)
+        copy(root / "cases" / "03_dry_120_3.6", tmp_path / "case", text, system)
 
 
 @pytest.mark.parametrize(
@@ -191,6 +209,6 @@ def test_a_wrong_name_in_a_case_is_refused(
         (["pB=a", "tauR=a"], "--map tauR: found variable 'a', which is already pB"),
     ],
 )
-def test_a_wrong_map_option_is_refused(mapped: list[str], match: str) -> None:
+def test_a_wrong_map_option_is_refused(system: System, mapped: list[str], match: str) -> None:
     with pytest.raises(InputError, match=match):
-        model_names(mapped)
+        model_names(mapped, system)

@@ -10,24 +10,20 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from workbench.__main__ import main
+from workbench.expression import Expression
 from workbench.fmu import FMU, Vector
-from workbench.observability import (
-    FRICTION_PRIOR,
-    BrakingPoint,
-    SampledModel,
-    SensorNoise,
-    bounds,
-    exponentials,
-    gramians,
-    linear_test,
-    linearise_along,
-    settle,
-)
+from workbench.information import SampledModel, bounds, exponentials, gramians
+from workbench.observability import linear_test, linearise_along, prior
+from workbench.observers import operating
+from workbench.system import OperatingPoint
+from workbench.systems import load_system
 
 ROOT = Path(__file__).parents[1]
 MINIMAL = ROOT / "fmus/fmi2/MinimalObserver.fmu"
 FULL = ROOT / "fmus/fmi2/FullObserver.fmu"
 CASE = ROOT / "cases/02_dry_100_2.7"
+SYSTEM = load_system("wheelset")
+FRICTION_PRIOR = prior(SYSTEM)
 FIRST = np.zeros(1, int)
 HALF_A_SECOND = 100
 
@@ -44,6 +40,16 @@ def full():
         yield fmu
 
 
+def braking(speed=22.0, pressure=2.7e5, muWR=0.225) -> OperatingPoint:
+    """Braked at constant speed [m/s] by a pressure [Pa]; by default the system's own test point."""
+    held = {"omegaR": Expression(f"{speed!r}/rR", "test")}
+    return OperatingPoint({"pB": pressure}, held, {"muWR": muWR})
+
+
+def settle(fmu, point):
+    return operating.settle(fmu, SYSTEM, point)
+
+
 def constant_model(Phi, C, R, length, Gamma=None):
     """A time-invariant SampledModel, for formulas of linear systems."""
     k = len(Phi)
@@ -51,7 +57,7 @@ def constant_model(Phi, C, R, length, Gamma=None):
         names=tuple(f"x{i}" for i in range(k)),
         Phi=np.tile(Phi, (length, 1, 1)),
         Gamma=np.tile(np.zeros((k, 1)) if Gamma is None else Gamma, (length, 1, 1)),
-        C=C,
+        C=np.tile(C, (length, 1, 1)),
         R=np.tile(R, (length, 1)),
     )
 
@@ -60,7 +66,7 @@ def held(fmu, x, u):
     """A model linearised at a point that is held for half a second."""
     time = 0.005 * np.arange(HALF_A_SECOND)
     return linearise_along(
-        fmu, time, np.tile(x, (time.size, 1)), np.tile(u, (time.size, 1)), SensorNoise()
+        fmu, SYSTEM, time, np.tile(x, (time.size, 1)), np.tile(u, (time.size, 1))
     )
 
 
@@ -141,8 +147,8 @@ def test_exponentials_are_those_of_scipy(stiffness):
 
 def test_only_the_minimal_model_is_observable(minimal, full):
     """The finding of Schwarz et al. (2018), section "Theoretical background"."""
-    assert linear_test(minimal).observable
-    test = linear_test(full)
+    assert linear_test(minimal, SYSTEM).observable
+    test = linear_test(full, SYSTEM)
     assert not test.observable
     assert test.invisible == ("betaB", "omegaBeta")
     assert set(test.invisible) <= set(test.unobservable)
@@ -151,11 +157,11 @@ def test_only_the_minimal_model_is_observable(minimal, full):
 @pytest.mark.parametrize("muWR", [0.15, 0.225, 0.40])
 def test_pitch_of_brake_units_hides_whatever_the_rail(full, muWR):
     """Pads that slide at 14 m/s push with a force that does not depend on their velocity."""
-    assert linear_test(full, BrakingPoint(muWR=muWR)).invisible == ("betaB", "omegaBeta")
+    assert linear_test(full, SYSTEM, braking(muWR=muWR)).invisible == ("betaB", "omegaBeta")
 
 
 def test_bounce_of_the_frame_is_seen_weakly_through_the_wheel_load(full):
-    information = linear_test(full).information
+    information = linear_test(full, SYSTEM).information
     # By direction: pitch (2), bounce (2), speeds (2). Bounce is far above rounding (1e-8) and three
     # orders below the speeds: whether it counts depends on noise, hence on the threshold.
     assert (information[:2] < 1e-8).all()
@@ -165,12 +171,17 @@ def test_bounce_of_the_frame_is_seen_weakly_through_the_wheel_load(full):
 
 def test_pitch_of_brake_units_shows_when_the_pads_nearly_stop_sliding(full):
     # 0.02 m/s on the rim are 0.043 rad/s, within the 0.05 rad/s in which pad friction is smoothed.
-    test = linear_test(full, BrakingPoint(speed=0.02))
+    test = linear_test(full, SYSTEM, braking(speed=0.02))
     assert not set(test.invisible) & {"betaB", "omegaBeta"}
 
 
+def test_test_point_of_the_system_is_the_middle_of_what_stops_cover(full):
+    for own, expected in zip(settle(full, SYSTEM.tested), settle(full, braking()), strict=True):
+        assert_allclose(own, expected, rtol=1e-12)
+
+
 def test_operating_point_carries_the_brake_torque(full):
-    x, u = settle(full, BrakingPoint())
+    x, u = settle(full, braking())
     force, Fz = full.get(full.variables(["Fx", "Fz"]))
     state = dict(zip(full.states, x, strict=True))
     # Steady state by hand: rW Fx = 3 rB muDC kappa (pB - p0) + losses; kF zF = 3 F; Fz = Fz0.
@@ -182,7 +193,7 @@ def test_operating_point_carries_the_brake_torque(full):
 
 
 def test_pad_friction_is_unknown_without_pressure(minimal):
-    x, u = settle(minimal, BrakingPoint(pressure=0.0))
+    x, u = settle(minimal, braking(pressure=0.0))
     assert_allclose(friction_bounds(minimal, x, u)[1], FRICTION_PRIOR[1], rtol=1e-9)
 
 
@@ -193,7 +204,7 @@ def test_adhesion_is_unknown_at_zero_slip(minimal):
 
 
 def test_both_frictions_are_known_near_the_limit_of_adhesion(minimal):
-    x, u = settle(minimal, BrakingPoint(muWR=0.15))
+    x, u = settle(minimal, braking(muWR=0.15))
     adhesion, pads = friction_bounds(minimal, x, u)
     # 2.7 bar use 0.099 of the 0.12 that muWR 0.15 offers here: the limits of usefulness hold.
     assert adhesion < 0.05
@@ -201,7 +212,7 @@ def test_both_frictions_are_known_near_the_limit_of_adhesion(minimal):
 
 
 def test_direction_of_rotation_does_not_matter(minimal):
-    x, u = settle(minimal, BrakingPoint())
+    x, u = settle(minimal, braking())
     forward, backward = friction_bounds(minimal, x, u), friction_bounds(minimal, -x, u)
     # Equal but for the order of rounding.
     assert_allclose(backward, forward, rtol=1e-6)
@@ -209,7 +220,7 @@ def test_direction_of_rotation_does_not_matter(minimal):
 
 def test_bound_of_pad_friction_is_that_of_the_rollers_slope(minimal):
     """Reference: in quasi-steady braking the pads' force is read off the roller's deceleration."""
-    x, u = settle(minimal, BrakingPoint())
+    x, u = settle(minimal, braking())
     bound = friction_bounds(minimal, x, u)[1]
     n, h, rB, rW, rR = HALF_A_SECOND, 0.005, 0.30, 0.46, 0.70
     # Mass of the wheelset counts with the roller: both decelerate together.
@@ -230,7 +241,7 @@ def test_knowledge_of_adhesion_rises_steeply_with_utilisation(minimal):
         speed = 40.0
         loss = 25.0 + 0.6 * speed / 0.46 + 0.004 * (speed / 0.46) ** 2
         pressure = 0.25e5 + (0.46 * 2 * force - loss) / (3 * 0.30 * 0.30 * 0.1086)
-        x, u = settle(minimal, BrakingPoint(speed, pressure, muWR=0.40))
+        x, u = settle(minimal, braking(speed, pressure, muWR=0.40))
         sensitivity.append(force_change(minimal, x, u, 0.01))
         wheelset = minimal.states.index("omegaW")
         minimal.set(minimal.variables(["dmuWR"]), u[2:3])
@@ -260,8 +271,8 @@ def force_change(fmu, x, u, step):
 
 def test_local_gramian_is_the_empirical_gramian_of_the_nonlinear_model(minimal):
     """Reference: Lall, Marsden, Glavaski (1999): simulations from states moved to and fro."""
-    noise, n, h = SensorNoise(), 20, 0.005
-    x0, u0 = settle(minimal, BrakingPoint())
+    n, h = 20, 0.005
+    x0, u0 = settle(minimal, braking())
     time = h * np.arange(n)
     u = np.tile(u0, (n, 1))
     u[:, 0] += 4e5 * time  # 4 bar/s, as fast as brakes fill
@@ -281,6 +292,9 @@ def test_local_gramian_is_the_empirical_gramian_of_the_nonlinear_model(minimal):
 
     path = simulate(x0, np.zeros(2))
     measured = [minimal.states.index(name) for name in ("omegaW", "omegaR")]
+    noise = np.column_stack(
+        [one.deviation(path[:, at]) for one, at in zip(SYSTEM.outputs, measured, strict=True)]
+    )
     steps = np.array([1e-3, 1e-3, 1e-3, 1e-3])
     sensitivity = []
     for j, step in enumerate(steps):
@@ -288,9 +302,9 @@ def test_local_gramian_is_the_empirical_gramian_of_the_nonlinear_model(minimal):
         for side in (step, -step):
             move = side * np.eye(4)[j]
             sides.append(simulate(x0 + move[:2], move[2:])[:, measured])
-        sensitivity.append((sides[0] - sides[1]) / (2 * step) / noise.outputs(path[:, measured]))
+        sensitivity.append((sides[0] - sides[1]) / (2 * step) / noise)
     S = np.array(sensitivity).reshape(4, -1)
-    model = linearise_along(minimal, time, path, u, noise)
+    model = linearise_along(minimal, SYSTEM, time, path, u)
     unit = np.sqrt(np.diag(S @ S.T))
     local = gramians(model, FIRST, n)[0] / np.outer(unit, unit)
     # Jacobians of a step's begin lag 2.5 ms: 0.01 bar of 2.7, in its sixth power (sensitivity to

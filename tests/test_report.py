@@ -18,8 +18,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
+from workbench.observers.gains import matrix_names
 from workbench.report.page import standings
 from workbench.report.results import label
+from workbench.system import System
 
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
 UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
@@ -125,14 +127,16 @@ def test_links_lead_to_headings_and_to_files_beside_the_page(results: Path, page
         assert link[1:] in ids if link.startswith("#") else (results / link).stat().st_size > 0
 
 
-def test_numbers_are_those_of_the_summary(page: Any, summary: dict[str, Any]) -> None:
+def test_numbers_are_those_of_the_summary(
+    page: Any, summary: dict[str, Any], system: System
+) -> None:
     table = page.get_element_by_id("case-table")
     titles = columns(table)
-    best = standings(summary)[0].name
+    best = standings(summary, "Fx")[0].name
     for row in rows(table):
         scores = summary["cases"][row[0].text_content().strip()]["estimators"]
         shown = dict(zip(titles, row, strict=True))
-        expected = {f"{label(n)} [%]": s["Fx_nrmse"] for n, s in scores.items()}
+        expected = {f"{label(n, system)} [%]": s["Fx_nrmse"] for n, s in scores.items()}
         expected |= {"rms error [N]": scores[best]["Fx_rms_N"], "objective z": scores[best]["z"]}
         assert len(titles) == len(expected) + 2
         for title, value in expected.items():
@@ -159,7 +163,9 @@ def best_estimator(summary: dict[str, Any]) -> str:
     return min(next(iter(summary["cases"].values()))["estimators"], key=worst)
 
 
-def test_worst_case_of_the_best_estimator_comes_first(page: Any, summary: dict[str, Any]) -> None:
+def test_worst_case_of_the_best_estimator_comes_first(
+    page: Any, summary: dict[str, Any], system: System
+) -> None:
     best = best_estimator(summary)
     errors = {n: c["estimators"][best]["Fx_nrmse"] for n, c in summary["cases"].items()}
     judged = sorted(CASES, key=lambda name: -errors[name])
@@ -167,7 +173,7 @@ def test_worst_case_of_the_best_estimator_comes_first(page: Any, summary: dict[s
     assert names == [*judged, UNJUDGED]
     assert page.xpath("//article/h3/text()") == names
     headline = page.find_class("headline")[0].text_content()
-    assert label(best) in headline
+    assert label(best, system) in headline
     assert judged[0] in headline
     assert f"{100 * errors[judged[0]]:.2f} %" in headline
 
@@ -178,9 +184,8 @@ def test_page_says_what_was_run(page: Any, summary: dict[str, Any]) -> None:
     assert provenance["fmu"]["sha256"] in text
     assert provenance["fmu"]["model"] in text
     assert provenance["commit"] is None or provenance["commit"] in text
-    for row in provenance["disturbance_observer"]["L"]:
-        for gain in row:
-            assert f"{gain:.4g}" in text
+    for name in matrix_names("L", 4, 4):
+        assert f"{provenance['disturbance_observer'][name]:.4g}" in text
 
 
 def test_missing_scores_are_explained(page: Any) -> None:
@@ -266,11 +271,13 @@ def test_page_opens_without_errors_and_draws_every_panel(browser: dict[str, Any]
     assert min(browser["curves"]) > 0
 
 
-def test_table_sorts_on_click(browser: dict[str, Any], page: Any, summary: dict[str, Any]) -> None:
+def test_table_sorts_on_click(
+    browser: dict[str, Any], page: Any, summary: dict[str, Any], system: System
+) -> None:
     """The script of the browser clicks the fourth heading twice, then the first."""
     fourth = columns(page.get_element_by_id("case-table"))[3]
     estimators = next(iter(summary["cases"].values()))["estimators"]
-    (clicked,) = [name for name in estimators if f"{label(name)} [%]" == fourth]
+    (clicked,) = [name for name in estimators if f"{label(name, system)} [%]" == fourth]
 
     def by(estimator: str, sign: int) -> list[str]:
         errors = {n: c["estimators"][estimator]["Fx_nrmse"] for n, c in summary["cases"].items()}
@@ -339,29 +346,32 @@ import sys
 from pathlib import Path
 import matplotlib.pyplot as plt
 from workbench.case import read_case
-from workbench.fmu import FMU
-from workbench.observers import DirectInversion, OpenLoop
+from workbench.observers import choose
 from workbench.report import LiveWindow
+from workbench.simulation import prepare
+from workbench.systems import load_system
 
-window = LiveWindow()
-case = read_case(Path(sys.argv[1]))
-with FMU(Path(sys.argv[2])) as fmu:
-    window.show(case, [OpenLoop(fmu), DirectInversion(fmu)])
+system = load_system("wheelset")
+window = LiveWindow(system)
+case = read_case(Path(sys.argv[1]), system)
+simulation = prepare(system, choose(system, ["open_loop", "direct_inversion"]), {})
+with simulation.estimators() as estimators:
+    window.show(case, list(estimators.values()))
     lines = plt.gcf().axes[0].get_lines()
     print([(line.get_label(), len(line.get_xdata()) == case.time.size) for line in lines])
     plt.close("all")
-    window.show(case, [OpenLoop(fmu)])
+    window.show(case, [estimators["open_loop"]])
 window.wait()
 """
 
 
 @pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no virtual screen")
-def test_live_window_draws_whole_runs_and_may_be_closed(root: Path, minimal_path: Path) -> None:
+def test_live_window_draws_whole_runs_and_may_be_closed(root: Path) -> None:
     pytest.importorskip("tkinter", reason="no toolkit for windows")
     case = root / "cases" / CASES[0]
     environment = {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}
     run = subprocess.run(
-        ["xvfb-run", "-a", sys.executable, "-c", LIVE, str(case), str(minimal_path)],
+        ["xvfb-run", "-a", sys.executable, "-c", LIVE, str(case)],
         cwd=root,
         env=environment,
         capture_output=True,

@@ -14,20 +14,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from workbench.case import Case
-from workbench.cosim import observe
-from workbench.fmu import FMU
-from workbench.objective import Weights, score
-from workbench.observers import DirectInversion, OpenLoop
-from workbench.report import (
-    CaseResult,
-    case_figure,
-    summarise,
-    write_estimates,
-    write_page,
-)
+from workbench.observers import choose
+from workbench.report import case_figure, summarise, write_estimates, write_page
 from workbench.report.drawing import extremes
 from workbench.report.figures import DARK, LIGHT
 from workbench.report.page import standings
+from workbench.simulation import CaseResult, prepare
+from workbench.system import System
 
 PROVENANCE = {
     "workbench": "0",
@@ -79,22 +72,20 @@ def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[
 
 
 @pytest.fixture(scope="module")
-def uncertain(dry_case: Case, minimal_path: Path) -> CaseResult:
+def uncertain(dry_case: Case, system: System) -> CaseResult:
     """Two estimators, the second with a standard deviation of Fx in the first half."""
-    with FMU(minimal_path) as fmu:
-        radius = fmu.defaults["rR"]
-        runs = {e.name: observe(dry_case, e) for e in (OpenLoop(fmu), DirectInversion(fmu))}
-    sigma = np.full_like(runs["direct_inversion"].estimate, np.nan)
-    sigma[: len(sigma) // 2, 6] = 1e3  # [N], column of Fx
-    runs["direct_inversion"] = replace(runs["direct_inversion"], sigma=sigma)
-    scores = {name: score(dry_case, run, radius, Weights()) for name, run in runs.items()}
-    return CaseResult(dry_case, runs, scores)
+    chosen = choose(system, ["open_loop", "direct_inversion"])
+    result = prepare(system, chosen, {}).run(dry_case)
+    run = result.runs["direct_inversion"]
+    sigma = np.full_like(run.estimate, np.nan)
+    sigma[: len(sigma) // 2, list(system.columns).index("Fx")] = 1e3  # [N]
+    return replace(result, runs={**result.runs, "direct_inversion": replace(run, sigma=sigma)})
 
 
 def write(result: CaseResult, path: Path, planned: int) -> Any:
     """A page of one case."""
-    summary = summarise([result], Weights(), PROVENANCE)
-    write_page(summary, [case_figure(result, 0.7)], planned, path)
+    summary = summarise(result.system, [result], PROVENANCE)
+    write_page(result.system, summary, [case_figure(result)], planned, path)
     return lxml.html.fromstring(path.read_bytes())
 
 
@@ -128,18 +119,17 @@ def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
     noisy = replace(run, estimate=estimate, sigma=0.1 * np.abs(estimate))
     names = [f"estimator_{k}" for k in range(6)]
     figure = case_figure(
-        CaseResult(
-            uncertain.case,
-            dict.fromkeys(names, noisy),
-            dict.fromkeys(names, uncertain.scores["direct_inversion"]),
-        ),
-        roller_radius=0.7,
+        replace(
+            uncertain,
+            runs=dict.fromkeys(names, noisy),
+            scores=dict.fromkeys(names, uncertain.scores["direct_inversion"]),
+        )
     )
     estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
     cases = {f"case_{k}": {"title": "", "estimators": estimators} for k in range(14)}
     figures = [replace(figure, name=name) for name in cases]
-    summary = {"provenance": PROVENANCE, "weights": {"cW": 1, "cR": 1, "cF": 1}, "cases": cases}
-    write_page(summary, figures, len(cases), tmp_path / "index.html")
+    summary = {"provenance": PROVENANCE, "weights": {"Fx": 1}, "cases": cases}
+    write_page(uncertain.system, summary, figures, len(cases), tmp_path / "index.html")
     assert 1e6 < (tmp_path / "index.html").stat().st_size < 5e6
 
 
@@ -159,7 +149,7 @@ def test_an_estimator_that_fails_on_a_hard_case_does_not_win() -> None:
         },
         "hard": {"estimators": {"brave": {**SCORE, "Fx_nrmse": 0.05}, "brittle": SCORE}},
     }
-    ranking = standings({"cases": cases})
+    ranking = standings({"cases": cases}, "Fx")
     assert [standing.name for standing in ranking] == ["brave", "brittle"]
     assert (ranking[0].case, ranking[0].worst) == ("hard", 0.05)
     assert (ranking[1].judged, ranking[1].worst) == (1, 0.01)

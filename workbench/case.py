@@ -213,10 +213,13 @@ def read_conditions(table: Table, system: System) -> dict[str, Value]:
         If one is missing, unknown, or none of its choices.
     """
     table.refuse_unknown(one.name for one in system.conditions)
-    return {one.name: _condition(table, one) for one in system.conditions}
+    signs = [f"'{one.name}' holds the sign" for one in system.conditions if one.sign]
+    remedy = "; ".join(["give the magnitude", *signs])
+    return {one.name: _condition(table, one, remedy) for one in system.conditions}
 
 
-def _condition(table: Table, one: Condition) -> Value:
+def _condition(table: Table, one: Condition, remedy: str) -> Value:
+    """One condition; `remedy` for a quantity that is too small."""
     if one.count:
         items = table.take(one.name, list)
         if len(items) != one.count:
@@ -240,7 +243,7 @@ def _condition(table: Table, one: Condition) -> Value:
             where=where,
             found=repr(text),
             expected=f"{'above' if one.exclusive else 'no less than'} {one.least:g} {one.unit}",
-            remedy="give the magnitude; other conditions hold signs",
+            remedy=remedy,
         )
     return number
 

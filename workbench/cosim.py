@@ -4,15 +4,21 @@ import enum
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.case import Case
 from workbench.errors import FMUError
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimate, Estimator
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Ending(enum.Enum):
@@ -62,6 +68,52 @@ class Run:
     def deviation(self, name: str) -> Vector:
         """Standard deviation of one column of the estimate, (n,)."""
         return self.sigma[:, list(self.columns).index(name)]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """What is known, (n,) by `signal [unit]`: estimates, `sigma_...`, and `..._claimed`."""
+        columns: dict[str, NDArray[Any]] = {}
+        for name, unit in self.columns.items():
+            if not np.isnan(self.signal(name)).all():
+                columns[f"{name} [{unit}]"] = self.signal(name)
+            if not np.isnan(self.deviation(name)).all():
+                columns[f"sigma_{name} [{unit}]"] = self.deviation(name)
+        for name, claimed in self.claimed.items():
+            if not np.isnan(self.signal(name)).all():
+                columns[f"{name}_claimed [1]"] = claimed.astype(int)
+        return columns
+
+    def to_frame(self) -> pd.DataFrame:
+        """The estimate as a table: time, then the columns of `to_columns`."""
+        return pd.DataFrame({"time [s]": self.time, **self.to_columns()})
+
+    def to_dict(self) -> dict[str, Any]:
+        """How it went, as plain numbers and texts."""
+        return {
+            "case": self.case,
+            "estimator": self.estimator,
+            "ending": self.ending.name,
+            "message": self.message,
+            "samples": self.time.size,
+            "seconds": self.seconds,
+        }
+
+    def summary(self) -> str:
+        """How it went, in one line."""
+        ending = f"{self.ending.value} {self.message}".strip()
+        return (
+            f"{self.estimator} on {self.case}: {ending}; {self.time.size} samples in "
+            f"{self.seconds:.2g} s"
+        )
+
+    def plot(self) -> "Figure":
+        """Figure of all that was estimated."""
+        from workbench.report.figures import run_figure, sheet
+
+        return sheet(run_figure(self))
+
+    def _repr_html_(self) -> str:
+        """Smallest, largest and typical values, for notebooks."""
+        return f"<p>{escape(self.summary())}</p>{self.to_frame().describe().to_html()}"
 
 
 def replay(case: Case, estimator: Estimator) -> Run:

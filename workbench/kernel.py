@@ -230,26 +230,37 @@ def read(model):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def differentiate(model, row, count):  # type: ignore[no-untyped-def]
+    """One row of the Jacobian, by state or correction `row`, into model.jacobian; a status.
+
+    Where the FMU has no directional derivatives, all rows are written; see `linearise`.
+    """
+    if model.fmi == 0:
+        return _differences(model)
+    known = model.knowns_at + 4 * row
+    out = model.jacobian_at + 8 * model.jacobian.shape[1] * row
+    if model.fmi == 2:
+        status = model.directional_2(
+            model.address, model.unknowns_at, count, known, 1, model.seed_at, out
+        )
+    else:
+        status = model.directional_3(
+            model.address, model.unknowns_at, count, known, 1, model.seed_at, 1, out, count
+        )
+    return REFUSED if status > 1 else OK
+
+
+@inlined
 def linearise(model, count):  # type: ignore[no-untyped-def]
     """Jacobian at the present point into model.jacobian; returns a status.
 
     The first `count` columns are written: n for the derivatives, n + l for the outputs too.
     Afterwards the FMU is where it was; model.dx and model.y are undefined.
     """
-    rows, columns = model.jacobian.shape
     if model.fmi == 0:
         return _differences(model)
-    for j in range(rows):
-        known, out = model.knowns_at + 4 * j, model.jacobian_at + 8 * columns * j
-        if model.fmi == 2:
-            status = model.directional_2(
-                model.address, model.unknowns_at, count, known, 1, model.seed_at, out
-            )
-        else:
-            status = model.directional_3(
-                model.address, model.unknowns_at, count, known, 1, model.seed_at, 1, out, count
-            )
-        if status > 1:
+    for j in range(model.jacobian.shape[0]):
+        if differentiate(model, j, count):
             return REFUSED
     return OK
 

@@ -63,6 +63,8 @@ class Signal:
     scale_error : share by which its scale may be wrong, which gains must bear [1].
     reading : output of the model that says what the sensor reads, imperfections included.
     mode : between the quantity and its sensor, or None.
+    smoothed : [s] windows of a parabola and of a line that take the noise from an input where it
+        allows that, before it drives a model; empty: it is taken as it is.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Signal:
     scale_error: float
     reading: str
     mode: Mode | None
+    smoothed: tuple[float, ...]
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
@@ -221,6 +224,7 @@ class Objective:
     weights : of the mean absolute deviation by signal [1/unit].
     bandwidth : below which deviations count [Hz].
     begins, ends : of the time that is judged: from the first sample above to the last one above.
+    when : what that time is, for people.
     """
 
     judged: str
@@ -228,6 +232,7 @@ class Objective:
     bandwidth: float
     begins: Threshold | None
     ends: Threshold | None
+    when: str
 
 
 @dataclass(frozen=True)
@@ -240,15 +245,17 @@ class Following:
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One panel of a figure: measured or estimated signals on one axis.
+class View:
+    """What one panel of a figure shows: measured or estimated signals on one axis.
 
     Attributes
     ----------
+    title, note : before and after the unit.
     low, high : of the axis in the shown unit; None: what the signals need.
     """
 
     title: str
+    note: str
     signals: tuple[str, ...]
     height: float
     low: float | None
@@ -338,11 +345,31 @@ class Exclusion:
 
 
 @dataclass(frozen=True)
+class Influence:
+    """What errors may go with.
+
+    Attributes
+    ----------
+    way : of the formula: its "value", "size", "rate", "integral", or "turn", an angle, whose phase
+        belongs to one recording.
+    """
+
+    name: str
+    unit: str
+    formula: Expression
+    way: str
+
+
+@dataclass(frozen=True)
 class Comparison:
     """How the diagnosis compares recordings with the model.
 
     Attributes
     ----------
+    block : [s] whose mean errors are the unit of all statistics.
+    lasting : [s] from which on an error is no noise.
+    least : [s] of a recording that must count.
+    settling : [s] at the start, in which the simulation finds its states.
     channels : what is compared, in this order.
     leading : a motion that is led, or None.
     begins : input that is applied in each recording, and by how much above its rest.
@@ -353,6 +380,10 @@ class Comparison:
     influences : what errors may go with, besides the measured signals.
     """
 
+    block: float
+    lasting: float
+    least: float
+    settling: float
     channels: tuple[Channel, ...]
     leading: Leading | None
     begins: Threshold | None
@@ -360,7 +391,7 @@ class Comparison:
     tolerances: Mapping[str, float]
     levels: Mapping[str, Level]
     exclusions: tuple[Exclusion, ...]
-    influences: tuple[Derived, ...]
+    influences: tuple[Influence, ...]
 
 
 @dataclass(frozen=True)
@@ -428,7 +459,7 @@ class System:
     fading: Fading | None = None
     rolling: Rolling | None = None
     following: Following | None = None
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[View, ...] = ()
     export: Export = Export({}, OperatingPoint({}, {}, {}))
     companion: str = ""
     shortest: float = 0.0
@@ -507,14 +538,20 @@ class System:
         derived = next(one for one in self.derived if one.name == name)
         return self.evaluate(derived.formula, measured)
 
-    def evaluate(self, formula: Expression, measured: Mapping[str, Vector]) -> Vector:
-        """A formula along a recording, (n,)."""
+    def evaluate(
+        self,
+        formula: Expression,
+        measured: Mapping[str, Vector],
+        parameters: Mapping[str, float] | None = None,
+    ) -> Vector:
+        """A formula along a recording, (n,), with the model's parameters unless others are given."""
+        known = self.values if parameters is None else parameters
         values: dict[str, Any] = {}
         for name in formula.names:
             if name in measured or any(one.name == name for one in self.derived):
                 values[name] = self.signal(name, measured)
             else:
-                values[name] = self.values[name]
+                values[name] = known[name]
         size = next(iter(measured.values())).size
         result: Vector = np.broadcast_to(np.asarray(formula(values), np.float64), (size,))
         return result

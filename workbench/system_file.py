@@ -20,23 +20,25 @@ from workbench.system import (
     Export,
     Fading,
     Following,
+    Influence,
     Leading,
     Level,
     Mode,
     Model,
     Objective,
     OperatingPoint,
-    Panel,
     Rest,
     Rolling,
     Signal,
     System,
     Threshold,
+    View,
 )
 from workbench.tables import Table, read_table
 from workbench.units import si_factor
 
-_ANY = (-math.inf, math.inf)
+_BLOCK, _LASTING = 5, 20  # samples of a block, and blocks of a lasting error, unless said otherwise
+_WAYS = ("value", "size", "rate", "integral", "turn")
 
 
 def read_system(path: Path) -> System:
@@ -176,8 +178,8 @@ def _signals(file: Table, path: Path) -> System:
         conditions=_conditions(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
-        objective=Objective("", {}, 0.0, None, None),
-        comparison=Comparison((), None, None, None, {}, {}, (), ()),
+        objective=Objective("", {}, 0.0, None, None, ""),
+        comparison=Comparison(0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
         settles=file.table("points").number("settles", "s", 10.0),
@@ -208,7 +210,7 @@ def _measured(file: Table, group: str) -> tuple[Signal, ...]:
         table = _sub(file, group, name)
         table.refuse_unknown(
             ("unit", "shown", "label", "noise", "relative_noise", "relative_error")
-            + ("scale", "scale_error", "reading", "mode")
+            + ("scale", "scale_error", "reading", "mode", "smoothed")
         )
         unit = table.take("unit", str)
         shown = table.text("shown", unit)
@@ -228,6 +230,7 @@ def _measured(file: Table, group: str) -> tuple[Signal, ...]:
                 scale_error=table.number("scale_error", "1", 0.0),
                 reading=table.text("reading", name),
                 mode=_mode(table.table("mode")) if "mode" in table else None,
+                smoothed=table.numbers("smoothed", "s", 2) if "smoothed" in table else (),
             )
         )
     return tuple(found)
@@ -337,7 +340,7 @@ def _placed(file: Table, system: System) -> System:
         fading=_fading(feedback.table("fades"), system) if "fades" in feedback else None,
         rolling=_rolling(feedback.table("rolls")) if "rolls" in feedback else None,
         following=_following(tuning.table("follows")) if "follows" in tuning else None,
-        panels=tuple(_panel(table, system) for table in file.tables("figures")),
+        panels=tuple(_view(table, system) for table in file.tables("figures")),
         export=_export(file.table("export"), system),
     )
 
@@ -373,7 +376,7 @@ def _threshold(table: Table, system: System) -> Threshold:
 
 
 def _objective(table: Table, system: System) -> Objective:
-    table.refuse_unknown(("judged", "weights", "bandwidth", "begins", "ends"))
+    table.refuse_unknown(("judged", "weights", "bandwidth", "begins", "ends", "when"))
     first = (*system.judged, *system.outputs)[0].name
     judged = table.text("judged", first)
     compared = {one.name: one for one in (*system.outputs, *system.judged)}
@@ -389,6 +392,7 @@ def _objective(table: Table, system: System) -> Objective:
         bandwidth=table.number("bandwidth", "Hz", math.inf),
         begins=_threshold(table.table("begins"), system) if "begins" in table else None,
         ends=_threshold(table.table("ends"), system) if "ends" in table else None,
+        when=table.text("when", ""),
     )
 
 
@@ -412,14 +416,15 @@ def _following(table: Table) -> Following:
     )
 
 
-def _panel(table: Table, system: System) -> Panel:
-    table.refuse_unknown(("title", "signals", "height", "low", "high"))
+def _view(table: Table, system: System) -> View:
+    table.refuse_unknown(("title", "note", "signals", "height", "low", "high"))
     signals = table.texts("signals")
     for signal in signals:
         system.refuse_missing(signal, f"{table.where} signals")
     low, high = (table.number(key, "1", math.nan) for key in ("low", "high"))
-    return Panel(
+    return View(
         title=table.take("title", str),
+        note=table.text("note", ""),
         signals=signals,
         height=table.number("height", "1", 1.0),
         low=None if math.isnan(low) else low,
@@ -430,7 +435,10 @@ def _panel(table: Table, system: System) -> Panel:
 def _comparison(table: Table, system: System) -> Comparison:
     table.refuse_unknown(
         ("begins", "rest", "leads", "channels", "tolerances", "levels", "excluded", "influences")
+        + ("block", "lasting", "least", "settling")
     )
+    block = table.number("block", "s", _BLOCK * system.sample_time)
+    lasting = table.number("lasting", "s", _LASTING * block)
     tolerances, levels = table.table("tolerances"), table.table("levels")
     channels = tuple(
         Channel(one.name, one.unit, one.formula) for one in _derived(table.table("channels"))
@@ -440,6 +448,10 @@ def _comparison(table: Table, system: System) -> Comparison:
         for one in (*system.outputs, *system.judged)
     )
     return Comparison(
+        block=block,
+        lasting=lasting,
+        least=table.number("least", "s", 2.0 * lasting),
+        settling=table.number("settling", "s", 0.0),
         channels=channels or default,
         leading=_leading(table.table("leads")) if "leads" in table else None,
         begins=_threshold(table.table("begins"), system) if "begins" in table else None,
@@ -447,8 +459,21 @@ def _comparison(table: Table, system: System) -> Comparison:
         tolerances={name: tolerances.number(name, "1") for name in tolerances.content},
         levels={name: _level(levels, name) for name in levels.content},
         exclusions=tuple(_exclusion(one, system) for one in table.tables("excluded")),
-        influences=_derived(table.table("influences")),
+        influences=_influences(table.table("influences")),
     )
+
+
+def _influences(table: Table) -> tuple[Influence, ...]:
+    found = []
+    for name in table.content:
+        own = Table(table.take(name, dict), f"{table.where} {name}")
+        own.refuse_unknown(("is", "unit", "way"))
+        way = own.text("way", "value")
+        if way not in _WAYS:
+            raise own.wrong("way", f"one of {', '.join(_WAYS)}")
+        formula = Expression(own.take("is", str), f"{own.where} is")
+        found.append(Influence(name, own.take("unit", str), formula, way))
+    return tuple(found)
 
 
 def _leading(table: Table) -> Leading:

@@ -1,11 +1,11 @@
 """The commands of the command line, one module each, imported only when its command runs."""
 
 COMMANDS = {
-    "simulate": "run all estimators on recorded brake stops",
+    "simulate": "run all estimators on recordings",
     "tune": "find the gains whose worst case is best",
     "diagnose": "find what the simulation gets wrong, name the cause, extend the model",
     "power": "measure how often the diagnosis is right",
-    "observability": "show when states and frictions can be observed",
+    "observability": "show when states and estimated quantities can be observed",
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
     "bench": "time calls into the FMUs, the observers, and the tuning",

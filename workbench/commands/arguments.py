@@ -1,18 +1,25 @@
 """What the commands share."""
 
 import argparse
+import time
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeAlias
 
-from workbench.case import Case, check_names
+from workbench.case import Case, check_names, read_cases
 from workbench.errors import InputError
 from workbench.installed import system_files
 from workbench.resources import CHECKOUT, fmus, modelica
 from workbench.resources import cases as package_cases
+from workbench.system import OBSERVER, System
+from workbench.system_file import with_model
+from workbench.systems import load_system
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+SYSTEM = "wheelset"  # unless another is asked for
+FULL = "full"  # role of a model that has more states than an observer corrects
 
 MINIMAL_OBSERVER = fmus() / "fmi2" / "MinimalObserver.fmu"
 FULL_OBSERVER = fmus() / "fmi2" / "FullObserver.fmu"
@@ -64,19 +71,24 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
     )
 
 
-def add_observer_models(parser: argparse.ArgumentParser) -> None:
-    """Add the files of the two observer models."""
-    for option, default, name in (
-        ("--fmu", MINIMAL_OBSERVER, "minimal"),
-        ("--full-fmu", FULL_OBSERVER, "full"),
-    ):
+def add_system(parser: argparse.ArgumentParser) -> None:
+    """Add the option --system, which `chosen_system` reads."""
+    parser.add_argument(
+        "--system",
+        default=SYSTEM,
+        metavar="NAME|FILE",
+        help="system that the recordings are of: an installed one, or a system file (default: "
+        "%(default)s)",
+    )
+
+
+def add_models(parser: argparse.ArgumentParser) -> None:
+    """Add the FMUs and their names of variables, which `chosen_system` reads."""
+    for option, name in (("--fmu", "observer"), ("--full-fmu", "full observer")):
         parser.add_argument(
-            option,
-            type=Path,
-            default=nearby(default),
-            metavar="FILE",
-            help=f"{name} observer model (default: %(default)s)",
+            option, type=Path, metavar="FILE", help=f"{name} model (default: the system's)"
         )
+    add_map(parser)
 
 
 def add_map(parser: argparse.ArgumentParser) -> None:
@@ -86,17 +98,38 @@ def add_map(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OURS=THEIRS",
-        help="the FMU's own name of a variable, such as pB=brakePressure; may be repeated "
+        help="the FMU's own name of a variable, such as p=pressure; may be repeated "
         "(also in case.toml, [model.names])",
     )
 
 
-def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, str]:
+def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
+    """The system that is asked for, with the models and names that are given, and the cases.
+
+    Raises
+    ------
+    InputError
+        If system, models or cases cannot be read, or do not fit each other.
+    """
+    system = load_system(options.system)
+    cases = read_cases(options.cases, system)
+    names = model_names(options.map, system, cases)
+    if options.fmu is not None or names:
+        path = options.fmu or system.model(OBSERVER).path
+        system = with_model(system.with_names(names), OBSERVER, path)
+    if options.full_fmu is not None:
+        system = with_model(system, FULL, options.full_fmu)
+    return system, cases
+
+
+def model_names(
+    mapped: Sequence[str], system: System, cases: Sequence[Case] = ()
+) -> dict[str, str]:
     """Names of variables in the FMU, from the command line and from the cases.
 
     Parameters
     ----------
-    mapped : the values of --map, "pB=brakePressure"; they win over the cases.
+    mapped : the values of --map, "p=pressure"; they win over the cases.
     cases : their names must agree, because one FMU runs on all of them.
 
     Raises
@@ -112,10 +145,10 @@ def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, 
                 where=f"command line, --map {entry}",
                 found=f"a second name for '{ours}'" if equals else "no '='",
                 expected="OURS=THEIRS, once for each variable",
-                remedy="write for instance --map pB=brakePressure",
+                remedy="write for instance --map p=pressure",
             )
         given[ours] = theirs
-    given = check_names(given, "command line, --map")
+    given = check_names(given, "command line, --map", system)
     names: dict[str, str] = {}
     for case in cases:
         for ours, theirs in case.names.items():
@@ -126,7 +159,7 @@ def model_names(mapped: Sequence[str], cases: Sequence[Case] = ()) -> dict[str, 
                     expected="the same name in all cases, because one FMU runs on all",
                     remedy=f"run these cases apart, or decide with --map {ours}=NAME",
                 )
-    return check_names(names | given, "--map and [model.names]")
+    return check_names(names | given, "--map and [model.names]", system)
 
 
 def installing(extra: str) -> str:
@@ -151,3 +184,10 @@ def require_compiler() -> None:
             expected="the extra [compiler], which holds the Modelica compiler",
             remedy=installing("compiler"),
         )
+
+
+def show_progress(done: int, total: int, name: str, begin: float) -> None:
+    """One line per finished case, with the time left."""
+    elapsed = time.perf_counter() - begin
+    left = elapsed / done * (total - done)
+    print(f"[{done:>3}/{total}] {name:<28} {elapsed:5.1f} s, about {left:.0f} s left", flush=True)

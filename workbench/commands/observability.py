@@ -1,58 +1,56 @@
-"""`workbench observability`: what the measured speeds can tell about states and frictions."""
+"""`workbench observability`: what measured outputs can tell about states and quantities."""
 
 import argparse
 import os
-import platform
 import time
+from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
-from workbench.case import Case, read_cases
+from workbench import resources
+from workbench.case import Case
 from workbench.commands.arguments import (
+    FULL,
     Commands,
-    add_observer_models,
+    add_models,
     add_recordings,
+    add_system,
+    chosen_system,
     nearby,
     positive,
+    show_progress,
 )
-from workbench.cosim import Outcome, observe
-from workbench.errors import FMUError
-from workbench.fmu import FMU
-from workbench.objective import braking_window
-from workbench.observability import LinearTest, linear_test, window_test
-from workbench.observers import DisturbanceGains, DisturbanceObserver, stationary_gains
+from workbench.fmu import Vector
+from workbench.observability import CaseObservability, case_observability, linear_test
 from workbench.pool import Pool
+from workbench.provenance import models, software
 from workbench.report.observability import (
-    StopObservability,
     draw_observability,
     format_observability,
     write_observability,
     write_windows,
 )
-from workbench.resources import cases
+from workbench.system import OBSERVER, System
+from workbench.systems import open_model
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
-    own = nearby(cases())
+    own = nearby(resources.cases())
     observability = commands.add_parser(
         "observability",
-        description="Show what the measured speeds can tell: a linear test of both observer "
-        "models, and for each recorded stop how well half a second of samples can know the "
-        "frictions dmuWR and dmuDC (Cramer-Rao bound). Writes windows (CSV), observability.json "
-        "and figures.",
+        description="Show what the measured outputs can tell: a linear test of the observer "
+        "models, and for each recording how well half a second of samples can know the estimated "
+        "quantities (Cramer-Rao bound). Writes windows (CSV), observability.json and figures.",
         epilog="examples:\n"
         "  python -m workbench observability\n"
-        f"  python -m workbench observability {own}/09_wet_160_4.2_wsp --out /tmp/slide\n"
-        "  python -m workbench observability my_cases --full-fmu my_full_model.fmu",
+        f"  python -m workbench observability {own}/01_dry_80_1.5 --out /tmp/one\n"
+        "  python -m workbench observability my_cases --system my/system.toml",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(observability, out="results/observability")
-    add_observer_models(observability)
+    add_system(observability)
+    add_models(observability)
     observability.add_argument(
         "--workers",
         type=positive,
@@ -64,82 +62,42 @@ def add(commands: Commands) -> None:
 
 
 def _observability(options: argparse.Namespace) -> int:
-    cases = read_cases(options.cases)
+    system, cases = chosen_system(options)
     options.out.mkdir(parents=True, exist_ok=True)
-    models = (options.fmu, options.full_fmu)
-    linear: list[LinearTest] = []
-    files = []
-    for path in models:
-        with FMU(path) as fmu:
-            linear.append(linear_test(fmu))
-            files.append({"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256})
-    with FMU(options.fmu) as fmu:
-        gains = stationary_gains(fmu)
+    linear = {}
+    for role in (role for role in (OBSERVER, FULL) if role in system.models):
+        with open_model(system, role) as fmu:
+            linear[role] = linear_test(fmu, system)
     provenance = {
-        "workbench": version("wheelset-workbench"),
-        "python": platform.python_version(),
-        "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy")},
-        "fmus": files,
+        **software(("fmpy", "numpy", "scipy")),
+        "fmus": list(models(system, list(linear)).values()),
     }
-    stops: list[StopObservability] = []
+    scales = {role: test.scale for role, test in linear.items()}
+    done: list[CaseObservability] = []
     begin = time.perf_counter()
     interrupted = False
-    setup = _Setup(models, tuple(linear), gains, options.out)
+    setup = (system, scales, options.out)
     with Pool(min(options.workers, len(cases)), nullcontext, setup) as pool:
         try:
-            for _, stop in pool.completed(_run_case, cases):
-                stops.append(stop)
-                elapsed = time.perf_counter() - begin
-                left = elapsed / len(stops) * (len(cases) - len(stops))
-                print(
-                    f"[{len(stops):>3}/{len(cases)}] {stops[-1].case.name:<28} {elapsed:5.1f} s, "
-                    f"about {left:.0f} s left",
-                    flush=True,
-                )
+            for _, one in pool.completed(_test_case, cases):
+                done.append(one)
+                show_progress(len(done), len(cases), one.case.name, begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
-    stops.sort(key=lambda stop: stop.case.name)
-    if stops:
-        write_observability(linear, stops, provenance, options.out / "observability.json")
-        print(format_observability(linear, stops))
-        print(f"{len(stops)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
+    if done:
+        done.sort(key=lambda one: one.case.name)
+        tests = list(linear.values())
+        write_observability(system, tests, done, provenance, options.out / "observability.json")
+        print(format_observability(system, tests, done))
+        print(f"{len(done)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
     return 130 if interrupted else 0
 
 
-@dataclass(frozen=True)
-class _Setup:
-    """What runs on every case.
-
-    Attributes
-    ----------
-    models : FMUs; the first is that of the disturbance observer.
-    linear : test of each model.
-    """
-
-    models: tuple[Path, ...]
-    linear: tuple[LinearTest, ...]
-    gains: DisturbanceGains
-    out: Path
-
-
-def _run_case(setup: _Setup, case: Case) -> StopObservability:
-    """Test all models on one case; writes its CSV and figure.
-
-    The trajectory is the estimate of the disturbance observer on the first model.
-    """
-    with FMU(setup.models[0]) as fmu:
-        run = observe(case, DisturbanceObserver(fmu, setup.gains))
-        roller_radius = float(fmu.get(fmu.variables(["rR"]))[0])
-    if run.outcome is not Outcome.OK:
-        raise FMUError(f"{case.name}: {run.outcome.value} {run.message}".strip())
-    tests = []
-    for path, test in zip(setup.models, setup.linear, strict=True):
-        with FMU(path) as fmu:
-            tests.append(window_test(fmu, case, run, test.scale))
-    window = braking_window(case, roller_radius)
-    braking = np.isin(tests[0].time, case.time[window])
-    stop = StopObservability(case, run, braking, tuple(tests))
-    write_windows(stop, setup.out / f"{case.name}.csv")
-    draw_observability(stop, setup.out / f"{case.name}.png")
-    return stop
+def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:
+    """Test all models on one case; writes its CSV and figure."""
+    system, scales, out = setup
+    one = case_observability(system, scales, case)
+    write_windows(one, out / f"{case.name}.csv")
+    draw_observability(one, out / f"{case.name}.png")
+    return one

@@ -8,31 +8,33 @@ switched on by a parameter.
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from workbench.case import Case
-from workbench.cosim import observe
+from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
-from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Court
+from workbench.diagnosis.evidence import Simulated, Simulations, delay, simulating
 from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.fit import TOLERANCES, Fit
+from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.samples import channels, compared
 from workbench.diagnosis.search import Reporter
-from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, judge
+from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
 from workbench.files import write_whole
 from workbench.fmu import FMU
 from workbench.modelica import Library
-from workbench.objective import Weights, score
-from workbench.observers import DisturbanceObserver, ExtendedKalmanFilter
-from workbench.observers.disturbance import stationary_gains
-from workbench.observers.kalman import FilterNoise
+from workbench.objective import score
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.system import OBSERVER, System
+from workbench.system_file import with_model
+from workbench.systems import open_model
 
 __all__ = [
-    "TOLERANCES",
     "Cause",
     "Dependence",
     "Diagnosis",
@@ -47,9 +49,9 @@ __all__ = [
     "read_effects",
 ]
 
-EXTENDED = "Extended"
-
-_ASKED = ("rW", "rR", "rB", "JW", "JR", "Fz", "muDC", "actuation.kappa", "actuation.p0")
+EVERYTHING, EXTENDED = "AllEffects", "Extended"
+# Observers that are tried with both models: one with a gain for all, one that makes it as it goes.
+_TRIED = (DisturbanceObserver, ExtendedKalmanFilter)
 
 
 @dataclass(frozen=True)
@@ -72,13 +74,15 @@ class Outcome:
 
     Attributes
     ----------
-    levels : calibrated values by quantity and surface, such as ("muDC", "dry"): (value, unit).
-    deviations : by stop and quantity, in standard deviations of its tolerance.
-    set_aside : number of samples by stop and reason.
-    has_force : whether Fx was measured.
-    observers : by observer and stop, error of the creep force (rms over mean [1]) with the model
-        before and after; empty where nothing was extended or Fx was not measured, and for effects
-        that turn with the wheel, whose phase an observer does not know.
+    levels : calibrated values by parameter and choice of a condition, or by a sensor's delay:
+        (value, unit).
+    deviations : by recording and parameter, in standard deviations of its tolerance.
+    set_aside : number of samples by recording and reason.
+    channels : what was compared, with units.
+    blocks : length of a block [s].
+    observers : by observer and recording, error of the judged signal (rms over mean [1]) with the
+        model before and after; empty where nothing was extended or it was not measured, and for
+        effects that turn with a shaft, whose phase an observer does not know.
     """
 
     diagnosis: Diagnosis
@@ -87,31 +91,31 @@ class Outcome:
     levels: dict[tuple[str, str], tuple[float, str]]
     deviations: dict[str, dict[str, float]]
     set_aside: dict[str, dict[str, int]]
-    has_force: bool
+    channels: dict[str, str]
+    block: float
     observers: dict[str, dict[str, tuple[float, float]]]
     extension: Extension | None
 
 
 def diagnose(
+    system: System,
     cases: Sequence[Case],
-    effects: Sequence[Effect],
     library: Library,
-    base: str,
-    model: Path,
+    effects: Sequence[Effect],
     out: Path,
     workers: int,
     report: Reporter,
     *,
     every_platform: bool = False,
 ) -> Outcome:
-    """Find what an observer model lacks, from recorded stops; write the extended model.
+    """Find what an observer model lacks, from recordings; write the extended model.
 
     Parameters
     ----------
-    cases : Fx is used if all of them have it.
-    effects : of the library, that are considered.
-    base : name of the model of the library whose slots they fill.
-    model : FMU of the base model, or of an extension of it: its values are kept.
+    system : whose observer model is diagnosed, or an extension of it: its values are kept.
+    cases : what is only there to judge by is compared if all of them have it.
+    library : of the system, which holds the effects.
+    effects : that are considered.
     out : folder of the extended model.
     report : takes a line on what is being done.
     every_platform : whether the extended FMU is for all platforms, or only for this machine's.
@@ -119,59 +123,66 @@ def diagnose(
     Raises
     ------
     InputError
-        If there are too few stops, or one has too little that counts; if the library cannot be
+        If there are too few recordings, or one has too little that counts; if the library cannot be
         compiled, or the model is none of this library.
     """
     if len(cases) < 2:
         raise InputError(
-            where="recorded stops",
+            where="recordings",
             found=str(len(cases)),
-            expected="two or more, because a cause is judged on stops it was not fitted to",
-            remedy="give the folder that holds all stops of one rig",
+            expected="two or more, because a cause is judged on those it was not fitted to",
+            remedy="give the folder that holds all recordings of one machine",
         )
-    if any(case.Fx is None for case in cases):
-        cases = [replace(case, Fx=None) for case in cases]
     with tempfile.TemporaryDirectory() as scratch:
-        everything = Path(scratch) / "AllEffects.fmu"
+        everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")
-        about = "Observer model with every effect, at zero"
-        text = source(library, base, "AllEffects", effects, {}, {}, about)
-        build(library, "AllEffects", text, everything, every_platform=False)
-        given = _given(everything, model, base)
-        with Court(everything, given, cases, workers) as court:
-            fit = Fit(court, effects)
-            diagnosis = judge(fit, effects, report)
+        build_everything(system, library, effects, everything)
+        given = _given(everything, system)
+        with Simulations(everything, system, given, cases, workers) as simulations:
+            fit = Fit(simulations, effects)
+            diagnosis = conclude(fit, effects, report)
             best = diagnosis.best
-            found = residuals(court, fit, diagnosis.base.linearised, best.linearised)
+            found = residuals(simulations, fit, diagnosis.base.linearised, best.linearised)
             extension = _extend(
-                *(court, fit, diagnosis, effects, library, base, out, report),
+                *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
             )
             observers: dict[str, dict[str, tuple[float, float]]] = {}
             turning = any(effect.order_locked for effect in best.active)
-            if extension is not None and cases[0].Fx is not None and not turning:
+            judged = all(system.objective.judged in case for case in cases)
+            if extension is not None and judged and not turning:
                 report("observers with both models")
-                observers = _observers(cases, model, extension.fmu)
-            units = {"muDC": "1", "muWR": "1", FORCE_DELAY: "s"}
+                observers = _observers(system, cases, extension.fmu)
+            levels = {key: float(value) for key, value in best.point.levels.items()}
+            signals = compared(system, cases)
             return Outcome(
                 diagnosis=diagnosis,
                 residuals=found,
-                dependences=dependences(court, found),
-                levels={
-                    key: (float(value), units[key[0]]) for key, value in best.point.levels.items()
-                },
+                dependences=dependences(simulations, found),
+                levels={key: (value, fit.level_unit(key)) for key, value in levels.items()},
                 deviations={
-                    name: dict(zip(TOLERANCES, map(float, row), strict=True))
+                    name: dict(zip(fit.local, map(float, row), strict=True))
                     for name, row in zip(fit.names, best.point.deviations, strict=True)
                 },
-                set_aside={stop.name: stop.set_aside for stop in court.stops},
-                has_force=cases[0].Fx is not None,
+                set_aside={one.name: one.set_aside for one in simulations.recordings},
+                channels={one.name: one.unit for one in channels(system, signals)},
+                block=system.comparison.block,
                 observers=observers,
                 extension=extension,
             )
 
 
-def _given(everything: Path, model: Path, base: str) -> dict[str, float]:
+def build_everything(
+    system: System, library: Library, effects: Sequence[Effect], path: Path
+) -> None:
+    """Write the FMU of the observer model with every effect at zero."""
+    about = "Observer model with every effect, at zero"
+    base = system.models[OBSERVER].name
+    text = source(library, base, EVERYTHING, effects, {}, {}, about)
+    build(library, EVERYTHING, text, path, every_platform=False)
+
+
+def _given(everything: Path, system: System) -> dict[str, float]:
     """Parameters of the diagnosed model that differ from the library's defaults.
 
     Raises
@@ -179,12 +190,14 @@ def _given(everything: Path, model: Path, base: str) -> dict[str, float]:
     InputError
         If the model is no observer model of this library.
     """
-    with FMU(everything) as extended, FMU(model) as diagnosed:
-        if missing := [name for name in _ASKED if name not in diagnosed.defaults]:
+    with FMU(everything) as extended, open_model(system) as diagnosed:
+        compare = system.comparison
+        asked = [*compare.tolerances, *compare.levels, *sorted(system.constants)]
+        if missing := [name for name in asked if name not in diagnosed.defaults]:
             raise InputError(
-                where=str(model),
+                where=str(diagnosed.path),
                 found=f"no parameter '{missing[0]}'",
-                expected=f"the FMU of {base}, or of a model that extends it",
+                expected=f"the FMU of {system.models[OBSERVER].name}, or of a model that extends it",
                 remedy="give such an FMU with --model",
             )
         return {
@@ -195,12 +208,11 @@ def _given(everything: Path, model: Path, base: str) -> dict[str, float]:
 
 
 def _extend(
-    court: Court,
+    simulations: Simulations,
     fit: Fit,
     diagnosis: Diagnosis,
     effects: Sequence[Effect],
     library: Library,
-    base: str,
     out: Path,
     report: Reporter,
     *,
@@ -210,26 +222,11 @@ def _extend(
     if not diagnosis.causes:
         return None
     report("compiling the extended model")
-    point = diagnosis.best.point
-    values: dict[str, dict[str, float]] = {}
-    for effect in effects:
-        for variable, value in court.given.items():
-            slot, _, parameter = variable.rpartition(".")
-            if slot == variables(effect, parameter)[0].rpartition(".")[0]:
-                values.setdefault(effect.name, {})[parameter] = value
-    for (name, parameter), value in point.sizes.items():
-        # An order-locked effect has another phase in each stop; the model turns from angle zero.
-        known = values.setdefault(name, {})
-        part = "cosine" if parameter == "amplitude" else parameter
-        is_size = part in next(one for one in effects if one.name == name).sizes
-        known[part] = (known.get(part, 0.0) if is_size else 0.0) + value
+    system, base = simulations.system, simulations.system.models[OBSERVER].name
+    values = _values(simulations, diagnosis, effects)
     present = [effect for effect in effects if effect.name in values]
-    own = {name: value for name, value in court.given.items() if "." not in name}
-    own |= {
-        name: value
-        for (name, surface), value in point.levels.items()
-        if surface == "dry" and name == "muDC"
-    }
+    own = {name: value for name, value in simulations.given.items() if "." not in name}
+    own |= _usual_levels(simulations, diagnosis)
     about = f"{base} with {', '.join(effect.name for effect in present)}"
     text = source(library, base, EXTENDED, present, values, own, about)
     folder = out / "model"
@@ -237,38 +234,68 @@ def _extend(
     modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
     write_whole(modelica, text)
     build(library, EXTENDED, text, path, every_platform=every_platform)
-    bench = Bench(path, court.stops)
-    difference = 0.0
-    for k, evidence in enumerate(diagnosis.best.linearised.evidence):
-        given = {
-            name: value
-            for name, value in fit.values(point)[k].items()
-            if name in bench.parameters or name == FORCE_DELAY
-        }
-        errors = bench.at(k, given).errors
-        difference = max(difference, float(np.abs(errors - evidence.errors).max()))
-    bench.close()
+    point, difference = diagnosis.best.point, 0.0
+    delays = {delay(name) for name in system.signals}
+    with simulating(Simulated(path, system, tuple(simulations.recordings))) as extended:
+        for k, evidence in enumerate(diagnosis.best.linearised.evidence):
+            known = {
+                name: value
+                for name, value in fit.values(point)[k].items()
+                if name in extended.parameters or name in delays
+            }
+            errors = extended.at(k, known).errors
+            difference = max(difference, float(np.abs(errors - evidence.errors).max()))
     return Extension(modelica, path, difference)
 
 
+def _values(
+    simulations: Simulations, diagnosis: Diagnosis, effects: Sequence[Effect]
+) -> dict[str, dict[str, float]]:
+    """Parameters of the effects that the extended model has, by effect."""
+    values: dict[str, dict[str, float]] = {}
+    for effect in effects:
+        for variable, value in simulations.given.items():
+            slot, _, parameter = variable.rpartition(".")
+            if slot == variables(effect, parameter)[0].rpartition(".")[0]:
+                values.setdefault(effect.name, {})[parameter] = value
+    for (name, parameter), value in diagnosis.best.point.sizes.items():
+        # An order-locked effect has another phase in each recording; the model turns from zero.
+        known = values.setdefault(name, {})
+        part = "cosine" if parameter == "amplitude" else parameter
+        is_size = part in next(one for one in effects if one.name == name).sizes
+        known[part] = (known.get(part, 0.0) if is_size else 0.0) + value
+    return values
+
+
+def _usual_levels(simulations: Simulations, diagnosis: Diagnosis) -> dict[str, float]:
+    """Calibrated levels of what is free, where conditions are the usual ones."""
+    system = simulations.system
+    found = {}
+    for (name, choice), value in diagnosis.best.point.levels.items():
+        level = system.comparison.levels.get(name)
+        if level is None or np.isfinite(level.spread):
+            continue
+        if not level.by or choice == str(system.condition(level.by).choices[0]):
+            found[name] = value
+    return found
+
+
 def _observers(
-    cases: Sequence[Case], before: Path, after: Path
+    system: System, cases: Sequence[Case], after: Path
 ) -> dict[str, dict[str, tuple[float, float]]]:
-    """Errors of the creep force, with the gains of the nominal model in both."""
+    """Errors of the judged signal, with the gains of the nominal model in both."""
+    with open_model(system) as nominal:
+        gains = {kind.name: kind.reasoned(nominal, system) for kind in _TRIED}
     errors: dict[str, dict[str, list[float]]] = {}
-    with FMU(before) as nominal, FMU(after) as extended:
-        gains = stationary_gains(nominal)
-        for fmu in (nominal, extended):
-            for estimator in (
-                DisturbanceObserver(fmu, gains),
-                ExtendedKalmanFilter(fmu, FilterNoise()),
-            ):
-                by_stop = errors.setdefault(estimator.name, {})
+    for one in (system, with_model(system, OBSERVER, after)):
+        with open_model(one) as fmu:
+            for kind in _TRIED:
+                estimator = kind(fmu, one, gains[kind.name])
+                by_case = errors.setdefault(kind.name, {})
                 for case in cases:
-                    run = observe(case, estimator)
-                    error = score(case, run, fmu.defaults["rR"], Weights()).Fx_nrmse
-                    by_stop.setdefault(case.name, []).append(np.nan if error is None else error)
+                    error = score(case, replay(case, estimator), one).nrmse
+                    by_case.setdefault(case.name, []).append(np.nan if error is None else error)
     return {
-        name: {stop: (pair[0], pair[1]) for stop, pair in by_stop.items()}
-        for name, by_stop in errors.items()
+        name: {case: (pair[0], pair[1]) for case, pair in by_case.items()}
+        for name, by_case in errors.items()
     }

@@ -1,44 +1,42 @@
-"""What each stop says about every parameter: whitened prediction errors and their derivatives.
+"""What each recording says about every parameter: whitened prediction errors, their derivatives.
 
 The derivatives are differences of two simulations. Everything that follows, fits, tests on held-out
-stops and confusability, is linear algebra on them.
+recordings and confusability, is linear algebra on them.
 """
 
-import signal
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import (
-    CancelledError,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.samples import Samples, prepare
+from workbench.diagnosis.samples import Samples, compared, prepare
 from workbench.fmu import FMU, Matrix, Vector
+from workbench.observers.operating import corrected_states, settle
+from workbench.pool import Pool
+from workbench.system import System
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-REST = "pBRest"
-
-# Not of the FMU: by how much the load cell is late beyond the mode that it sits behind [s].
-FORCE_DELAY = "FxDelay"
-_DELAY_STEP = 1e-3  # [s] of the difference; errors are linear in the delay
-
+_DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _CHUNK = 6  # columns of one task: few, so that no processor waits long for the last one
 
 
+def delay(signal: str) -> str:
+    """Name of the delay of a sensor behind a structure [s], which is no variable of the FMU."""
+    return f"{signal}Delay"
+
+
 @dataclass(frozen=True)
-class Column:
+class Variation:
     """A parameter that is varied.
 
     Attributes
@@ -56,13 +54,13 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """One stop, linearised about a point.
+    """One recording, linearised about a point.
 
     Attributes
     ----------
-    errors : (b, m) whitened prediction errors of the blocks, in CHANNELS.
-    rest : whitened error of the pressure at rest.
-    jacobian : (b*m + 1, p) derivatives of [errors, rest] in SI units, by FORCE_DELAY and columns.
+    errors : (b, c) whitened prediction errors of the blocks, by channel.
+    rest : whitened error of the input at rest.
+    jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
     """
 
     errors: Matrix
@@ -71,46 +69,66 @@ class Evidence:
 
     @property
     def residual(self) -> Vector:
-        """(b*m + 1,) errors and rest in one vector."""
+        """(b*c + 1,) errors and rest in one vector."""
         return np.append(self.errors.ravel(), self.rest)
 
 
-class Bench:
-    """An FMU and the stops, in one process."""
+class Simulated(NamedTuple):
+    """What a simulator is made from: an FMU and the recordings."""
 
-    def __init__(self, path: Path, stops: Sequence[Samples]) -> None:
-        self._fmu = FMU(path)
-        self._predictor = Predictor(self._fmu)
-        self._rest = self._fmu.variables([REST])
-        self._stops = stops
+    path: Path
+    system: System
+    recordings: tuple[Samples, ...]
+
+
+class Simulator:
+    """An FMU along recordings, in one process."""
+
+    def __init__(self, given: Simulated) -> None:
+        self._fmu = FMU(given.path)
+        self._recordings = given.recordings
+        signals = given.recordings[0].signals
+        self._predictor = Predictor(self._fmu, given.system, signals)
+        self._delays = {
+            j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
+        }
+        rest = given.system.comparison.rest
+        self._rest = self._fmu.variables([rest.output]) if rest else None
 
     @property
     def parameters(self) -> set[str]:
         """Names of the FMU's variables that have a default."""
         return set(self._fmu.defaults)
 
+    def begin(self, number: int) -> dict[str, float]:
+        """Start values of states that a recording's outputs show."""
+        return self._predictor.begin(self._recordings[number])
+
     def close(self) -> None:
         """Free the FMU."""
         self._fmu.close()
 
     def at(self, number: int, values: Mapping[str, float]) -> Evidence:
-        """Errors of one stop at a point, and their derivative by FORCE_DELAY, which costs nothing.
+        """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
 
         Parameters
         ----------
-        values : of the FMU's variables and of FORCE_DELAY, SI.
+        values : of the FMU's variables and of delays, SI.
         """
         simulated, rest = self._simulated(number, values)
-        delay = values[FORCE_DELAY]
-        errors = self._whitened(number, simulated, delay)
-        late = self._whitened(number, simulated, delay + _DELAY_STEP)
-        by_delay = np.append((late - errors).ravel() / _DELAY_STEP, 0.0)
-        return Evidence(errors, rest, by_delay[:, None])
+        errors = self._whitened(number, simulated, values)
+        columns = []
+        for name, spread in self._delays.values():
+            step = _DELAY_STEP * spread
+            late = self._whitened(number, simulated, {**values, name: values[name] + step})
+            columns.append(np.append((late - errors).ravel() / step, 0.0))
+        jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
+        return Evidence(errors, rest, jacobian)
 
     def derivatives(
-        self, number: int, values: Mapping[str, float], columns: Sequence[Column], about: Evidence
+        self, number: int, values: Mapping[str, float], columns: Sequence[Variation], about: Evidence
     ) -> Matrix:
-        """Derivatives of one stop's [errors, rest] by the columns, (b*m + 1, p).
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
 
         Parameters
         ----------
@@ -123,47 +141,46 @@ class Bench:
             moved = {**values, **column.setting}
             moved |= dict.fromkeys(column.variables, start + column.step)
             simulated, rest = self._simulated(number, moved)
-            errors = self._whitened(number, simulated, values[FORCE_DELAY])
+            errors = self._whitened(number, simulated, values)
             jacobian[:-1, j] = (errors - about.errors).ravel() / column.step
             jacobian[-1, j] = (rest - about.rest) / column.step
         return jacobian
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
-        """Prediction errors of all samples, and the whitened error of the pressure at rest."""
-        stop = self._stops[number]
-        known = {name: value for name, value in values.items() if name != FORCE_DELAY}
-        errors = self._predictor.errors(stop, known)
-        return errors, (stop.rest - float(self._fmu.get(self._rest)[0])) / stop.rest_noise
+        """Prediction errors of all samples, and the whitened error of the input at rest."""
+        one = self._recordings[number]
+        delays = {name for name, _ in self._delays.values()}
+        known = {name: value for name, value in values.items() if name not in delays}
+        errors = self._predictor.errors(one, known)
+        if self._rest is None:
+            return errors, 0.0
+        return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
 
-    def _whitened(self, number: int, errors: Matrix, delay: float) -> Matrix:
-        """Whitened errors of the blocks, (b, m), with the load cell late by `delay` [s]."""
-        stop, nominal = self._stops[number], self._fmu.defaults
-        if errors.shape[1] == 3:
-            errors, force = errors.copy(), stop.y[:, 2]
-            read = stop.behind_structure(force - errors[:, 2])
-            errors[:, 2] = force - (read - delay * np.gradient(read, stop.time))
-        means = stop.channels(errors, nominal["rW"], nominal["rR"])
-        whitened: Matrix = np.einsum("bij,bj->bi", stop.whitening, means)
+    def _whitened(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Whitened errors of the blocks, (b, c), with sensors as late as `values` say."""
+        one = self._recordings[number]
+        if self._delays:
+            errors = errors.copy()
+        for j, (name, _) in self._delays.items():
+            measured = one.y[:, j]
+            read_ = one.behind_structure(j, measured - errors[:, j])
+            errors[:, j] = measured - (read_ - values[name] * np.gradient(read_, one.time))
+        whitened: Matrix = np.einsum("bij,bj->bi", one.whitening, one.channels(errors))
         return whitened
 
 
-_bench: Bench | None = None
+@contextmanager
+def simulating(given: Simulated) -> Iterator[Simulator]:
+    """Open a simulator."""
+    simulator = Simulator(given)
+    try:
+        yield simulator
+    finally:
+        simulator.close()
 
 
-def _begin(path: Path, stops: Sequence[Samples]) -> None:
-    """Start a worker; it leaves Ctrl-C to the process that waits for it."""
-    global _bench
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _bench = Bench(path, stops)
-
-
-def _work(task: Callable[..., Any], *arguments: Any) -> Any:
-    assert _bench is not None
-    return task(_bench, *arguments)
-
-
-class Court:
-    """Gathers evidence, in worker processes if there are more than one.
+class Simulations:
+    """A model along all recordings, in worker processes if there are more than one.
 
     Parameters
     ----------
@@ -173,14 +190,20 @@ class Court:
     Attributes
     ----------
     nominal, units, bounds : value, unit, (least, greatest) value by variable of the FMU.
-    cases, stops : as recorded, and made ready.
+    begin : start values of states by recording, as measured.
+    cases, recordings : as recorded, and made ready.
     """
 
     def __init__(
-        self, path: Path, given: Mapping[str, float], cases: Sequence[Case], workers: int
+        self,
+        path: Path,
+        system: System,
+        given: Mapping[str, float],
+        cases: Sequence[Case],
+        workers: int,
     ) -> None:
-        with FMU(path) as fmu:
-            self.nominal = {**fmu.defaults, **given}
+        with FMU(path, None, given) as fmu:
+            self.nominal = dict(fmu.defaults)
             self.units = dict(fmu.units)
             self.bounds = {
                 v.name: (
@@ -189,14 +212,18 @@ class Court:
                 )
                 for v in fmu.description.variables
             }
-        self.given = dict(given)
-        self.stops = [prepare(case, self.nominal) for case in cases]
-        self.cases = list(cases)
+            effects = _effects_on_led(fmu, system)
+        self.system, self.given, self.cases = system, dict(given), list(cases)
+        signals = compared(system, cases)
+        self.recordings = [prepare(one, system, signals, self.nominal, effects) for one in cases]
         workers = min(workers, len(cases))
-        self._own = Bench(path, self.stops) if workers == 1 else None
-        self._pool = ProcessPoolExecutor(workers, initializer=_begin, initargs=(path, self.stops))
-        # Long stops first: the last one to finish leaves the other processors idle.
-        self._order = sorted(range(len(cases)), key=lambda k: -self.stops[k].time.size)
+        simulated = Simulated(path, system, tuple(self.recordings))
+        with simulating(simulated) as own:
+            self.begin = [own.begin(k) for k in range(len(cases))]
+        self._alone = workers == 1
+        self._pool = Pool(workers, simulating, simulated)
+        # Long ones first: the last one to finish leaves the other processors idle.
+        self._order = sorted(range(len(cases)), key=lambda k: -self.recordings[k].time.size)
         self._interrupted = threading.Event()
 
     def __enter__(self) -> Self:
@@ -208,48 +235,46 @@ class Court:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._pool.shutdown(cancel_futures=True)
-        if self._own is not None:
-            self._own.close()
+        self._pool.close()
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
-        """Errors of every stop at its own point.
+        """Errors of every recording at its own point.
 
         Parameters
         ----------
-        points : values of the FMU's variables and of FORCE_DELAY, one mapping for each stop.
+        points : values of the FMU's variables and of delays, one mapping for each recording.
         """
-        found = self._gathered({k: (Bench.at, k, points[k]) for k in self._order})
-        return [found[k] for k in range(len(self.stops))]
+        found = self._gathered({k: (Simulator.at, k, points[k]) for k in self._order})
+        return [found[k] for k in range(len(self.recordings))]
 
     def derivatives(
         self,
         points: Sequence[Mapping[str, float]],
-        columns: Sequence[Column],
+        columns: Sequence[Variation],
         about: Sequence[Evidence],
     ) -> list[Matrix]:
-        """Derivatives of every stop's [errors, rest] by the columns, each (b*m + 1, p).
+        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p).
 
         Parameters
         ----------
-        about : errors of each stop at its point.
+        about : errors of each recording at its point.
         """
         chunks = [columns[i : i + _CHUNK] for i in range(0, len(columns), _CHUNK)]
         found = self._gathered(
             {
-                (k, i): (Bench.derivatives, k, points[k], chunk, about[k])
+                (k, i): (Simulator.derivatives, k, points[k], chunk, about[k])
                 for k in self._order
                 for i, chunk in enumerate(chunks)
             }
         )
         return [
             np.column_stack([found[k, i] for i in range(len(chunks))])
-            for k in range(len(self.stops))
+            for k in range(len(self.recordings))
         ]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""
-        if self._own is not None or len(items) < 2:
+        if self._alone or len(items) < 2:
             return [job(item) for item in items]
         with ThreadPoolExecutor(len(items)) as threads:
             jobs = [threads.submit(job, item) for item in items]
@@ -264,14 +289,34 @@ class Court:
 
     def _gathered(self, tasks: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Any]:
         """Results of tasks, by their names."""
-        if self._own is not None:
-            return {name: task(self._own, *rest) for name, (task, *rest) in tasks.items()}
         if self._interrupted.is_set():
             raise CancelledError
-        under_way = {name: self._pool.submit(_work, *task) for name, task in tasks.items()}
+        under_way = {name: self._pool.submit(*task) for name, task in tasks.items()}
         try:
             return {name: one.result() for name, one in under_way.items()}
         finally:
             # After Ctrl-C nobody waits for the others.
             for one in under_way.values():
                 one.cancel()
+
+
+def _effects_on_led(fmu: FMU, system: System) -> dict[str, float]:
+    """Effect of each input on the rate of the led output, along the slow motion it is part of.
+
+    At the design point, by the left and right eigenvectors of the slowest mode of its states.
+    """
+    leading = system.comparison.leading
+    names = [one.name for one in system.inputs]
+    if leading is None:
+        return dict.fromkeys(names, 0.0)
+    settle(fmu, system, system.design)
+    states = corrected_states(fmu, system)
+    at = [fmu.states.index(name) for name in states]
+    A = fmu.state_jacobian()[np.ix_(at, at)]
+    B = fmu.input_jacobian(fmu.variables(names))[at]
+    values, right = np.linalg.eig(A)
+    rates, left = np.linalg.eig(A.T)
+    v = right[:, np.argmax(values.real)].real
+    w = left[:, np.argmax(rates.real)].real
+    v = v / v[states.index(leading.output)]
+    return dict(zip(names, (w @ B / (w @ v)).tolist(), strict=True))

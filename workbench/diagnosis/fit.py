@@ -1,82 +1,121 @@
-"""Fit of effects to all stops at once, with what differs from stop to stop by nature.
+"""Fit of effects to all recordings at once, with what differs between them by nature.
 
-In each stop, levels of friction, wheel load and inertias may differ from their common value within
-the tolerances of the rig; these local deviations have priors, and are eliminated stop by stop. What
-is left of a stop is a small quadratic form in the common unknowns, which sums and leaves-one-out
-are made of.
+In each recording, parameters may differ from their common value within the tolerances of the
+machine, and states may start elsewhere; these local deviations have priors, and are eliminated one
+recording after the other. What is left of a recording is a small quadratic form in the common
+unknowns, which sums and leaves-one-out are made of.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from workbench.case import Case, Surface
+from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, Unless, Where
-from workbench.diagnosis.evidence import FORCE_DELAY, Column, Court, Item, Result
+from workbench.diagnosis.evidence import Variation, Item, Result, Simulations, delay
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
 from workbench.errors import InputError
 from workbench.fmu import Vector
 
-# Relative standard deviation from stop to stop, data sheet of the rig.
-TOLERANCES = {"muDC": 0.02, "muWR": 0.02, "JW": 0.01, "JR": 0.002, "Fz": 0.003}
-
-# Polach's parameters and friction at zero slip, data sheet of the rig.
-_RAIL: Mapping[Surface, Mapping[str, float]] = {
-    "dry": {"muWR": 0.40, "polach.kA": 1.0, "polach.kS": 0.4, "polach.A": 0.4, "polach.B": 0.6},
-    "wet": {"muWR": 0.28, "polach.kA": 0.3, "polach.kS": 0.1, "polach.A": 0.4, "polach.B": 0.2},
-}
-_RAIL_SPREAD = 0.2  # relative, of the common level of muWR, which dry stops hardly show
-_FORCE_DELAY = 1e-3  # [s] standard deviation: filters of the amplifier, uncertain damping
 _WORSE = 1.0  # of deviance, which no step is worth
 _HALVED = 4  # times: after that a step is given up
 _FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
 _FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
-_STOP = ""
-_LATE: Key = (FORCE_DELAY, "load cell")
-_DELAY: Key = (_STOP, FORCE_DELAY)
+_LOCAL = ""  # in place of an effect, of what differs between recordings
+_SENSOR = "sensor"  # in place of a choice, of a sensor's delay
+_LEVEL_STEP = 0.02  # relative, twice the step of a level that has no tolerance
+_ALL = "all"  # in place of a choice, of a level that no condition changes
 
 
 class Fit:
-    """Unknowns, evidence and least squares of one set of stops.
+    """Unknowns, evidence and least squares of one set of recordings.
 
     Parameters
     ----------
-    court : that gathers the evidence.
+    simulations : that give the evidence.
     effects : that may be asked for.
     """
 
-    def __init__(self, court: Court, effects: Sequence[Effect]) -> None:
-        self._court = court
+    def __init__(self, simulations: Simulations, effects: Sequence[Effect]) -> None:
+        self._simulations = simulations
+        self._compare = simulations.system.comparison
         self._effects = {effect.name: effect for effect in effects}
-        self.count = len(court.cases)
+        self._modes = {
+            delay(one.name): one.mode
+            for one in simulations.system.judged + simulations.system.outputs
+            if one.mode is not None and one.name in simulations.recordings[0].signals
+        }
+        self.count = len(simulations.cases)
+
+    @cached_property
+    def local(self) -> dict[str, float]:
+        """What differs between recordings, by name: relative standard deviation of a parameter, or
+        that of a state at the start, in its unit."""
+        spreads = self._simulations.system.spreads
+        return {**self._compare.tolerances, **spreads}
+
+    @property
+    def delays(self) -> tuple[Key, ...]:
+        """Keys of the derivatives that cost no simulation."""
+        return tuple((_LOCAL, name) for name in self._modes)
+
+    @property
+    def lasting(self) -> int:
+        """Blocks from which on an error is no noise."""
+        return max(1, round(self._compare.lasting / self._compare.block))
 
     @property
     def names(self) -> list[str]:
-        """Names of the stops."""
-        return [case.name for case in self._court.cases]
+        """Names of the recordings."""
+        return [case.name for case in self._simulations.cases]
 
     def unit(self, effect: Effect, parameter: str) -> str:
         """Unit of a parameter, "1" if it has none."""
-        return self._court.units.get(variables(effect, parameter)[0], "1")
+        return self._simulations.units.get(variables(effect, parameter)[0], "1")
+
+    def level_unit(self, key: Key) -> str:
+        """Unit of a level, or of a delay."""
+        return "s" if key[1] == _SENSOR else self._simulations.units.get(key[0], "1")
 
     def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:
         """Least and greatest value of a parameter, SI."""
-        low, high = self._court.bounds[variables(effect, parameter)[0]]
+        low, high = self._simulations.bounds[variables(effect, parameter)[0]]
         # An amplitude has no sign: its phase has.
         return (0.0, high) if parameter == "cosine" else (low, high)
 
     def start(self) -> Point:
         """The nominal model."""
-        levels: dict[Key, float] = {_LATE: 0.0}
-        for case in self._court.cases:
-            levels["muDC", _discs(case)] = self._court.nominal["muDC"]
-            rail = case.conditions.wheel_rail
-            levels["muWR", rail] = _RAIL[rail]["muWR"]
-        return Point({}, levels, np.zeros((self.count, len(TOLERANCES))), {})
+        levels: dict[Key, float] = {(name, _SENSOR): 0.0 for name in self._modes}
+        for case in self._simulations.cases:
+            for name in self._compare.levels:
+                levels[name, self._choice(name, case)] = self._usual(name, case)
+        return Point({}, levels, np.zeros((self.count, len(self.local))), {})
+
+    def _choice(self, level: str, case: Case) -> str:
+        """Which level of a parameter a recording has: of a list, the entry that is not usual."""
+        by = self._compare.levels[level].by
+        if not by:
+            return _ALL
+        said = case.conditions[by]
+        entries = said if isinstance(said, tuple) else (said,)
+        usual = self._simulations.system.condition(by).choices[0]
+        return str(next((entry for entry in entries if entry != usual), usual))
+
+    def _usual(self, name: str, case: Case) -> float:
+        """What a parameter is by the conditions of a recording, or else nominally."""
+        return self._set_by(case).get(name, self._simulations.nominal[name])
+
+    def _set_by(self, case: Case) -> dict[str, float]:
+        """Parameters that the conditions of a recording set."""
+        found: dict[str, float] = {}
+        for condition in self._simulations.system.conditions:
+            found |= condition.parameters.get(str(case.conditions[condition.name]), {})
+        return found
 
     def present(self, effect: Effect, k: int) -> bool:
         """Whether stop k can have an effect: where the conditions say, if those of any stop do."""
@@ -85,10 +124,10 @@ class Fit:
 
     def _share(self, said: Where | Unless, k: int) -> float:
         """Share of what a condition of stop k says that is one state."""
-        states = getattr(self._court.cases[k].conditions, said.condition, None)
+        states = self._simulations.cases[k].conditions.get(said.condition)
         if states is None:
             raise InputError(
-                where=f"conditions of {self._court.cases[k].name}",
+                where=f"conditions of {self._simulations.cases[k].name}",
                 found=f"no '{said.condition}', which an effect of the library asks for",
                 expected="a condition that stops have",
                 remedy="correct the annotation of the effect",
@@ -105,23 +144,25 @@ class Fit:
         unless, falling = effect.unless, effect.falling
         if unless is not None and self._told(unless):
             return unless.because
-        if falling is not None and not any(s.falls(falling.signal) for s in self._court.stops):
+        if falling is not None and not any(
+            one.falls(falling.signal) for one in self._simulations.recordings
+        ):
             return falling.because
         return effect.hidden
 
     def values(self, point: Point) -> list[dict[str, float]]:
-        """Values of the FMU's variables in each stop."""
+        """Values of the FMU's variables, and of delays, in each recording."""
         return [self._values(point, k) for k in range(self.count)]
 
     def _values(self, point: Point, k: int) -> dict[str, float]:
-        case = self._court.cases[k]
-        values = {
-            **_RAIL[case.conditions.wheel_rail],
-            FORCE_DELAY: point.levels[_LATE],
-        }
-        for j, (name, tolerance) in enumerate(TOLERANCES.items()):
-            common = self._common(point, name, case)
-            values[name] = common * (1.0 + tolerance * point.deviations[k, j])
+        case = self._simulations.cases[k]
+        values = {**self._simulations.given, **self._set_by(case)}
+        values |= {name: point.levels[name, _SENSOR] for name in self._modes}
+        values |= {name: point.levels[name, self._choice(name, case)] for name in self._compare.levels}
+        for j, (name, spread) in enumerate(self.local.items()):
+            values[name] = self._middle(point, name, k) + (
+                self._spread(point, name, k, spread) * point.deviations[k, j]
+            )
         for effect in self._effects.values():
             where = effect.where
             if where is not None and where.share and self._told(where):
@@ -137,22 +178,30 @@ class Fit:
                 parts = {parameter: size}
             for part, value in parts.items():
                 names = variables(effect, part)
-                start = self._court.given.get(names[0], 0.0) if part in effect.sizes else 0.0
+                start = self._simulations.given.get(names[0], 0.0) if part in effect.sizes else 0.0
                 values |= dict.fromkeys(names, start + float(value))
         return values
 
-    def _common(self, point: Point, name: str, case: Case) -> float:
-        if name == "muDC":
-            return point.levels[name, _discs(case)]
-        if name == "muWR":
-            return point.levels[name, case.conditions.wheel_rail]
-        return self._court.nominal[name]
+    def _middle(self, point: Point, name: str, k: int) -> float:
+        """Value of what differs between recordings, without the deviation of this one."""
+        case = self._simulations.cases[k]
+        if name in self._compare.levels:
+            return point.levels[name, self._choice(name, case)]
+        if name in self._simulations.system.spreads:
+            return self._simulations.begin[k].get(name, self._simulations.nominal.get(name, 0.0))
+        return self._usual(name, case)
+
+    def _spread(self, point: Point, name: str, k: int, spread: float) -> float:
+        """Standard deviation of a local deviation, in the parameter's or state's unit."""
+        absolute = name in self._simulations.system.spreads
+        return spread if absolute else spread * self._middle(point, name, k)
 
     def at(self, point: Point) -> Linearised:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
-        evidence = self._court.at(self.values(point))
+        evidence = self._simulations.at(self.values(point))
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
-        return Linearised(point, (_DELAY,), tuple(evidence), slowness(evidence), away)
+        slow = slowness(evidence, self.lasting)
+        return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away)
 
     def linearise(
         self,
@@ -179,24 +228,26 @@ class Fit:
                 for name in variables(effect, parameter)
             }
             for parameter in effect.sizes:
-                column = Column(variables(effect, parameter), effect.step, setting)
+                column = Variation(variables(effect, parameter), effect.step, setting)
                 columns[variant(effect, shape), parameter] = column
         missing = {key: column for key, column in columns.items() if key not in lin.keys}
         if not missing:
             return lin
         values = self.values(lin.point)
         return lin.extended(
-            missing, self._court.derivatives(values, list(missing.values()), lin.evidence)
+            missing, self._simulations.derivatives(values, list(missing.values()), lin.evidence)
         )
 
-    def _tolerances(self) -> dict[Key, Column]:
+    def _tolerances(self) -> dict[Key, Variation]:
         """Columns of what differs from stop to stop."""
+        start = self.start()
+        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.local}
         return {
-            (_STOP, name): Column((name,), 0.5 * tolerance * self._court.nominal[name])
-            for name, tolerance in TOLERANCES.items()
+            (_LOCAL, name): Variation((name,), 0.5 * self._spread(start, name, 0, spread))
+            for name, spread in spreads.items()
         }
 
-    def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Column]:
+    def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Variation]:
         """Columns of the effects that a point has."""
         columns = {}
         for effect in active:
@@ -204,10 +255,10 @@ class Fit:
                 names = variables(effect, parameter)
                 is_shape = parameter not in effect.sizes
                 step = 0.05 * point.sizes[effect.name, parameter] if is_shape else effect.step
-                high = self._court.bounds[names[0]][1]
+                high = self._simulations.bounds[names[0]][1]
                 if not is_shape and point.sizes[effect.name, effect.label] + step > high:
                     step = -step
-                columns[effect.name, parameter] = Column(names, step)
+                columns[effect.name, parameter] = Variation(names, step)
         return columns
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
@@ -224,21 +275,18 @@ class Fit:
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
     def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> StopSystem:
-        point, case = lin.point, self._court.cases[k]
+        point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
         b, m = evidence.errors.shape
         weight = np.append(np.tile(1.0 / np.sqrt(lin.inflation), b), 1.0)
         at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
-            if key == _LATE:
-                J[:, j] = at[_DELAY]
+            if key in point.levels and key[1] == _SENSOR:
+                J[:, j] = at[_LOCAL, key[0]]
             elif key in point.levels:
-                name, surface = key
-                mine = _discs(case) if name == "muDC" else case.conditions.wheel_rail
-                if surface == mine:
-                    deviation = point.deviations[k, list(TOLERANCES).index(name)]
-                    J[:, j] = at[_STOP, name] * (1.0 + TOLERANCES[name] * deviation)
+                if key[1] == self._choice(key[0], case):
+                    J[:, j] = at[_LOCAL, key[0]] * self._shared(point, key[0], k)
             elif key[1] == "amplitude":
                 cosine, sine, phase = (
                     at[key[0], "cosine"],
@@ -251,31 +299,43 @@ class Fit:
                 effect = self._effects[key[0].partition(" ")[0]]
                 J[:, j] = at[key] * float(self.present(effect, k))
         tolerances = [
-            at[_STOP, name] * tolerance * self._common(point, name, case)
-            for name, tolerance in TOLERANCES.items()
+            at[_LOCAL, name] * self._spread(point, name, k, spread)
+            for name, spread in self.local.items()
         ]
-        local = np.column_stack(tolerances + P)
+        free = np.zeros((b * m + 1, 0))
+        local = np.column_stack([free, *tolerances, *P])
         return StopSystem(evidence.residual * weight, J, local, point.deviations[k])
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
-        """What is known of the common unknowns beforehand: muWR to a fifth, the rest freely."""
+        """What is known of the common unknowns beforehand."""
         N, g, c = np.zeros((len(shared),) * 2), np.zeros(len(shared)), 0.0
         for j, key in enumerate(shared):
-            if key in point.levels and key[0] != "muDC":
-                middle, sigma = self._expected(key)
+            if key not in point.levels:
+                continue
+            middle, sigma = self._expected(key)
+            if np.isfinite(sigma):
                 away = (point.levels[key] - middle) / sigma
                 N[j, j], g[j], c = 1.0 / sigma**2, away / sigma, c + away**2
         return Quadratic(N, g, c, 0)
 
-    @staticmethod
-    def _expected(key: Key) -> tuple[float, float]:
-        """What is expected of a level, and its standard deviation; of pads, anything."""
-        if key == _LATE:
-            return 0.0, _FORCE_DELAY
-        if key[0] == "muDC":
+    def _shared(self, point: Point, name: str, k: int) -> float:
+        """By how much a recording's own value moves with the common level."""
+        if name not in self._compare.tolerances:
+            return 1.0
+        deviation = point.deviations[k, list(self.local).index(name)]
+        return float(1.0 + self._compare.tolerances[name] * deviation)
+
+    def _expected(self, key: Key) -> tuple[float, float]:
+        """What is expected of a level, and its standard deviation, infinite for anything."""
+        name, choice = key
+        if choice == _SENSOR:
+            return 0.0, self._modes[name].late
+        spread = self._compare.levels[name].spread
+        if not np.isfinite(spread):
             return 0.0, np.inf
-        middle = _RAIL["wet" if key[1] == "wet" else "dry"]["muWR"]
-        return middle, _RAIL_SPREAD * middle
+        case = next(c for c in self._simulations.cases if self._choice(name, c) == choice)
+        middle = self._usual(name, case)
+        return middle, spread * abs(middle)
 
     def refine(
         self,
@@ -338,7 +398,7 @@ class Fit:
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
-        return self._court.together(job, items)
+        return self._simulations.together(job, items)
 
     def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)
@@ -350,7 +410,7 @@ class Fit:
             elif key in sizes:
                 sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
         locals_ = [system.local(step) for system in joint.systems]
-        count = len(TOLERANCES)
+        count = len(self.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
         deviations = np.clip(deviations, -_FURTHEST, _FURTHEST)
         phases = {}
@@ -368,10 +428,6 @@ class Fit:
         if parameter not in effect.sizes:
             low, high = max(low, 0.5 * old), min(high, 2.0 * old)
         return float(np.clip(new, low, high))
-
-
-def _discs(case: Case) -> Surface:
-    return "wet" if "wet" in case.conditions.discs else "dry"
 
 
 def variant(effect: Effect, shape: Mapping[str, float]) -> str:

@@ -11,7 +11,6 @@ from workbench.diagnosis.quadratic import Key
 from workbench.fmu import Matrix, Vector
 
 _NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
-_SECOND = 20  # blocks
 
 
 @dataclass(frozen=True)
@@ -21,8 +20,8 @@ class Point:
     Attributes
     ----------
     sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
-    levels : common level by quantity and surface, as ("muDC", "dry"), or sensor.
-    deviations : of each stop from the common values, in standard deviations, (K, 5).
+    levels : common level by parameter and choice of a condition, or by delay.
+    deviations : of each recording from the common values, in standard deviations, (K, d).
     phases : [rad] of order-locked effects, (K,) by effect.
     """
 
@@ -38,7 +37,9 @@ class Linearised:
 
     Attributes
     ----------
-    keys : of the columns of each jacobian: FORCE_DELAY, TOLERANCES, (effect, parameter).
+    keys : of the columns of each jacobian: delays, what differs between recordings, (effect,
+        parameter).
+    lasting : blocks from which on an error is no noise.
     inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
     away : chi-squared of levels and deviations against what tolerances say of them.
     """
@@ -46,6 +47,7 @@ class Linearised:
     point: Point
     keys: tuple[Key, ...]
     evidence: tuple[Evidence, ...]
+    lasting: int
     inflation: Vector
     away: float
 
@@ -72,20 +74,22 @@ class Linearised:
     def deviance(self) -> float:
         """What a fit makes least: minus twice the log likelihood, up to a constant.
 
-        Of a channel that is wrong, the variance is unknown, and errors that last count once in a
-        second: its logarithm counts. To spoil one channel for another is no gain then.
+        Of a channel that is wrong, the variance is unknown, and errors that last count once:
+        its logarithm counts. To spoil one channel for another is no gain then.
         Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
         """
         count, mean = self._squares
         noise = count * np.minimum(mean, _NOISE)
-        wrong = count / _SECOND * np.log(self.spread)
+        wrong = count / self.lasting * np.log(self.spread)
         rest = sum(one.rest**2 for one in self.evidence)
         return float((noise + wrong).sum()) + rest + self.away
 
     @property
     def spread(self) -> Vector:
         """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        spread: Vector = 1.0 + _SECOND * np.maximum(0.0, self._squares[1] - _NOISE)
+        spread: Vector = 1.0 + self.lasting * np.maximum(
+            0.0, self._squares[1] - _NOISE
+        )
         return spread
 
     def weighed(self, inflation: Vector) -> float:
@@ -93,22 +97,22 @@ class Linearised:
         return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
 
 
-def seconds(errors: Matrix) -> Matrix:
-    """Mean squares over seconds of whitened errors (b, m), times blocks, (s, m): noise leaves 1."""
-    count = len(errors) // _SECOND * _SECOND
-    means = errors[:count].reshape(-1, _SECOND, errors.shape[1]).mean(axis=1)
-    squares: Matrix = _SECOND * means**2
+def lasting(errors: Matrix, blocks: int) -> Matrix:
+    """Squares of means of so many whitened errors (b, c), times their number: noise leaves 1."""
+    count = len(errors) // blocks * blocks
+    means = errors[:count].reshape(-1, blocks, errors.shape[1]).mean(axis=1)
+    squares: Matrix = blocks * means**2
     return squares
 
 
-def slowness(evidence: Sequence[Evidence]) -> Vector:
-    """Variance of errors that last a second over that of white noise, by channel, at least 1.
+def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
+    """Variance of errors that last over that of white noise, by channel, at least 1.
 
     What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
     against that, not against the noise.
     """
-    lasting = np.concatenate([seconds(one.errors) for one in evidence])
-    slow: Vector = np.maximum(1.0, lasting.mean(axis=0))
+    squares = np.concatenate([lasting(one.errors, blocks) for one in evidence])
+    slow: Vector = np.maximum(1.0, squares.mean(axis=0))
     return slow
 
 

@@ -1,164 +1,195 @@
-"""Prediction errors of a model along a recorded stop: what the data say that the model does not.
+"""Prediction errors of a model along a recording: what the data say that the model does not.
 
-The model is simulated from the measured inputs. Only its slow motion, the common speed of wheelset
-and roller, is led along the measured roller speed, by the stationary Kalman gain for the noise of
-torque and roller speed: errors of the past are forgotten and the prediction errors are white when
-the model is right. Slip and creep force stay the model's own.
-Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2 (prediction-error methods).
+The model is simulated from the measured inputs. Only a slow motion that integrates the noise of
+inputs is led along its measured output, by the stationary Kalman gain for that noise: errors of the
+past are forgotten and the prediction errors are white when the model is right. All else stays the
+model's own. Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2 (prediction-error
+methods).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.diagnosis.samples import Samples
-from workbench.fmu import FMU, Matrix
+from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import (
     checked,
     compiled,
+    differentiate,
     evaluate,
-    linearise,
+    instance,
     place,
-    plant,
     read,
     set_states,
+    solve,
 )
+from workbench.observers.contract import rolling_ratio
+from workbench.system import System
 
-INPUTS = ("pB", "tauR", "dmuWR", "dmuDC")
-READINGS = ("omegaWReading", "omegaRReading", "FxReading")
-
-_LONGEST = 0.006  # [s] of a step: all but the speeds is stepped explicitly, some in 10 ms
-_KEPT = 8  # steps with one Jacobian: 50 ms, in which the speed of a stop falls by 0.2 m/s
+_LONGEST = 1.2  # sample times, of a step: what is stepped explicitly has to be stable
+_SWIFT = 1.0  # rate times step from which on a state is stepped implicitly
+_KEPT = 8  # steps with one Jacobian: in as many samples a machine changes little
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
+class _Led(NamedTuple):
+    """The motion that is led.
+
+    Attributes
+    ----------
+    states : that a correction scales alike, the leader first; empty: none is led.
+    column : of the output.
+    """
+
+    states: NDArray[np.intp]
+    column: int
+
+
+class _Work(NamedTuple):
+    """What a simulation remembers, and work space.
+
+    Attributes
+    ----------
+    stiff : (p,) states that are stepped implicitly.
+    a : (n, p) columns of the Jacobian by them.
+    inverse : (p, p) of I - gamma h A, for them; step : (1,) that it is for [s].
+    """
+
+    stiff: NDArray[np.intp]
+    a: Matrix
+    inverse: Matrix
+    step: Vector
+    system: Matrix
+    between: Vector
+    x: Vector
+    k1: Vector
+    k2: Vector
+    picked: Vector
+
+
 @compiled
-def _stiff(plant, wheel, roller, a):  # type: ignore[no-untyped-def]
-    """Fill a (n, 2) with the columns of the Jacobian by both speeds; a status."""
-    n = plant.x.size
-    if plant.fmi == 0:
-        if linearise(plant, n):
-            return 1
-    else:
-        for j in (wheel, roller):
-            known, out = (
-                plant.knowns_at + 4 * j,
-                plant.jacobian_at + 8 * plant.jacobian.shape[1] * j,
-            )
-            if plant.fmi == 2:
-                status = plant.directional_2(
-                    plant.instance, plant.unknowns_at, n, known, 1, plant.seed_at, out
-                )
-            else:
-                status = plant.directional_3(
-                    plant.instance, plant.unknowns_at, n, known, 1, plant.seed_at, 1, out, n
-                )
-            if status > 1:
+def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
+    """Make the matrix of a step of h [s], with the Jacobian here or the one that is kept."""
+    n, p = model.x.size, work.stiff.size
+    if anew:
+        for c in range(p):
+            if differentiate(model, work.stiff[c], n):
                 return 1
-    for i in range(n):
-        a[i, 0] = plant.jacobian[wheel, i]
-        a[i, 1] = plant.jacobian[roller, i]
-    return 0
+            for i in range(n):
+                work.a[i, c] = model.jacobian[work.stiff[c], i]
+    elif work.step[0] == h:
+        return 0
+    for r in range(p):
+        for c in range(p):
+            work.system[r, c] = -_GAMMA * h * work.a[work.stiff[r], c]
+            work.inverse[r, c] = 1.0 if r == c else 0.0
+        work.system[r, r] += 1.0
+    work.step[0] = h
+    return solve(work.system, work.inverse)
 
 
 @compiled
-def _solve(a, h, wheel, roller, k):  # type: ignore[no-untyped-def]
-    """Solve (I - gamma h A) x = k in place; A has the columns a by both speeds, else zeros."""
-    f = -_GAMMA * h
-    p, q = 1.0 + f * a[wheel, 0], f * a[wheel, 1]
-    r, s = f * a[roller, 0], 1.0 + f * a[roller, 1]
-    determinant = p * s - q * r
-    if not abs(determinant) > 0.0:
-        return 2
-    kW = (s * k[wheel] - q * k[roller]) / determinant
-    kR = (p * k[roller] - r * k[wheel]) / determinant
+def _solve(work, h, k):  # type: ignore[no-untyped-def]
+    """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
+    stiff, picked = work.stiff, work.picked
+    for r in range(stiff.size):
+        picked[r] = 0.0
+        for c in range(stiff.size):
+            picked[r] += work.inverse[r, c] * k[stiff[c]]
     for i in range(k.size):
-        k[i] -= f * (a[i, 0] * kW + a[i, 1] * kR)
-    k[wheel], k[roller] = kW, kR
-    return 0
+        for c in range(stiff.size):
+            k[i] += _GAMMA * h * work.a[i, c] * picked[c]
+    for r in range(stiff.size):
+        k[stiff[r]] = picked[r]
 
 
 @compiled
-def _step(plant, u, h, wheel, roller, x, a, renew, k1, k2):  # type: ignore[no-untyped-def]
-    """Advance plant.x by h [s] while the inputs go from plant.u to u; returns a status.
+def _step(model, work, h, renew):  # type: ignore[no-untyped-def]
+    """Advance model.x by h [s] while the inputs go to work.between; returns a status.
 
-    Rosenbrock method of two stages, L-stable, with inputs linear in time: a sampled pressure ramp
-    is met without lag, which linearly implicit Euler would show as half a sample of delay. It is
-    of order 2 whatever matrix stands for the Jacobian, so that one serves several steps; both
-    speeds are stiff, through the slip, and only they are treated so. What drives them, inputs and
-    all other states, enters by its change over the step.
+    Rosenbrock method of two stages, L-stable, with inputs linear in time: a sampled ramp is met
+    without lag, which linearly implicit Euler would show as half a sample of delay. It is of order
+    2 whatever matrix stands for the Jacobian, so that one serves several steps, and only the states
+    that may be stiff are treated so. What drives them, inputs and all other states, enters by its
+    change over the step.
     Source: J. G. Verwer et al. (1999), SIAM J. Sci. Comput. 20, 1456-1480.
     """
-    n = x.size
-    if evaluate(plant):
+    n, x, k1, k2 = model.x.size, work.x, work.k1, work.k2
+    if evaluate(model):
         return 1
     for i in range(n):
-        x[i] = plant.x[i]
-        k1[i] = plant.dx[i]
-    if renew and _stiff(plant, wheel, roller, a):
-        return 1
-    for j in range(u.size):
-        plant.u[j] = u[j]
+        x[i] = model.x[i]
+        k1[i] = model.dx[i]
+    status = _renew(model, work, h, renew)
+    if status:
+        return status
+    for j in range(work.between.size):
+        model.u[j] = work.between[j]
     for i in range(n):
-        if i != wheel and i != roller:
-            plant.x[i] += h * k1[i]
-    if place(plant) or evaluate(plant):
+        model.x[i] += h * k1[i]
+    for i in work.stiff:
+        model.x[i] = x[i]
+    if place(model) or evaluate(model):
         return 1
     for i in range(n):
-        k2[i] = _GAMMA * (plant.dx[i] - k1[i])
+        k2[i] = _GAMMA * (model.dx[i] - k1[i])
         k1[i] += k2[i]
-    if _solve(a, h, wheel, roller, k1):
-        return 2
+    _solve(work, h, k1)
     for i in range(n):
-        plant.x[i] = x[i] + h * k1[i]
-    if set_states(plant) or evaluate(plant):
+        model.x[i] = x[i] + h * k1[i]
+    if set_states(model) or evaluate(model):
         return 1
     for i in range(n):
-        k2[i] = plant.dx[i] - 2.0 * k1[i] - k2[i]
-    if _solve(a, h, wheel, roller, k2):
-        return 2
+        k2[i] = model.dx[i] - 2.0 * k1[i] - k2[i]
+    _solve(work, h, k2)
     for i in range(n):
-        plant.x[i] = x[i] + h * (1.5 * k1[i] + 0.5 * k2[i])
-    return set_states(plant)
+        model.x[i] = x[i] + h * (1.5 * k1[i] + 0.5 * k2[i])
+    return set_states(model)
 
 
 @compiled
-def _predict(plant, time, u, y, gain, x0, wheel, roller, errors, between, x, a, k1, k2):  # type: ignore[no-untyped-def]
-    """Fill `errors` (n, m), measured minus predicted; returns a status.
+def _predict(model, time, u, y, gain, led, x0, longest, errors, work):  # type: ignore[no-untyped-def]
+    """Fill `errors` (n, c), measured minus predicted; returns a status.
 
-    A correction of the roller's speed scales both speeds: creepage and force stay as they are, so
-    that the noise of one sample does not come back as force in the next.
+    A correction scales all states that move together: what depends on their ratio stays as it is,
+    so that the noise of one sample does not come back as something else in the next.
     """
     for i in range(x0.size):
-        plant.x[i] = x0[i]
+        model.x[i] = x0[i]
     for j in range(u.shape[1]):
-        plant.u[j] = u[0, j]
-    if place(plant):
+        model.u[j] = u[0, j]
+    if place(model):
         return 1
     taken = 0
     for k in range(time.size):
         if k > 0:
-            correction = gain[k - 1] * errors[k - 1, 1]
-            if abs(plant.x[roller]) > 2.0 * abs(correction):
-                plant.x[wheel] *= 1.0 + correction / plant.x[roller]
-                plant.x[roller] += correction
-            if set_states(plant):
-                return 1
+            if led.states.size:
+                correction = gain[k - 1] * errors[k - 1, led.column]
+                leader = model.x[led.states[0]]
+                if led.states.size == 1:
+                    model.x[led.states[0]] += correction
+                elif abs(leader) > 2.0 * abs(correction):
+                    for i in led.states:
+                        model.x[i] *= 1.0 + correction / leader
+                if set_states(model):
+                    return 1
             interval = time[k] - time[k - 1]
-            steps = max(1, math.ceil(interval / _LONGEST - 1e-6))
+            steps = max(1, math.ceil(interval / longest - 1e-6))
             for i in range(1, steps + 1):
                 for j in range(u.shape[1]):
-                    between[j] = u[k - 1, j] + (u[k, j] - u[k - 1, j]) * i / steps
-                renew = taken % _KEPT == 0
-                status = _step(plant, between, interval / steps, wheel, roller, x, a, renew, k1, k2)
+                    work.between[j] = u[k - 1, j] + (u[k, j] - u[k - 1, j]) * i / steps
+                status = _step(model, work, interval / steps, taken % _KEPT == 0)
                 taken += 1
                 if status:
                     return status
-        if read(plant):
+        if read(model):
             return 1
         for i in range(y.shape[1]):
-            errors[k, i] = y[k, i] - plant.y[i]
+            errors[k, i] = y[k, i] - model.y[i]
     return 0
 
 
@@ -167,47 +198,83 @@ class Predictor:
 
     Parameters
     ----------
-    fmu : model with states omegaW, omegaR, the inputs INPUTS and the outputs READINGS; it must
-        outlive the predictor.
+    fmu : model with the states, inputs and readings of the system; it must outlive the predictor.
+    signals : that are predicted.
     """
 
-    def __init__(self, fmu: FMU) -> None:
-        self._fmu = fmu
-        self._plant = plant(fmu, INPUTS, READINGS)
-        self._speeds = fmu.states.index("omegaW"), fmu.states.index("omegaR")
-        self._ratio = fmu.defaults["rR"] / fmu.defaults["rW"]
+    def __init__(self, fmu: FMU, system: System, signals: Sequence[str]) -> None:
+        self._fmu, self._system = fmu, system
+        inputs = [one.name for one in system.inputs]
+        readings = [system.signals[name].reading for name in signals]
+        self._model = instance(fmu, inputs, system.corrections, readings)
+        self._longest = _LONGEST * system.sample_time
+        leading, rolling = system.comparison.leading, system.rolling
+        states: list[int] = []
+        if leading is not None:
+            others = [name for name in leading.together if name != leading.output]
+            states = [fmu.states.index(name) for name in (leading.output, *others)]
+        column = list(signals).index(leading.output) if leading is not None else 0
+        self._led = _Led(np.array(states, np.intp), column)
+        self._ratio = rolling_ratio(fmu, system) if rolling is not None else 0.0
 
-    def errors(self, samples: Samples, parameters: Mapping[str, float]) -> Matrix:
-        """Prediction errors along one stop.
+    def begin(self, samples: Samples) -> dict[str, float]:
+        """Start values of states, as measured at the start of a recording."""
+        rolling = self._system.rolling
+        known = {name: value for name, value in samples.begin.items() if name in self._fmu.states}
+        if rolling is not None and rolling.leader in known:
+            known[rolling.follower] = self._ratio * known[rolling.leader]
+        return known
+
+    def errors(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
+        """Prediction errors along one recording.
 
         Parameters
         ----------
-        parameters : values by name of the FMU's variables, SI; others keep their defaults.
+        values : by name of the FMU's variables, SI; others keep their defaults.
 
         Returns
         -------
-        errors : (n, m) measured minus predicted: omegaW, omegaR [rad/s] and Fx [N] if measured.
+        errors : (n, c) measured minus predicted.
 
         Raises
         ------
         FMUError
-            If the model cannot be evaluated along the stop.
+            If the model cannot be evaluated along the recording.
         """
-        fmu, n = self._fmu, len(self._fmu.states)
-        begin = {"omegaW": samples.omegaR * self._ratio, "omegaR": samples.omegaR}
-        fmu.start(begin, parameters)
+        fmu = self._fmu
+        fmu.start({**self.begin(samples), **values})
         errors = np.zeros_like(samples.y)
-        work = (np.zeros(len(INPUTS)), np.zeros(n), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
+        self._model.u[:] = 0.0
+        x0 = fmu.get_states()
         status = _predict(
-            self._plant,
+            self._model,
             samples.time,
             samples.u,
             samples.y,
             samples.gain,
-            fmu.get_states(),
-            *self._speeds,
+            self._led,
+            x0,
+            self._longest,
             errors,
-            *work,
+            self._work(),
         )
         checked(status, fmu)
         return errors
+
+    def _work(self) -> _Work:
+        """Work space; which states are stiff is judged where the recording begins."""
+        fmu, n = self._fmu, len(self._fmu.states)
+        rates = np.abs(fmu.state_jacobian().diagonal()) * self._longest
+        stiff = [
+            i
+            for i, name in enumerate(fmu.states)
+            if name in self._system.states or rates[i] > _SWIFT
+        ]
+        p = len(stiff)
+        square = np.zeros((p, p))
+        return _Work(
+            np.array(stiff, np.intp),
+            *(np.zeros((n, p)), square, np.zeros(1), square.copy()),
+            np.zeros(len(self._system.inputs)),
+            *(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(p)),
+        )

@@ -1,10 +1,10 @@
-"""A recorded stop made ready for statistics: what counts, what is set aside, how large noise is.
+"""A recording made ready for statistics: what counts, what is set aside, how large noise is.
 
-Blocks of 50 ms are the unit of all statistics: short against everything that brakes do, long
-enough to average most of the 20 Hz ringing of a load cell.
+Blocks are the unit of all statistics: short against everything that the machine does, long enough
+to average most of the ringing of its structure.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,64 +14,58 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 from scipy.optimize import nnls
 from scipy.signal import lfilter, lfiltic, savgol_filter
 
-from workbench.case import Case, Matrix, Vector
+from workbench.case import Case
 from workbench.errors import InputError
+from workbench.recording import Matrix, Vector
+from workbench.system import Channel, Exclusion, Mode, System
 
-BLOCK = 0.05  # [s]
-
-_FEWEST = 100  # blocks, 5 s: less does not tell noise from cause
-_SETTLING = 1.0  # [s] at the start, in which the simulation finds its slip
-_SLOWEST = 1.0  # [m/s] below, slip is a small difference of uncertain speeds
-_SLIDE = 0.03  # [1] creepage from which on a wheel slides: friction then depends on the rail only
+_EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
 _ABREAST = 11  # samples of the running median
-# [s] and order: parabolas over less than the lags of a valve, lines where pressure holds.
-_SMOOTHED = (0.15, 2), (2.0, 1)
 _HELD = 4.0  # standard deviations that a polynomial may take away
-_RELEASED = 0.1  # share of the pressure
+_RELEASED = 0.1  # share of the greatest value
 _SPIKE = 8.0  # standard deviations that no noise reaches
-_UNMODELLED = 1.2  # ripple and the like, over the noise of torque and pressure
 _STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat itself
-
-# The load cell sits behind the wheelset's longitudinal mode on its cylinders.
-_MODE, _DAMPING = 21.6, 0.05  # [Hz], [1]
-
-CHANNELS = ("slip", "omegaR", "Fx")  # in m/s, rad/s, N
-_RECORDED = ("pB", "tauR")  # columns of u
+_WRONG = "spike, dropout or saturation"
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """One stop, sampled.
+    """One recording, sampled.
 
     Attributes
     ----------
     name : of the case.
     time : (n,) [s].
-    u : (n, 4) pB [Pa], tauR [N.m] and two corrections that stay zero.
-    y : (n, m) omegaW, omegaR [rad/s], and Fx [N] if it was measured.
-    gain : (n,) [1] of the correction of the roller's speed, 0 where that was not measured.
-    omegaR : [rad/s] at the start.
-    rest : [Pa] mean brake pressure before the brake is applied.
-    rest_noise : [Pa] its standard deviation.
+    inputs : names of the columns of u.
+    u : (n, m) measured inputs, without noise that the model would not feel.
+    signals : names of the columns of y: outputs, and what is judged if it was measured.
+    y : (n, c) measured.
+    gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
+    begin : mean of each output at the start.
+    rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
     blocks : (b, 2) first sample and end of each block that counts.
-    whitening : (b, m, m) makes the errors of a block, in CHANNELS, white with variance one.
-    speed : (b,) [m/s] mean circumferential speed of the roller in each block.
+    slopes : (c, c) of the channels by the signals.
+    whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
+    modes : by column of y, of the structure before its sensor.
     set_aside : number of samples by reason.
     """
 
     name: str
     time: Vector
+    inputs: tuple[str, ...]
     u: Matrix
+    signals: tuple[str, ...]
     y: Matrix
     gain: Vector
-    omegaR: float
+    begin: Mapping[str, float]
     rest: float
     rest_noise: float
     blocks: NDArray[np.int64]
+    slopes: Matrix
     whitening: NDArray[np.float64]
-    speed: Vector
+    modes: Mapping[int, Mode]
     set_aside: dict[str, int]
 
     def falls(self, signal: str) -> bool:
@@ -82,119 +76,131 @@ class Samples:
         InputError
             If it is none of the recorded inputs.
         """
-        if signal not in _RECORDED:
+        if signal not in self.inputs:
             raise InputError(
-                where=f"stop {self.name}",
+                where=f"recording {self.name}",
                 found=f"no recorded input '{signal}', which an effect of the library asks for",
-                expected=f"one of {', '.join(_RECORDED)}",
+                expected=f"one of {', '.join(self.inputs)}",
                 remedy="correct the annotation of the effect",
             )
-        column = _RECORDED.index(signal)
+        column = self.inputs.index(signal)
         u = np.concatenate([self.u[first:end, column] for first, end in self.blocks])
         return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
 
     @cached_property
-    def _structure(self) -> tuple[Vector, Vector] | None:
-        """Numerator and denominator of the mode before the load cell, as a digital filter."""
+    def _filters(self) -> dict[int, tuple[Vector, Vector]]:
+        """Numerator and denominator of the modes, as digital filters; of those that show."""
         h = float(np.median(np.diff(self.time)))
-        omega = 2.0 * np.pi * _MODE
-        if omega * h > 2.0:
-            return None  # sampled too slowly to show the mode
-        poles = omega * (-_DAMPING + 1j * np.sqrt(1.0 - _DAMPING**2)) * np.array([1.0, 1.0])
-        poles[1] = np.conj(poles[0])
-        z = np.exp(h * poles)
-        denominator = np.real(np.poly(z))
-        # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below 15 Hz.
-        return np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+        found = {}
+        for column, mode in self.modes.items():
+            omega = 2.0 * np.pi * mode.frequency
+            if omega * h > 2.0:
+                continue  # sampled too slowly to show the mode
+            damped = -mode.damping + 1j * np.sqrt(1.0 - mode.damping**2)
+            z = np.exp(h * omega * np.array([damped, np.conj(damped)]))
+            denominator = np.real(np.poly(z))
+            # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below
+            # three quarters of the mode's frequency.
+            found[column] = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+        return found
 
-    def behind_structure(self, force: Vector) -> Vector:
-        """What load cells read of a creep force [N], (n,): a mode of second order in between."""
-        if self._structure is None:
-            return force
-        numerator, denominator = self._structure
-        begin = lfiltic(numerator, denominator, force[:1].repeat(2), force[:1].repeat(2))
-        read: Vector = lfilter(numerator, denominator, force, zi=begin)[0]
+    def behind_structure(self, column: int, values: Vector) -> Vector:
+        """What a sensor reads of a quantity, (n,): a mode of second order in between."""
+        if column not in self._filters:
+            return values
+        numerator, denominator = self._filters[column]
+        begin = lfiltic(numerator, denominator, values[:1].repeat(2), values[:1].repeat(2))
+        read: Vector = lfilter(numerator, denominator, values, zi=begin)[0]
         return read
 
-    def channels(self, errors: Matrix, rW: float, rR: float) -> Matrix:
-        """Means of prediction errors over each block, (b, m), in CHANNELS.
-
-        The error of the slip is free of what both speeds have in common.
-        """
-        slip = rR * errors[:, 1] - rW * errors[:, 0]
-        total = np.zeros((len(errors) + 1, errors.shape[1]))
-        np.cumsum(slip, out=total[1:, 0])
-        np.cumsum(errors[:, 1:], axis=0, out=total[1:, 1:])
+    def channels(self, errors: Matrix) -> Matrix:
+        """Means of prediction errors (n, c) over each block, by channel, (b, c)."""
+        total = np.zeros((len(errors) + 1, len(self.slopes)))
+        for c, slopes in enumerate(self.slopes):
+            sum_ = sum(slope * errors[:, j] for j, slope in enumerate(slopes) if slope)
+            np.cumsum(sum_, out=total[1:, c])
         first, end = self.blocks.T
         means: Matrix = (total[end] - total[first]) / (end - first)[:, None]
         return means
 
 
-def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
-    """Make a stop ready.
+def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
+    """Signals that all cases have: outputs, and what is only there to judge by."""
+    judged = [one.name for one in system.judged if all(one.name in case for case in cases)]
+    return (*(one.name for one in system.outputs), *judged)
+
+
+def channels(system: System, signals: Sequence[str]) -> tuple[Channel, ...]:
+    """Channels that can be formed from some signals."""
+    missing = set(system.signals) - set(signals)
+    return tuple(one for one in system.comparison.channels if not one.formula.names & missing)
+
+
+def prepare(
+    case: Case,
+    system: System,
+    signals: tuple[str, ...],
+    values: Mapping[str, float],
+    effects: Mapping[str, float],
+) -> Samples:
+    """Make a recording ready.
 
     Parameters
     ----------
-    nominal : defaults of the model's parameters.
+    signals : that are compared, see `compared`.
+    values : parameters of the model.
+    effects : of each input on the rate of the led motion.
 
     Raises
     ------
     InputError
-        If the stop has too little that counts.
+        If the recording has too little that counts.
     """
-    rW, rR = nominal["rW"], nominal["rR"]
-    time, h = case.time, float(np.median(np.diff(case.time)))
-    signals = {"pB": case.pB, "tauR": case.tauR, "omegaW": case.omegaW, "omegaR": case.omegaR}
-    if case.Fx is not None:
-        signals["Fx"] = case.Fx
-    wrong = {name: _outliers(values) for name, values in signals.items()}
-    clean = {name: _bridge(time, values, wrong[name]) for name, values in signals.items()}
-
-    speed = np.abs(clean["omegaR"]) * rR
-    slip = rR * clean["omegaR"] - rW * clean["omegaW"]
-    applied = _first_contact(clean["pB"], time)
-    sliding = _sliding(slip, speed, h, applied)
-    excluded = {
-        "spike, dropout or saturation": np.logical_or.reduce(list(wrong.values())),
-        "slide": sliding,
-        "settling": time < time[0] + _SETTLING,
-        "standstill": _stopped(speed, h),
-    }
+    compare, time = system.comparison, case.time
+    h, steps = float(np.median(np.diff(time))), np.diff(time)
+    names = (*case.inputs, *signals)
+    wrong = {name: _outliers(case[name]) for name in names}
+    clean = {name: _bridge(time, case[name], wrong[name]) for name in names}
+    applied = _applied(clean, system, time)
+    excluded = {_WRONG: np.logical_or.reduce(list(wrong.values()))}
+    for one in compare.exclusions:
+        excluded[one.reason] = _excluded(one, clean, system, time, h, applied)
+    excluded["settling"] = time < time[0] + compare.settling
     usable = ~np.logical_or.reduce(list(excluded.values()))
-    blocks = _blocks(usable, time, round(BLOCK / h))
-    if len(blocks) < _FEWEST:
-        lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
-        raise InputError(
-            where=str(case.source),
-            found=f"{BLOCK * len(blocks):.1f} s that count; samples set aside: {lost}",
-            expected=f"{BLOCK * _FEWEST:.0f} s or more of rolling above {_SLOWEST:g} m/s",
-            remedy="leave this stop out, or repair its recording",
+    blocks = _blocks(usable, time, compare.block, h)
+    _refuse_too_few(case, system, blocks, excluded)
+    formed = channels(system, signals)
+    slopes = np.array([one.formula.slopes(signals, values) for one in formed])
+    deviation = {name: _deviation(clean[name]) for name in names}
+    gain, predicted = np.zeros(time.size), np.zeros(time.size)
+    if (leading := compare.leading) is not None:
+        moved = leading.ripple * np.hypot.reduce(
+            [effects[name] * deviation[name] for name in case.inputs]
         )
-    steps = np.diff(time)
-
-    deviation = {name: _deviation(clean[name]) for name in ("pB", "tauR", "omegaR")}
-    lever = 3.0 * nominal["muDC"] * nominal["actuation.kappa"] * nominal["rB"] * rR / rW
-    torque = _UNMODELLED * np.hypot(deviation["tauR"], lever * deviation["pB"])
-    inertia = nominal["JR"] + nominal["JW"] * (rR / rW) ** 2
-    # Noise of a torque sample acts until half way to its neighbours.
-    acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
-    p, gains = _kalman(torque * acting / inertia, deviation["omegaR"], wrong["omegaR"])
-    u = np.column_stack([_smooth(clean["pB"], h), clean["tauR"], np.zeros((time.size, 2))])
-    y = np.column_stack([clean[name] for name in signals if name not in ("pB", "tauR")])
-    v = np.array([speed[first:end].mean() for first, end in blocks])
-    rest = clean["pB"][:applied]
+        # Noise of an input's sample acts until half way to its neighbours.
+        acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
+        noise, missing = deviation[leading.output], wrong[leading.output]
+        predicted, gain = _kalman(moved * acting, noise, missing)
+    inputs = [_smooth(clean[one.name], one.smoothed, h) for one in system.inputs]
+    rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
+    zero = compare.rest.zero if compare.rest else 1.0
+    start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
+    modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
         name=case.name,
         time=time,
-        u=np.ascontiguousarray(u),
-        y=np.ascontiguousarray(y),
-        gain=gains,
-        omegaR=float(np.mean(clean["omegaR"][: max(1, round(0.2 / h))])),
+        inputs=case.inputs,
+        u=np.ascontiguousarray(np.column_stack(inputs)),
+        signals=signals,
+        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
+        gain=gain,
+        begin={name: float(np.mean(clean[name][start])) for name in case.outputs},
         rest=float(np.mean(rest)),
-        rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), _REST_ZERO)),
+        rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), zero)),
         blocks=blocks,
-        whitening=_whitening(clean, slip, speed, blocks, v, p + deviation["omegaR"] ** 2, rR),
-        speed=v,
+        slopes=slopes,
+        whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, predicted),
+        modes=modes,
         set_aside={
             "missing": int(np.sum(np.maximum(0, np.round(steps / h) - 1))),
             **{reason: int(mask.sum()) for reason, mask in excluded.items()},
@@ -202,7 +208,18 @@ def prepare(case: Case, nominal: Mapping[str, float]) -> Samples:
     )
 
 
-_REST_ZERO = 200.0  # [Pa] by which the zero of a good pressure sensor moves
+def _refuse_too_few(
+    case: Case, system: System, blocks: NDArray[np.int64], excluded: Mapping[str, Mask]
+) -> None:
+    compare = system.comparison
+    if len(blocks) * compare.block < compare.least * (1.0 - 1e-9):
+        lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
+        raise InputError(
+            where=str(case.source),
+            found=f"{compare.block * len(blocks):.3g} s that count; samples set aside: {lost}",
+            expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
+            remedy="leave this recording out, or repair it",
+        )
 
 
 def _outliers(values: Vector) -> Mask:
@@ -228,17 +245,17 @@ def _bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
     return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
 
 
-def _smooth(pB: Vector, h: float) -> Vector:
-    """Pressure without most of its sensor's noise, and without lag.
+def _smooth(values: Vector, windows: Sequence[float], h: float) -> Vector:
+    """An input without most of its sensor's noise, and without lag.
 
-    The pads do not feel that noise; fed to a model, any effect that lags or sticks would gain by
-    keeping it from them. Where pressure holds, the mean is taken over longer.
+    The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
+    by keeping it from the rest. Where the input holds, the mean is taken over longer.
     """
-    best, noise = pB, _deviation(pB)
-    for seconds, order in _SMOOTHED:
+    best, noise = values, _deviation(values)
+    for seconds, order in zip(windows, (2, 1), strict=False):
         window = 2 * (round(seconds / h) // 2) + 1
-        if order < window <= pB.size:
-            smooth = savgol_filter(pB, window, order)
+        if order < window <= values.size:
+            smooth = savgol_filter(values, window, order)
             moves = maximum_filter1d(np.abs(best - smooth) > _HELD * noise, window)
             weight = uniform_filter1d(moves.astype(np.float64), window)
             best = weight * best + (1.0 - weight) * smooth
@@ -248,17 +265,24 @@ def _smooth(pB: Vector, h: float) -> Vector:
 
 
 def _deviation(values: Vector) -> float:
-    """Standard deviation of white noise on a slow signal, from its second differences."""
-    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+    """Standard deviation of white noise on a slow signal, from its second differences.
+
+    It is no less than that of rounding to the least step that the signal makes.
+    """
+    moved = np.abs(np.diff(values))
+    quantum = moved[moved > 0.0].min(initial=np.inf)
+    rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
+    spread = float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+    return max(spread, float(rounding))
 
 
 def _kalman(process: Vector, measurement: float, missing: Mask) -> tuple[Vector, Vector]:
-    """Variance of the predicted roller speed, and gain, of a random walk, (n,).
+    """Variance of the predicted led output, and gain, of a random walk, (n,).
 
     Parameters
     ----------
-    process : (n,) [rad/s] standard deviation of what is added up to the next sample.
-    measurement : [rad/s] standard deviation of a sample.
+    process : (n,) standard deviation of what is added up to the next sample.
+    measurement : standard deviation of a sample.
     missing : (n,) where there is none.
     """
     r = max(measurement, 1e-9) ** 2
@@ -273,33 +297,38 @@ def _kalman(process: Vector, measurement: float, missing: Mask) -> tuple[Vector,
     return predicted, gains
 
 
-def _first_contact(pB: Vector, time: Vector) -> int:
-    """Sample at which the brake is applied; at least a quarter of a second is coasting."""
-    early = max(2, int(np.searchsorted(time, time[0] + 0.25)))
-    rising = pB > np.median(pB[:early]) + 0.1e5
-    return max(early, int(np.argmax(rising)) - early if rising.any() else pB.size)
+def _applied(clean: Mapping[str, Vector], system: System, time: Vector) -> int:
+    """Sample at which the recording begins; before it the machine is as it was left."""
+    early = max(2, int(np.searchsorted(time, time[0] + _EARLY * system.sample_time)))
+    if (begins := system.comparison.begins) is None:
+        return early
+    values = system.signal(begins.signal, clean)
+    rising = values > np.median(values[:early]) + begins.level
+    return max(early, int(np.argmax(rising)) - early if rising.any() else values.size)
 
 
-def _sliding(slip: Vector, speed: Vector, h: float, applied: int) -> Mask:
-    """Where the wheel slides, with half a second around it; a wrong radius is no slide."""
-    width = max(1, round(0.1 / h))
-    smooth = np.convolve(slip, np.ones(width) / width, "same")
-    creepage = smooth / np.maximum(speed, _SLOWEST)
-    coasting = np.median(creepage[:applied])
-    slides = (np.abs(creepage - coasting) > _SLIDE) & (speed > 3.0 * _SLOWEST)
-    slides[:width] = slides[-width:] = False
-    around = np.ones(max(1, round(1.0 / h)))
-    mask: Mask = np.convolve(slides, around, "same") > 0.5
+def _excluded(
+    one: Exclusion, clean: Mapping[str, Vector], system: System, time: Vector, h: float, rest: int
+) -> Mask:
+    """Where samples do not count for one reason."""
+    width = max(1, round(one.smoothed / h))
+    values = np.convolve(system.evaluate(one.formula, clean), np.ones(width) / width, "same")
+    if one.from_rest:
+        values = values - np.median(values[:rest])
+    mask: Mask = (np.abs(values) > one.above) | (np.abs(values) < one.below)
+    if one.only_while is not None:
+        signal = np.abs(system.signal(one.only_while.signal, clean))
+        mask &= signal > one.only_while.level
+    # A mean at an end is one of zeros too.
+    mask[: width + 1] = False
+    if one.to_the_end:
+        mask = np.cumsum(mask) > 0
+    else:
+        mask[time.size - width :] = False
+    if one.within:
+        around = np.ones(max(1, round(2.0 * one.within / h)))
+        mask = np.convolve(mask, around, "same") > 0.5
     return mask
-
-
-def _stopped(speed: Vector, h: float) -> Mask:
-    """From the first second below the slowest speed on."""
-    width = max(1, round(0.1 / h))
-    slow = np.convolve(speed, np.ones(width) / width, "same") < _SLOWEST
-    slow[: width + 1] = False
-    stopped: Mask = np.cumsum(slow) > 0
-    return stopped
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:
@@ -308,45 +337,65 @@ def _runs(mask: Mask) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def _blocks(usable: Mask, time: Vector, size: int) -> NDArray[np.int64]:
-    size = max(1, size)
+def _blocks(usable: Mask, time: Vector, block: float, h: float) -> NDArray[np.int64]:
+    size = max(1, round(block / h))
     found = [
         (k, k + size)
         for first, end in _runs(usable)
         for k in range(first, end - size + 1, size)
-        if time[k + size - 1] - time[k] < 2.0 * BLOCK
+        if time[k + size - 1] - time[k] < 2.0 * max(block, h)
     ]
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
 def _whitening(
-    clean: dict[str, Vector],
-    slip: Vector,
-    speed: Vector,
+    system: System,
+    clean: Mapping[str, Vector],
+    deviation: Mapping[str, float],
+    signals: tuple[str, ...],
+    slopes: Matrix,
     blocks: NDArray[np.int64],
-    v: Vector,
-    roller: Vector,
-    rR: float,
+    usable: Mask,
+    predicted: Vector,
 ) -> NDArray[np.float64]:
-    """Inverse Cholesky factors of the covariance of block means, (b, m, m).
+    """Inverse Cholesky factors of the covariance of block means, (b, c, c).
 
-    A pole wheel's noise grows with speed; the slip shares the noise of the roller's speed; the
-    noise of a load cell is mostly ringing, whose block means are taken as they are.
+    Noise that grows with a signal is told from what does not by the differences of a channel;
+    channels share the noise of their signals; the noise behind a structure is mostly its ringing,
+    whose block means are taken as they are.
     """
-    size = int(blocks[0, 1] - blocks[0, 0]) if len(blocks) else 1
-    squares = np.diff(slip, 2) ** 2 / 6.0
+    size = int(blocks[0, 1] - blocks[0, 0])
+    fixed = np.array([deviation[name] ** 2 for name in signals])
+    covariance = np.tile(slopes * fixed @ slopes.T, (len(blocks), 1, 1))
+    for c, row in enumerate(slopes):
+        own = [name for name, slope in zip(signals, row, strict=True) if slope]
+        channel = sum(slope * clean[name] for name, slope in zip(signals, row, strict=True))
+        growing = [name for name in own if system.signals[name].relative_noise > 0.0]
+        shared = np.delete(np.abs(slopes), c, axis=0).sum(axis=0) > 0.0
+        if len(own) == 1 and system.signals[own[0]].mode is not None:
+            means = np.array([clean[own[0]][first:end].mean() for first, end in blocks])
+            covariance[:, c, c] = size * _deviation(means) ** 2
+        elif growing:
+            least = 1.01 * float(row[shared] ** 2 @ fixed[shared])
+            covariance[:, c, c] = _growing(channel, clean[growing[0]], usable, blocks, least)
+    leading = system.comparison.leading
+    if leading is not None:
+        for c, row in enumerate(slopes):
+            if np.count_nonzero(row) == 1 and row[signals.index(leading.output)] == 1.0:
+                ahead = [predicted[first:end].mean() for first, end in blocks]
+                covariance[:, c, c] += np.array(ahead)
+    return np.linalg.inv(np.linalg.cholesky(covariance / size))
+
+
+def _growing(
+    channel: Vector, signal: Vector, usable: Mask, blocks: NDArray[np.int64], least: float
+) -> Vector:
+    """Variance of a channel's samples in each block, part of which grows with a signal, (b,)."""
+    squares = np.diff(channel, 2) ** 2 / 6.0
     squares = np.minimum(squares, 9.0 * median_filter(squares, 201) / 0.455)
-    moving = speed[1:-1] > _SLOWEST
-    design = np.column_stack([np.ones(moving.sum()), speed[1:-1][moving] ** 2])
-    coefficients, _ = nnls(design, squares[moving])
-    noise = _deviation(clean["omegaR"]) ** 2
-    variance = np.maximum(coefficients[0] + coefficients[1] * v**2, 1.01 * rR**2 * noise)
-    m = 3 if "Fx" in clean else 2
-    covariance = np.zeros((len(v), m, m))
-    covariance[:, 0, 0] = variance / size
-    covariance[:, 0, 1] = covariance[:, 1, 0] = rR * noise / size
-    covariance[:, 1, 1] = [roller[first:end].mean() / size for first, end in blocks]
-    if m == 3:
-        means = np.array([clean["Fx"][first:end].mean() for first, end in blocks])
-        covariance[:, 2, 2] = _deviation(means) ** 2
-    return np.linalg.inv(np.linalg.cholesky(covariance))
+    counts = usable[1:-1]
+    design = np.column_stack([np.ones(counts.sum()), signal[1:-1][counts] ** 2])
+    coefficients, _ = nnls(design, squares[counts])
+    means = np.array([np.abs(signal[first:end]).mean() for first, end in blocks])
+    variance: Vector = np.maximum(coefficients[0] + coefficients[1] * means**2, least)
+    return variance

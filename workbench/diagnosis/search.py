@@ -9,7 +9,7 @@ import numpy as np
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
-from workbench.diagnosis.trial import Candidate, Score, Trial, shapes, tried
+from workbench.diagnosis.trial import Option, Prospect, Trial, shapes, tried
 from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
@@ -55,11 +55,11 @@ class Step:
     """
 
     before: Fitted
-    scores: tuple[Score, ...]
+    scores: tuple[Prospect, ...]
     rivals: tuple[Fitted, ...]
 
 
-def search(
+def seek(
     fit: Fit, catalogue: Sequence[Effect], best: Fitted, report: Reporter
 ) -> tuple[Fitted, list[Step], Trial, bool]:
     """Find what is missing.
@@ -124,7 +124,7 @@ def beyond(one: Fitted, other: Fitted) -> float:
     return one.linearised.weighed(inflation) - other.linearised.weighed(inflation)
 
 
-def _fits(fit: Fit, best: Fitted, rivals: Sequence[Score]) -> list[Fitted]:
+def _fits(fit: Fit, best: Fitted, rivals: Sequence[Prospect]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
     begun = [one for one in fit.together(partial(_begun, fit, best), rivals) if _gains(best, one)]
     if not begun:
@@ -146,7 +146,7 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
     return np.array([one.linearised.weighed(inflation) for one in fits])
 
 
-def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
+def _begun(fit: Fit, best: Fitted, rival: Prospect) -> Fitted:
     """First rounds of a fit with one more effect, begun at half the size where it was too much."""
     for halvings in range(_HALVINGS + 1):
         # A law bends: half the contact's stiffness is twice the slip.
@@ -156,7 +156,7 @@ def _begun(fit: Fit, best: Fitted, rival: Score) -> Fitted:
     return one
 
 
-def extended(fit: Fit, before: Fitted, rival: Score, rounds: int = _ROUNDS) -> Fitted:
+def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = _ROUNDS) -> Fitted:
     """Fit with one more effect, begun where it was fitted without."""
     start, spread = fit.at(joined(before.point, rival)), before.linearised.spread
     return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
@@ -172,7 +172,7 @@ def examine(
     best : with the derivatives by all of them.
     trial : of all of them.
     """
-    candidates: list[Candidate] = [
+    candidates: list[Option] = [
         (effect, shape)
         for effect in catalogue
         if effect not in best.active and not fit.unseen(effect)
@@ -259,7 +259,7 @@ def fitted(
     return Fitted(active, lin.point, lin, lin.misfit)
 
 
-def joined(point: Point, rival: Score) -> Point:
+def joined(point: Point, rival: Prospect) -> Point:
     """The point with one more effect."""
     name = rival.effect.name
     sizes = {**point.sizes, (name, rival.effect.label): rival.size}
@@ -270,7 +270,7 @@ def joined(point: Point, rival: Score) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _rivals(scores: Sequence[Score], best: Fitted) -> list[Score]:
+def _rivals(scores: Sequence[Prospect], best: Fitted) -> list[Prospect]:
     """The best variant of each effect that is large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
@@ -279,7 +279,7 @@ def _rivals(scores: Sequence[Score], best: Fitted) -> list[Score]:
     clear, needed = _SIGNIFICANT, _HELD_OUT
     if best.linearised.inflation.max() > WRONG:
         clear, needed = _HINT, 0.0
-    able: dict[str, Score] = {}
+    able: dict[str, Prospect] = {}
     for one in scores:
         significant = (
             abs(one.size) > clear * one.sigma and min(one.gain, one.held_out.sum()) > needed

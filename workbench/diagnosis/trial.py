@@ -11,13 +11,13 @@ from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Joint, Quadratic, add, covariance, minimum
 from workbench.fmu import Matrix, Vector
 
-Candidate = tuple[Effect, Mapping[str, float]]
+Option = tuple[Effect, Mapping[str, float]]
 
 _IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class Prospect:
     """What one effect would explain, linearised.
 
     Attributes
@@ -48,7 +48,7 @@ def shapes(effect: Effect) -> list[dict[str, float]]:
     return tried
 
 
-def tried(fit: Fit, lin: Linearised, candidates: Sequence[Candidate]) -> "Trial":
+def tried(fit: Fit, lin: Linearised, candidates: Sequence[Option]) -> "Trial":
     """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
     extra = [
         (variant(effect, shape), parameter)
@@ -70,7 +70,7 @@ class Trial:
         self,
         fit: Fit,
         joint: Joint,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[Option],
     ) -> None:
         self._fit, self.joint, self._candidates = fit, joint, candidates
         self._stops = joint.stops()
@@ -114,12 +114,12 @@ class Trial:
         known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
         return known
 
-    def scores(self) -> list[Score]:
+    def scores(self) -> list[Prospect]:
         """All candidates, best first."""
         found = [self._score(effect, shape) for effect, shape in self._candidates]
         return sorted(found, key=lambda one: -one.held_out.sum())
 
-    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Score:
+    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Prospect:
         at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
         phases = np.zeros(len(self._stops))
         own = {at[0]: np.ones(len(self._stops))}
@@ -142,7 +142,7 @@ class Trial:
         if not low <= single <= high:
             single = float(np.clip(single, low, high))
             alone, prior = [_fixed(stop, single) for stop in alone], _fixed(prior, single)
-        return Score(
+        return Prospect(
             effect=effect,
             shape=shape,
             size=size,

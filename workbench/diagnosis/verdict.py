@@ -10,7 +10,7 @@ from scipy.stats import bootstrap
 
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit, variant
-from workbench.diagnosis.linearised import seconds
+from workbench.diagnosis.linearised import lasting
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
     WRONG,
@@ -23,9 +23,9 @@ from workbench.diagnosis.search import (
     fitted,
     lesser,
     pruned,
-    search,
+    seek,
 )
-from workbench.diagnosis.trial import Score, Trial, shapes
+from workbench.diagnosis.trial import Prospect, Trial, shapes
 from workbench.fmu import Matrix, Vector
 
 Verdict = Literal["nothing", "found", "unexplained"]
@@ -116,17 +116,17 @@ class Diagnosis:
     base: Fitted
     best: Fitted
     steps: tuple[Step, ...]
-    scores: tuple[Score, ...]
+    scores: tuple[Prospect, ...]
     names: tuple[str, ...]
     cosines: Matrix
     not_visible: Mapping[str, str]
 
 
-def judge(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
+def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of stops."""
     report("nominal model, levels calibrated")
     nominal = fitted(fit, fit.at(fit.start()), ())
-    best, steps, trial, interrupted = search(fit, catalogue, nominal, report)
+    best, steps, trial, interrupted = seek(fit, catalogue, nominal, report)
     base = steps[0].before if steps else best
     best, trial = pruned(fit, catalogue, best, base, trial, report)
     less = lesser(fit, best, base)
@@ -205,7 +205,9 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
         errors = system.r + system.J @ z + system.P @ system.local(z)
         shape = one.linearised.evidence[k].errors.shape
         whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
-        result[k] = (whitened**2 if fast else seconds(whitened)).mean()
+        result[k] = (
+            whitened**2 if fast else lasting(whitened, one.linearised.lasting)
+        ).mean()
     return result
 
 
@@ -301,7 +303,7 @@ def _twins(
             judged |= set(rivals)
         elif effect.name in rivals:
             alike |= set(rivals)
-    others: dict[str, Score] = {}
+    others: dict[str, Prospect] = {}
     for score in (score for step in steps for score in step.scores):
         if score.effect.name in alike - judged:
             others.setdefault(score.effect.name, score)

@@ -162,6 +162,10 @@ class Estimator(ABC):
         """
         return None
 
+    def settings(self) -> dict[str, object]:
+        """What it runs with, as plain numbers, lists and texts; empty if it has no gains."""
+        return self.gains.summary() if self.gains.names else {}
+
     @abstractmethod
     def _begin(self, u: Vector, y: Vector) -> None:
         """Set the memory to the first sample."""

@@ -249,7 +249,7 @@ class ExtendedKalmanFilter(Estimator):
     """
 
     name = "ekf"
-    label = "EKF"
+    label = "extended Kalman filter"
     rank = 40
     adapts = True
     meaning = "standard deviations of samples, and random walks"

@@ -198,7 +198,7 @@ class ParameterEstimator(Estimator):
             scaled = (response + model.D) / noise[:, None]
             # The part in phase serves a model that settles, the other one that integrates.
             inverse = np.linalg.pinv(scaled, rcond=0.01) / noise
-            L = np.hstack([-speed * inverse.imag, speed * inverse.real])
+            L = np.hstack([inverse.imag, speed * inverse.real])
             dynamics = cls.error_dynamics(model.A, model.B, model.C, cls.of(L, effect))
             assert dynamics is not None
             kept = dynamics[0][: n + outputs, : n + outputs]

@@ -227,7 +227,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     """
 
     name = "ukf"
-    label = "UKF"
+    label = "unscented Kalman filter"
     rank = 45
     _law = staticmethod(_law)
     _loop = staticmethod(_loop)

@@ -4,7 +4,6 @@ from workbench.report.figures import CaseFigure, case_figure, draw_case
 from workbench.report.live import LiveWindow
 from workbench.report.page import write_page
 from workbench.report.results import (
-    CaseResult,
     format_table,
     summarise,
     write_estimates,
@@ -12,7 +11,6 @@ from workbench.report.results import (
 
 __all__ = [
     "CaseFigure",
-    "CaseResult",
     "LiveWindow",
     "case_figure",
     "draw_case",

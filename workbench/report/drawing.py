@@ -1,4 +1,4 @@
-"""A figure of a stop as geometry for a page, where it can be zoomed.
+"""A figure of a recording as geometry for a page, where it can be zoomed.
 
 A panel of a figure is an `svg` of its own, whose view box is time [ms] by value; zooming is a
 change of that view box.

@@ -1,4 +1,4 @@
-"""Figures like Figs. 8 and 9 of Schwarz et al. (2018): inputs, outputs, creep force, residual.
+"""Figures like Figs. 8 and 9 of Schwarz et al. (2018): inputs, outputs, what is judged, residual.
 
 A figure is described once, as panels of curves, and drawn twice: to files by matplotlib here, and
 into the page, where it can be zoomed.
@@ -14,12 +14,22 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from workbench.cosim import Run
 from workbench.fmu import Vector
-from workbench.objective import BANDWIDTH, braking_window
-from workbench.report.results import CaseResult, label, percent
+from workbench.objective import judged_window
+from workbench.report.results import label, percent
+from workbench.report.views import (
+    below,
+    called,
+    per_shown,
+    rounded,
+    shown_unit,
+    titled,
+    views,
+)
+from workbench.simulation import CaseResult
+from workbench.system import View
 
 # On white and on near black; at least 3:1 to the ground as WCAG 2.2 asks of graphics, and
 # differing in lightness or in the blue-yellow axis, which colour-blind readers keep.
@@ -99,7 +109,7 @@ class CaseFigure:
     name, title : of the case.
     finding : what the figure says, for those who do not see it.
     time : (n,) [s].
-    window : begin and end [s] of the time in which estimators are judged; None without braking.
+    window : begin and end [s] of the time in which estimators are judged; None without.
     legend : (style, text) of each entry; from the ninth estimator on, styles repeat.
     panels : from top to bottom.
     """
@@ -113,65 +123,19 @@ class CaseFigure:
     panels: tuple[Panel, ...]
 
 
-def case_figure(result: CaseResult, roller_radius: float) -> CaseFigure:
+def case_figure(result: CaseResult) -> CaseFigure:
     """Describe the figure of a case.
 
-    Residuals are shown as they are judged: below 5 Hz.
-
-    Parameters
-    ----------
-    roller_radius : [m], ends the window in which estimators are judged.
+    Residuals are shown as they are judged: below the bandwidth.
     """
-    case = result.case
-    names = list(result.runs)
-    styles = dict(zip(names, cycle(ESTIMATORS), strict=False))
-    window = braking_window(case, roller_radius)
-    force, force_range = _force(result, styles)
-    residual = [
-        Curve(styles[name], error / 1e3)
-        for name in names
-        if (error := result.error(name)) is not None
-    ]
-    reach = _reach([np.abs(curve.values[window]) for curve in residual])
-    panels = [
-        _panel(
-            "Speed: omegaW (solid), omegaR (dashed) [rad/s]",
-            [Curve("measured", case.omegaW), Curve("measured", case.omegaR, dashed=True)],
-            height=0.8,
-        ),
-        _panel("Brake pressure pB [bar]", [Curve("measured", case.pB / 1e5)], height=0.55),
-        _panel("Drive torque tauR [kN.m]", [Curve("measured", case.tauR / 1e3)], height=0.55),
-        Panel("Creep force Fx [kN]", *force_range, 1.8, tuple(force)),
-        Panel(
-            f"Error of Fx, estimated - measured, below {BANDWIDTH:g} Hz [kN]",
-            -reach,
-            reach,
-            1.1,
-            tuple(residual),
-        ),
-        Panel(
-            "Friction wheel-rail muWR [1], dashed where not observable; "
-            "solid near the adhesion limit, if the contact is as in the model",
-            0.0,
-            0.6,
-            0.8,
-            tuple(
-                part
-                for (_, run), curve in zip(
-                    _knowing(result, "muWR"), _estimated(result, styles, "muWR"), strict=True
-                )
-                for part in _claimed(curve, run.muWR_claimed)
-            ),
-        ),
-        Panel("Friction disc-pad muDC [1]", 0.0, 0.6, 0.8, _estimated(result, styles, "muDC")),
-    ]
-    legend = [("measured", "measured")]
-    if case.Fx is not None:
-        legend = [
-            ("measured", f"measured (Fx below {BANDWIDTH:g} Hz)"),
-            ("raw", "measured Fx, unfiltered"),
-        ]
-    legend += [(styles[name], _legend(result, name)) for name in names]
+    system, case = result.system, result.case
+    styles = dict(zip(result.runs, cycle(ESTIMATORS), strict=False))
+    window = judged_window(case, system)
+    panels, judged = [], system.objective.judged
+    for view in views(system):
+        panels.append(_seen(result, styles, view))
+        if judged in view.signals:
+            panels.append(_residual(result, styles, window))
     return CaseFigure(
         name=case.name,
         title=case.title,
@@ -180,24 +144,35 @@ def case_figure(result: CaseResult, roller_radius: float) -> CaseFigure:
         window=(float(case.time[window.start]), float(case.time[window.stop - 1]))
         if window.stop > window.start
         else None,
-        legend=tuple(legend),
+        legend=tuple(_legend(result, styles)),
         panels=tuple(panel for panel in panels if panel.curves),
     )
 
 
-def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
-    """Draw a case with matplotlib, once, to each path (PNG or SVG by suffix)."""
+def run_figure(run: Run) -> CaseFigure:
+    """Describe a figure of one estimate alone, a panel for each signal."""
+    panels = []
+    for name, unit in run.columns.items():
+        if not np.isnan(run.signal(name)).all():
+            curve = Curve("2", run.signal(name), _known(run.deviation(name)))
+            panels.append(_panel(f"{name} [{unit}]", _claimed(curve, run, name), height=1.0))
+    legend = (("2", run.estimator),)
+    return CaseFigure(run.case, run.summary(), "", run.time, None, legend, tuple(panels))
+
+
+def sheet(figure: CaseFigure) -> Figure:
+    """Draw a figure with matplotlib."""
     style = STYLE | {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
     with mpl.rc_context(style):
-        sheet = Figure(figsize=_SHEET)
-        rows = sheet.subplots(
+        drawn = Figure(figsize=_SHEET)
+        rows = drawn.subplots(
             len(figure.panels),
             1,
             sharex=True,
             squeeze=False,
             gridspec_kw=_placed([panel.height for panel in figure.panels], len(figure.legend)),
         )[:, 0]
-        sheet.suptitle(f"{figure.name}: {figure.title}", fontsize=10, y=1.0 - 0.1 / _SHEET[1])
+        drawn.suptitle(f"{figure.name}: {figure.title}", fontsize=10, y=1.0 - 0.1 / _SHEET[1])
         for axes, panel in zip(rows, figure.panels, strict=True):
             for curve in panel.curves:
                 colour = LIGHT[curve.style]
@@ -213,7 +188,7 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
             axes.set_ylim(panel.low, panel.high)
         rows[-1].set_xlim(figure.time[0], figure.time[-1])
         rows[-1].set_xlabel("time [s]")
-        sheet.legend(
+        drawn.legend(
             [Line2D([], [], color=LIGHT[style]) for style, _ in figure.legend],
             [text for _, text in figure.legend],
             loc="lower center",
@@ -221,7 +196,14 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
             fontsize=8,
             frameon=False,
         )
-        save_figure(sheet, paths)
+    return drawn
+
+
+def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
+    """Draw a case with matplotlib, once, to each path (PNG or SVG by suffix)."""
+    drawn = sheet(figure)
+    with mpl.rc_context(STYLE | {"svg.fonttype": "none"}):
+        save_figure(drawn, paths)
 
 
 def _placed(heights: Sequence[float], entries: int) -> dict[str, Any]:
@@ -251,28 +233,77 @@ def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
         sheet.savefig(path, dpi=110, metadata={stamp: None})
 
 
-def _force(result: CaseResult, styles: dict[str, str]) -> tuple[list[Curve], tuple[float, float]]:
-    """Curves of the force [kN], and the range that serves them.
+def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
+    """One panel: what was measured of its signals, and what was estimated.
 
-    What was measured sets the range: an estimator may start or end with a spike, and the load
-    cell rings at standstill.
+    Of the judged signal, what was measured sets the range: an estimator may start or end with a
+    spike, and a sensor may ring.
     """
-    curves = list(_estimated(result, styles, "Fx", 1e3))
-    measured = result.measured_force()
-    if result.case.Fx is None or measured is None:
-        return curves, _range([curve.values for curve in curves])
-    curves.insert(0, Curve("raw", result.case.Fx / 1e3))
-    curves.append(Curve("measured", measured / 1e3))
-    return curves, _range([measured / 1e3], margin=0.25)
+    system, case = result.system, result.case
+    unit = shown_unit(system, view.signals[0])
+    fed = {one.name for one in (*system.inputs, *system.outputs)}
+    curves: list[Curve] = []
+    measured = None
+    for number, name in enumerate(view.signals):
+        factor, judged = per_shown(system, name, unit), name == system.objective.judged
+        if judged or name not in fed:
+            curves += _estimated(result, styles, name, factor)
+        if judged and (measured := result.measured()) is not None:
+            measured = measured / factor
+            if below(system):
+                curves.insert(0, Curve("raw", case[name] / factor))
+            curves.append(Curve("measured", measured))
+        elif name in case or any(one.name == name for one in system.derived):
+            values = system.signal(name, case.signals) / factor
+            curves.append(Curve("measured", values, dashed=number > 0))
+    signals = [curve.values for curve in curves]
+    low, high = _range(signals) if measured is None else _range([measured], margin=0.25)
+    return Panel(
+        titled(view, unit),
+        low if view.low is None else view.low,
+        high if view.high is None else view.high,
+        view.height,
+        tuple(curves),
+    )
 
 
-def _knowing(result: CaseResult, signal: str) -> list[tuple[str, Run]]:
-    """The estimators that know a signal."""
-    return [(n, run) for n, run in result.runs.items() if np.isfinite(run.signal(signal)).any()]
+def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
+    """Error of the judged signal by estimator."""
+    system = result.system
+    judged = system.objective.judged
+    unit = shown_unit(system, judged)
+    factor = per_shown(system, judged, unit)
+    curves = [
+        Curve(styles[name], error / factor)
+        for name in result.runs
+        if (error := result.error(name)) is not None
+    ]
+    reach = _reach([np.abs(curve.values[window]) for curve in curves])
+    within = f", {below(system)}" if below(system) else ""
+    title = f"Error of {judged}, estimated - measured{within} [{unit}]"
+    return Panel(title, -reach, reach, 1.1, tuple(curves))
 
 
-def _claimed(curve: Curve, claimed: NDArray[np.bool_]) -> list[Curve]:
+def _estimated(
+    result: CaseResult, styles: dict[str, str], signal: str, factor: float
+) -> list[Curve]:
+    """Curves of each estimator that knows the signal, with its standard deviation."""
+    curves = []
+    for name, run in result.runs.items():
+        if signal in run.columns and np.isfinite(run.signal(signal)).any():
+            sigma = result.sigma(name, signal)
+            scaled = None if sigma is None else sigma / factor
+            curves += _claimed(
+                Curve(styles[name], run.signal(signal) / factor, scaled), run, signal
+            )
+    return curves
+
+
+def _claimed(curve: Curve, run: Run, signal: str) -> list[Curve]:
     """A curve in up to two parts: what is claimed, and dashed what is not."""
+    if signal not in run.claimed:
+        return [curve]
+    claimed = run.claimed[signal]
     parts = (
         replace(curve, values=np.where(claimed, curve.values, np.nan)),
         Curve(curve.style, np.where(claimed, np.nan, curve.values), dashed=True),
@@ -280,16 +311,9 @@ def _claimed(curve: Curve, claimed: NDArray[np.bool_]) -> list[Curve]:
     return [part for part in parts if np.isfinite(part.values).any()]
 
 
-def _estimated(
-    result: CaseResult, styles: dict[str, str], signal: str, unit: float = 1.0
-) -> tuple[Curve, ...]:
-    """One curve for each estimator that knows the signal, with its standard deviation."""
-    curves = []
-    for name, run in _knowing(result, signal):
-        sigma = result.sigma(name, signal)
-        scaled = None if sigma is None else sigma / unit
-        curves.append(Curve(styles[name], run.signal(signal) / unit, scaled))
-    return tuple(curves)
+def _known(sigma: Vector) -> Vector | None:
+    """Standard deviations, or None where there is none."""
+    return None if np.isnan(sigma).all() else sigma
 
 
 def _panel(title: str, curves: Sequence[Curve], height: float) -> Panel:
@@ -318,23 +342,35 @@ def _reach(errors: Sequence[Vector]) -> float:
     return 1.1 * peaks[min(1, len(peaks) - 1)] if peaks else 1.0
 
 
-def _legend(result: CaseResult, name: str) -> str:
-    score = result.scores[name].Fx_nrmse
-    return label(name) if score is None else f"{label(name)} ({percent(score)})"
+def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]:
+    """Style and text of each entry."""
+    system, judged = result.system, result.system.objective.judged
+    entries = [("measured", "measured")]
+    if judged in result.case and below(system):
+        entries = [
+            ("measured", f"measured ({judged} {below(system)})"),
+            ("raw", f"measured {judged}, unfiltered"),
+        ]
+    for name, style in styles.items():
+        share, text = result.scores[name].nrmse, label(name, system)
+        entries.append((style, text if share is None else f"{text} ({percent(share)})"))
+    return entries
 
 
 def _finding(result: CaseResult) -> str:
     """Errors of the estimators, the least first."""
+    system, signal = result.system, result.system.objective.judged
     judged = sorted(
-        (score.Fx_nrmse, label(name), score.Fx_rms)
+        (score.nrmse, label(name, system), score.rms)
         for name, score in result.scores.items()
-        if score.Fx_nrmse is not None and score.Fx_rms is not None
+        if score.nrmse is not None and score.rms is not None
     )
     if not judged:
         reasons = sorted({score.reason for score in result.scores.values()})
         return f"Estimated, not judged: {'; '.join(reasons)}."
     share, first, rms = judged[0]
     others = ", ".join(f"{name} {percent(value)}" for value, name, _ in judged[1:])
-    return f"The {first} errs least: {percent(share)} of the mean creep force, {rms:.0f} N rms" + (
-        f"; {others}." if others else "."
+    return (
+        f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "
+        f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".")
     )

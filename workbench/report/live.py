@@ -10,19 +10,18 @@ from matplotlib.lines import Line2D
 
 from workbench.case import Case
 from workbench.errors import InputError
-from workbench.observers import ESTIMATE, Estimator
+from workbench.observers import Estimator
 from workbench.report.figures import ESTIMATORS, LIGHT
-from workbench.report.results import label
+from workbench.report.views import named, per_shown, shown_unit
+from workbench.system import System
 
 _PAUSE = 0.1  # [s] between two drawings
-_SIGNALS = ("Fx", "muWR", "muDC")
-_TITLES = ("Creep force Fx [kN]", "Friction wheel-rail muWR [1]", "Friction disc-pad muDC [1]")
-_UNITS = np.array([1e3, 1.0, 1.0])
-_COLUMNS = [list(ESTIMATE).index(name) for name in _SIGNALS]
 
 
 class LiveWindow:
-    """Creep force and frictions of one case at a time. Closing it ends the show, not the run.
+    """Judged signal and estimated quantities, one case at a time.
+
+    Closing it ends the show, not the run.
 
     Raises
     ------
@@ -30,11 +29,29 @@ class LiveWindow:
         If there is no display, or nothing to open a window with.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._signals = [system.objective.judged, *(one.name for one in system.estimated)]
+        units = [shown_unit(system, name) for name in self._signals]
+        self._titles = [
+            f"{named(system, name)} [{unit}]"
+            for name, unit in zip(self._signals, units, strict=True)
+        ]
+        self._units = np.array(
+            [per_shown(system, n, u) for n, u in zip(self._signals, units, strict=True)]
+        )
+        self._columns = [list(system.columns).index(name) for name in self._signals]
         try:
-            self._figure, self._axes = plt.subplots(
-                3, 1, sharex=True, height_ratios=[2, 1, 1], figsize=(9, 7), layout="constrained"
+            self._figure, axes = plt.subplots(
+                len(self._signals),
+                1,
+                sharex=True,
+                squeeze=False,
+                height_ratios=[2, *[1] * len(system.estimated)],
+                figsize=(9, 7),
+                layout="constrained",
             )
+            self._axes = axes[:, 0]
             framework = self._figure.canvas.required_interactive_framework
             found = f"no window (matplotlib fell back on '{plt.get_backend()}')"
         except ImportError as error:
@@ -54,21 +71,22 @@ class LiveWindow:
         """Step each estimator through a recording, one after the other, and draw what it says."""
         if not self._open():
             return
-        force, *frictions = self._axes
-        for axes, title in zip(self._axes, _TITLES, strict=True):
+        judged, *quantities = self._axes
+        for axes, title in zip(self._axes, self._titles, strict=True):
             axes.clear()
             axes.set_title(title, loc="left", fontsize=9)
             axes.grid(alpha=0.25)
         self._axes[-1].set_xlabel("time [s]")
-        force.set_xlim(case.time[0], case.time[-1])
-        for axes in frictions:
-            axes.set_ylim(0.0, 0.6)
-        if case.Fx is not None:
-            force.plot(case.time, case.Fx / 1e3, color=LIGHT["raw"], lw=0.5, label="measured")
+        judged.set_xlim(case.time[0], case.time[-1])
+        for axes, one in zip(quantities, self._system.estimated, strict=True):
+            axes.set_ylim(one.low, one.high)
+        if self._signals[0] in case:
+            measured = case[self._signals[0]] / self._units[0]
+            judged.plot(case.time, measured, color=LIGHT["raw"], lw=0.5, label="measured")
         for estimator, style in zip(estimators, cycle(ESTIMATORS), strict=False):
-            name = label(estimator.name)
+            name = estimator.label
             lines = [axes.plot([], [], color=LIGHT[style], label=name)[0] for axes in self._axes]
-            force.legend(loc="lower center", ncols=4, fontsize=8)
+            judged.legend(loc="lower center", ncols=4, fontsize=8)
             self._figure.suptitle(f"{case.name}: {name}", fontsize=10)
             self._step(case, estimator, lines)
 
@@ -80,11 +98,11 @@ class LiveWindow:
 
     def _step(self, case: Case, estimator: Estimator, lines: Sequence[Line2D]) -> None:
         u, y = case.u, case.y
-        values = np.full((case.time.size, len(_SIGNALS)), np.nan)
+        values = np.full((case.time.size, len(self._signals)), np.nan)
         drawn = time.monotonic()
         for k, t in enumerate(case.time):
             advance = estimator.init if k == 0 else estimator.step
-            values[k] = advance(t, u[k], y[k]).values[_COLUMNS] / _UNITS
+            values[k] = advance(t, u[k], y[k]).values[self._columns] / self._units
             last = k == case.time.size - 1
             if last or time.monotonic() - drawn > _PAUSE:
                 if not self._open():

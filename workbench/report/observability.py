@@ -1,7 +1,6 @@
-"""Observability of states and frictions: figure, files and table."""
+"""Observability of states and estimated quantities: figure, files and table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,137 +8,138 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from workbench.case import Case
-from workbench.cosim import Run
 from workbench.files import write_json, write_whole
 from workbench.observability import (
-    FRICTION_PRIOR,
-    FRICTIONS,
     STRIDE,
-    USEFUL,
     WINDOW,
-    BrakingPoint,
+    CaseObservability,
     LinearTest,
-    SensorNoise,
     WindowTest,
+    prior,
 )
 from workbench.report.figures import STYLE, save_figure
+from workbench.report.views import called, per_shown, shown_unit
+from workbench.system import System
 
 _COLOURS = ("#0072B2", "#D55E00")
 _LINES = ("-", "--")
 
 
-@dataclass(frozen=True)
-class StopObservability:
-    """Tests of several models along one recorded stop.
-
-    Attributes
-    ----------
-    case : the recording.
-    run : the estimate that makes the trajectory.
-    braking : (m,) windows that end while braking.
-    tests : one per model, with the same windows.
-    """
-
-    case: Case
-    run: Run
-    braking: NDArray[np.bool_]
-    tests: tuple[WindowTest, ...]
-
-
-def draw_observability(stop: StopObservability, path: Path) -> None:
-    """Draw one stop to `path` (PNG): pressure and slip, then the bounds of both frictions.
+def draw_observability(one: CaseObservability, path: Path) -> None:
+    """Draw one recording to `path` (PNG): an input and an output, then the bounds of quantities.
 
     Bounds are drawn at the end of their window and shaded where the first model's are useful.
     """
-    case = stop.case
+    system, case = one.system, one.case
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
-        inputs, *rows = figure.subplots(3, 1, sharex=True)
+        top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
         figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
-        inputs.plot(case.time, case.pB / 1e5, color="#D55E00", label="pB")
-        inputs.set_ylabel("pB [bar]")
-        slip = inputs.twinx()
-        slip.plot(case.time, stop.run.signal("slip"), color="#0072B2", label="slip")
-        slip.set_ylabel("slip velocity [m/s]")
-        slip.grid(visible=False)
-        slip.spines["right"].set_visible(True)
-        handles = [*inputs.get_lines(), *slip.get_lines()]
-        inputs.legend(handles, [str(h.get_label()) for h in handles], loc="upper right", ncols=2)
-        for j, (axes, name) in enumerate(zip(rows, FRICTIONS, strict=True)):
-            for test, colour, line in zip(stop.tests, _COLOURS, _LINES, strict=False):
-                axes.semilogy(test.time, test.bound[:, j], line, color=colour, label=test.model)
-            first = stop.tests[0]
-            axes.fill_between(
-                first.time,
-                0.0,
-                1.0,
-                where=list(first.frictions_useful()[:, j]),
-                transform=axes.get_xaxis_transform(),
-                color=_COLOURS[0],
-                alpha=0.08,
-                linewidth=0,
-            )
-            limit, prior = USEFUL[name], FRICTION_PRIOR[j]
-            axes.axhline(limit, color="black", linewidth=0.8, label=f"useful below {limit:g}")
-            axes.axhline(
-                prior, color="#999999", linewidth=0.8, linestyle=":", label="known beforehand"
-            )
-            axes.set_ylabel(f"bound of {name} [1]")
-            # Room for the legend above the prior of 0.10.
-            axes.set_ylim(3e-5, 2.0)
-            axes.legend(loc="upper center", ncols=4, fontsize=7)
+        first, unit = system.inputs[0], system.inputs[0].shown
+        values = case[first.name] / per_shown(system, first.name, unit)
+        top.plot(case.time, values, color="#D55E00", label=first.name)
+        top.set_ylabel(f"{first.name} [{unit}]")
+        beside = _beside(system)
+        other = top.twinx()
+        other.plot(case.time, one.run.signal(beside), color="#0072B2", label=beside)
+        other.set_ylabel(f"{called(system, beside)} [{system.unit(beside)}]")
+        other.grid(visible=False)
+        other.spines["right"].set_visible(True)
+        handles = [*top.get_lines(), *other.get_lines()]
+        top.legend(handles, [str(h.get_label()) for h in handles], loc="upper right", ncols=2)
+        for j, axes in enumerate(rows):
+            _draw_bounds(one, j, axes)
         rows[-1].set_xlabel("time [s]")
         figure.align_ylabels()
         save_figure(figure, [path])
 
 
-def write_windows(stop: StopObservability, path: Path) -> None:
-    """Write one CSV of a stop: end of the window, then bounds and remaining shares by model."""
-    first = stop.tests[0]
-    at = np.searchsorted(stop.case.time, first.time)
-    columns = {
-        "time [s]": first.time,
-        "pB [bar]": stop.case.pB[at] / 1e5,
-        "slip [m/s]": stop.run.signal("slip")[at],
-        "muWR [1]": stop.run.signal("muWR")[at],
-        "muDC [1]": stop.run.signal("muDC")[at],
-        "braking [1]": stop.braking.astype(int),
-    }
-    for test in stop.tests:
-        for j, name in enumerate(FRICTIONS):
-            columns[f"{test.model}.bound_{name} [1]"] = test.bound[:, j]
+def _beside(system: System) -> str:
+    """What shows the state of the machine beside its first input: what the model reports last."""
+    return [*(one.name for one in system.outputs), *system.reported][-1]
+
+
+def _draw_bounds(one: CaseObservability, j: int, axes: Any) -> None:
+    """Bounds of quantity j by all models."""
+    quantity, known = one.system.estimated[j], float(prior(one.system)[j])
+    for test, colour, line in zip(one.tests, _COLOURS, _LINES, strict=False):
+        axes.semilogy(test.time, test.bound[:, j], line, color=colour, label=test.model)
+    first = one.tests[0]
+    axes.fill_between(
+        first.time,
+        0.0,
+        1.0,
+        where=list(first.useful()[:, j]),
+        transform=axes.get_xaxis_transform(),
+        color=_COLOURS[0],
+        alpha=0.08,
+        linewidth=0,
+    )
+    axes.axhline(
+        quantity.useful, color="black", linewidth=0.8, label=f"useful below {quantity.useful:g}"
+    )
+    axes.axhline(known, color="#999999", linewidth=0.8, linestyle=":", label="known beforehand")
+    axes.set_ylabel(f"bound of {quantity.correction} [{quantity.unit}]")
+    # Room for the legend above the prior.
+    axes.set_ylim(3e-4 * known, 20.0 * known)
+    axes.legend(loc="upper center", ncols=4, fontsize=7)
+
+
+def write_windows(one: CaseObservability, path: Path) -> None:
+    """Write one CSV of a recording: end of the window, bounds and remaining shares by model."""
+    system, first = one.system, one.tests[0]
+    at = np.searchsorted(one.case.time, first.time)
+    columns: dict[str, Any] = {"time [s]": first.time}
+    for signal in system.inputs:
+        factor = per_shown(system, signal.name, signal.shown)
+        columns[f"{signal.name} [{signal.shown}]"] = one.case[signal.name][at] / factor
+    for name in (*system.reported, *(quantity.name for quantity in system.estimated)):
+        columns[f"{name} [{system.unit(name)}]"] = one.run.signal(name)[at]
+    columns["judged [1]"] = one.judged.astype(int)
+    for test in one.tests:
+        for j, quantity in enumerate(system.estimated):
+            columns[f"{test.model}.bound_{quantity.correction} [{quantity.unit}]"] = test.bound[
+                :, j
+            ]
         for j, name in enumerate(test.states):
             columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
     write_whole(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
 
 
 def write_observability(
+    system: System,
     linear: Sequence[LinearTest],
-    stops: Sequence[StopObservability],
+    done: Sequence[CaseObservability],
     provenance: Mapping[str, Any],
     path: Path,
 ) -> None:
-    """Write observability.json: the linear test of each model, shares of each stop."""
+    """Write observability.json: the linear test of each model, shares of each recording."""
+    point = system.tested
     summary = {
         "provenance": provenance,
-        "operating_point": asdict(BrakingPoint()),
-        "noise": asdict(SensorNoise()),
+        "operating_point": {
+            "inputs": dict(point.inputs),
+            "held": {name: formula.text for name, formula in point.held.items()},
+            "quantities": dict(point.quantities),
+        },
+        "noise": {
+            one.name: {"absolute": one.noise, "relative": one.relative_noise}
+            for one in (*system.inputs, *system.outputs)
+        },
         "window_s": WINDOW,
         "stride_s": STRIDE,
-        "prior": dict(zip(FRICTIONS, FRICTION_PRIOR.tolist(), strict=True)),
-        "useful": USEFUL,
+        "prior": dict(zip(system.corrections, prior(system).tolist(), strict=True)),
+        "useful": {one.correction: one.useful for one in system.estimated},
         "linear": {test.model: _linear(test) for test in linear},
         "cases": {
-            stop.case.name: {
-                "title": stop.case.title,
-                "braking_windows": int(stop.braking.sum()),
-                "median_muWR": _median_adhesion(stop),
-                "models": {test.model: _shares(test, stop) for test in stop.tests},
+            one.case.name: {
+                "title": one.case.title,
+                "judged_windows": int(one.judged.sum()),
+                **{f"median_{name}": value for name, value in _medians(one).items()},
+                "models": {test.model: _shares(test, one) for test in one.tests},
             }
-            for stop in stops
+            for one in done
         },
     }
     write_json(path, summary)
@@ -161,32 +161,48 @@ def _linear(test: LinearTest) -> dict[str, Any]:
     }
 
 
-def _median_adhesion(stop: StopObservability) -> float | None:
-    """Friction wheel-rail of the trajectory, on which the bound of dmuWR depends most."""
-    at = np.searchsorted(stop.case.time, stop.tests[0].time[stop.braking])
-    return float(np.median(stop.run.signal("muWR")[at])) if at.size else None
+def _medians(one: CaseObservability) -> dict[str, float | None]:
+    """Quantities of the trajectory, on which their bounds depend; None if nothing is judged."""
+    at = np.searchsorted(one.case.time, one.tests[0].time[one.judged])
+    names = [quantity.name for quantity in one.system.estimated]
+    return {n: float(np.median(one.run.signal(n)[at])) if at.size else None for n in names}
 
 
-def _shares(test: WindowTest, stop: StopObservability) -> dict[str, Any]:
-    """Shares of the braking windows; None for a stop without braking."""
-    if not stop.braking.any():
+def _shares(test: WindowTest, one: CaseObservability) -> dict[str, Any]:
+    """Shares of the judged windows; None for a recording without."""
+    if not one.judged.any():
         return {"useful": None, "median_bound": None, "states_observable": None}
-    useful = test.frictions_useful()[stop.braking].mean(axis=0)
-    median = np.median(test.bound[stop.braking], axis=0)
-    observable = test.states_observable()[stop.braking].mean(axis=0)
+    useful = test.useful()[one.judged].mean(axis=0)
+    median = np.median(test.bound[one.judged], axis=0)
+    observable = test.states_observable()[one.judged].mean(axis=0)
+    names = one.system.corrections
     return {
-        "useful": dict(zip(FRICTIONS, useful.tolist(), strict=True)),
-        "median_bound": dict(zip(FRICTIONS, median.tolist(), strict=True)),
+        "useful": dict(zip(names, useful.tolist(), strict=True)),
+        "median_bound": dict(zip(names, median.tolist(), strict=True)),
         "states_observable": dict(zip(test.states, observable.tolist(), strict=True)),
     }
 
 
-def format_observability(linear: Sequence[LinearTest], stops: Sequence[StopObservability]) -> str:
-    """Table for the terminal: linear test by model and state, then shares of braking by case."""
-    point = BrakingPoint()
+def format_observability(
+    system: System, linear: Sequence[LinearTest], done: Sequence[CaseObservability]
+) -> str:
+    """Table for the terminal: linear test by model and state, shares of judged time by case."""
+    return "\n".join(
+        [
+            *_linear_lines(system, linear),
+            "",
+            *_case_lines(system, done),
+            "Bounds are floors, for a right model at the estimated quantities (their medians), "
+            "which are constant within\nthe window. An estimate may err by far more where the "
+            "model differs.",
+        ]
+    )
+
+
+def _linear_lines(system: System, linear: Sequence[LinearTest]) -> list[str]:
     lines = [
-        f"Linear test: one second at {point.speed:g} m/s, {point.pressure / 1e5:g} bar, "
-        f"muWR {point.muWR:g}; left = standard deviation after it over before it"
+        f"Linear test: one second at {_point(system)}; left = standard deviation after it over "
+        "before it"
     ]
     for test in linear:
         verdict = "observable" if test.observable else "not observable"
@@ -197,33 +213,47 @@ def format_observability(linear: Sequence[LinearTest], stops: Sequence[StopObser
             strength = "invisible" if name in test.invisible else "weak"
             remark = f"  {strength}" if name in test.unobservable else ""
             lines.append(f"  {name:<10} scale {scale:8.3g}   left {100 * left:6.2f} %{remark}")
-    width = max([len("case"), *(len(stop.case.name) for stop in stops)])
-    header = f"{'case':<{width}}{'muWR':>7}" + "".join(
-        f"{f'{name} < {USEFUL[name]:g}':>16}{'median':>10}" for name in FRICTIONS
+    return lines
+
+
+def _point(system: System) -> str:
+    """The operating point in the units of people."""
+    parts = []
+    for name, value in system.tested.inputs.items():
+        unit = shown_unit(system, name)
+        parts.append(f"{name} {value / per_shown(system, name, unit):g} {unit}")
+    parts += [f"{name} {formula.text}" for name, formula in system.tested.held.items()]
+    parts += [f"{name} {value:g}" for name, value in system.tested.quantities.items()]
+    return ", ".join(parts) or "rest"
+
+
+def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
+    first, last = done[0].tests[0], done[0].tests[-1]
+    width = max([len("case"), *(len(one.case.name) for one in done)])
+    header = f"{'case':<{width}}" + "".join(
+        f"{one.name:>9}{f'{one.correction} < {one.useful:g}':>16}{'median':>10}"
+        for one in system.estimated
     )
-    hidden = [n for n in stops[0].tests[-1].states if n not in stops[0].tests[0].states]
+    hidden = [name for name in last.states if name not in first.states]
     header += "".join(f"{name:>11}" for name in hidden)
-    lines += [
-        "",
-        f"Share of braking time in which {WINDOW:g} s of samples tell: dmuWR, dmuDC "
-        f"({stops[0].tests[0].model}), states ({stops[0].tests[-1].model})",
+    lines = [
+        f"Share of time {system.objective.when or 'that is judged'} in which {WINDOW:g} s of "
+        f"samples tell: {', '.join(system.corrections)} ({first.model})"
+        + (f", states ({last.model})" if hidden else ""),
         header,
         "-" * len(header),
     ]
-    for stop in stops:
-        row = f"{stop.case.name:<{width}}"
-        frictions, states = _shares(stop.tests[0], stop), _shares(stop.tests[-1], stop)
-        if frictions["useful"] is None:
-            lines.append(f"{row}  no braking")
+    for one in done:
+        row = f"{one.case.name:<{width}}"
+        shares, states = _shares(one.tests[0], one), _shares(one.tests[-1], one)
+        if shares["useful"] is None:
+            lines.append(f"{row}  nothing is judged")
             continue
-        row += f"{_median_adhesion(stop):>7.2f}"
-        for name in FRICTIONS:
-            row += f"{100 * frictions['useful'][name]:>14.0f} %"
-            row += f"{frictions['median_bound'][name]:>10.2g}"
+        medians = _medians(one)
+        for quantity in system.estimated:
+            row += f"{medians[quantity.name]:>9.2g}"
+            row += f"{100 * shares['useful'][quantity.correction]:>14.0f} %"
+            row += f"{shares['median_bound'][quantity.correction]:>10.2g}"
         row += "".join(f"{100 * states['states_observable'][name]:>9.0f} %" for name in hidden)
         lines.append(row)
-    lines.append(
-        "Bounds are floors, for a right model at the estimated muWR (median) and friction that is "
-        "constant within\nthe window. An estimate may err by far more where the contact differs."
-    )
-    return "\n".join(lines)
+    return lines

@@ -139,7 +139,7 @@ function zoomable(figure) {
     ["−", "Zoom out", () => zoom(2), ["-"]],
     ["←", "Earlier", () => move(-0.25), ["ArrowLeft"]],
     ["→", "Later", () => move(0.25), ["ArrowRight"]],
-    ["Whole stop", "Whole stop", whole, ["0", "Home"]],
+    ["Whole recording", "Whole recording", whole, ["0", "Home"]],
   ];
   const tools = document.createElement("div");
   tools.className = "tools";
@@ -229,7 +229,7 @@ function zoomable(figure) {
       draw();
     });
   }
-  range.value = "whole stop";
+  range.value = "whole recording";
 }
 
 document.documentElement.classList.add("script");

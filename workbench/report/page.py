@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from workbench.files import write_whole
-from workbench.objective import BANDWIDTH, FIRST_PRESSURE, LOWEST_SPEED
 from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
+from workbench.report.results import label
 from workbench.report.templates import environment
+from workbench.report.views import below, called, inverse, rounded, window
+from workbench.system import System
 
 _SIZE = 4.5e6  # [byte] that all curves may take, so that a page opens at once
 _BLOCK = 13  # [byte] two points of a noisy curve
@@ -29,7 +31,7 @@ class Standing:
     Attributes
     ----------
     name : key in the summary.
-    worst, median : error of Fx, rms over mean [1].
+    worst, median : error of the judged signal, rms over mean [1].
     case : where it was worst.
     z : largest objective z_k [1].
     judged : number of cases with an error.
@@ -45,14 +47,20 @@ class Standing:
     seconds: float
 
 
-def standings(summary: Mapping[str, Any]) -> list[Standing]:
-    """Estimators, the one with the least worst case first; those never judged last."""
+def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
+    """Estimators, the one with the least worst case first; those never judged last.
+
+    Parameters
+    ----------
+    judged : name of the judged signal.
+    """
     cases: Mapping[str, Any] = summary["cases"]
     names = list(next(iter(cases.values()))["estimators"])
     table = []
     for name in names:
         scores = {case: values["estimators"][name] for case, values in cases.items()}
-        errors = {case: s["Fx_nrmse"] for case, s in scores.items() if s["Fx_nrmse"] is not None}
+        shares = {case: s[f"{judged}_nrmse"] for case, s in scores.items()}
+        errors = {case: share for case, share in shares.items() if share is not None}
         worst = max(errors, key=lambda case: errors[case], default="")
         table.append(
             Standing(
@@ -70,7 +78,11 @@ def standings(summary: Mapping[str, Any]) -> list[Standing]:
 
 
 def write_page(
-    summary: Mapping[str, Any], figures: Sequence[CaseFigure], planned: int, path: Path
+    system: System,
+    summary: Mapping[str, Any],
+    figures: Sequence[CaseFigure],
+    planned: int,
+    path: Path,
 ) -> None:
     """Write the page; files of each case are expected beside it.
 
@@ -80,7 +92,8 @@ def write_page(
     figures : one per case of the summary.
     planned : number of cases that were asked for; more than there are after an interruption.
     """
-    ranking = standings(summary)
+    judged = system.objective.judged
+    ranking = standings(summary, judged)
     best = ranking[0]
     # A band has two edges of a quarter of the blocks.
     curves = sum(
@@ -93,11 +106,11 @@ def write_page(
     drawn = {figure.name: drawing(figure, blocks) for figure in figures}
 
     def badness(name: str) -> float:
-        error = summary["cases"][name]["estimators"][best.name]["Fx_nrmse"]
+        error = summary["cases"][name]["estimators"][best.name][f"{judged}_nrmse"]
         return -np.inf if error is None else float(error)
 
     text = (
-        environment()
+        environment(lambda name: label(name, system))
         .get_template("page.html")
         .render(
             summary=summary,
@@ -106,9 +119,18 @@ def write_page(
             order=sorted(drawn, key=badness, reverse=True),
             drawings=drawn,
             planned=planned,
-            bandwidth=BANDWIDTH,
-            first_pressure=FIRST_PRESSURE / 1e5,
-            lowest_speed=LOWEST_SPEED,
+            judged=judged,
+            unit=system.unit(judged),
+            called=called(system, judged),
+            when=system.objective.when or window(system),
+            window=window(system),
+            below=below(system),
+            fed=judged in (one.name for one in system.outputs),
+            rounded=rounded,
+            weights=[
+                (weight, inverse(system.unit(name)), name)
+                for name, weight in system.objective.weights.items()
+            ],
         )
     )
     write_whole(path, text)

@@ -1,15 +1,25 @@
 """Templates of the pages, and what all of them share: one file each, readable without scripts."""
 
 import re
+from collections.abc import Callable
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from workbench.report.figures import DARK, LIGHT
-from workbench.report.results import label, percent
+from workbench.report.results import percent
 
 
-def environment() -> Environment:
-    """Where the pages find templates, filters and the colours of curves."""
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def environment(label: Callable[[str], str] = _spaced) -> Environment:
+    """Where the pages find templates, filters and the colours of curves.
+
+    Parameters
+    ----------
+    label : name of an estimator or of an entry, for people.
+    """
     found = Environment(
         autoescape=True,
         loader=PackageLoader("workbench", "report"),

@@ -152,6 +152,10 @@ class DiscObserver(DisturbanceObserver):
         )
         self._temperature = np.zeros(1)
 
+    def settings(self) -> dict[str, object]:
+        """Gains, and constants of the discs."""
+        return {**super().settings(), "disc": self._disc.disc._asdict()}
+
     def _arguments(self) -> tuple[Any, Any]:
         return self._disc, _DiscMemory(self._memory, self._temperature)
 

@@ -1,0 +1,233 @@
+"""A machine of another kind, by its system file alone: simulated, drawn and tested like any other."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import lxml.html
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.case import Case, read_case
+from workbench.fmu import FMU
+from workbench.observability import case_observability, linear_test
+from workbench.observers import choose
+from workbench.report import case_figure, format_table, summarise, write_estimates, write_page
+from workbench.report.observability import (
+    draw_observability,
+    format_observability,
+    write_observability,
+    write_windows,
+)
+from workbench.report.views import views
+from workbench.simulation import CaseResult, prepare, simulate
+from workbench.system import System
+from workbench.systems import load_system, open_model
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench import compiler  # noqa: E402  (needs the extra)
+
+MODEL = """
+within ;
+package Boiler
+  model Vessel "Water that is heated through its wall, above the temperature of the room"
+    parameter Real C(unit = "J/K") = 2000 "Heat capacity of the water";
+    parameter Real CWall(unit = "J/K") = 500 "Heat capacity of the wall";
+    parameter Real GWall(unit = "W/K") = 100 "From the wall to the water";
+    parameter Real G(unit = "W/K") = 10 "From the water to the room";
+    input Real P(unit = "W") "Heat into the wall";
+    input Real dG(unit = "W/K") "Correction of G";
+    Real T(unit = "K", start = 0.0, fixed = true, nominal = 50) "Water";
+    Real TWall(unit = "K", start = 0.0, fixed = true, nominal = 50) "Wall";
+    output Real TSkin(unit = "K") "Skin, between wall and water";
+  equation
+    CWall*der(TWall) = P - GWall*(TWall - T);
+    C*der(T) = GWall*(TWall - T) - (G + dG)*T;
+    TSkin = 0.7*TWall + 0.3*T;
+  end Vessel;
+end Boiler;
+"""
+SYSTEM = """
+name = "boiler"
+title = "Water in a vessel"
+sample_time = "0.5 s"
+
+[models]
+observer = { class = "Vessel", fmu = "Vessel.fmu" }
+
+[inputs.P]
+unit = "W"
+shown = "kW"
+label = "heating power"
+noise = "1 W"
+scale = "1 kW"
+
+[outputs.TSkin]
+unit = "K"
+label = "temperature of the skin"
+noise = "0.02 K"
+scale = "50 K"
+
+[outputs.T]
+unit = "K"
+label = "temperature of the water"
+noise = "0.02 K"
+scale = "50 K"
+
+[estimated.G]
+correction = "dG"
+label = "loss"
+unit = "W/K"
+range = ["1 W/K", "40 W/K"]
+walk = "0.1 W/K"
+acts_on = "T"
+
+[points]
+settles = "2000 s"
+
+[points.design]
+inputs = { P = "500 W" }
+
+[objective]
+judged = "T"
+"""
+TRUE_LOSS = 14.0  # [W/K], nominal is 10
+
+
+@pytest.fixture(scope="module")
+def boiler(tmp_path_factory: pytest.TempPathFactory) -> System:
+    folder = tmp_path_factory.mktemp("boiler")
+    package = folder / "package.mo"
+    package.write_text(MODEL)
+    compiler.build(package, "Boiler.Vessel", folder / "Vessel.fmu", platforms=(compiler.native(),))
+    (folder / "system.toml").write_text(SYSTEM)
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """Ten minutes of heating a vessel that loses more than its model says."""
+    folder = tmp_path_factory.mktemp("case") / "01_heating"
+    folder.mkdir()
+    time = np.arange(0.0, 600.0, 0.5)
+    power = np.where(time > 20.0, 800.0, 0.0)
+    rows = []
+    with FMU(boiler.models["observer"].path) as fmu:
+        fmu.start({}, {"G": TRUE_LOSS})
+        driven, seen = fmu.variables(["P"]), fmu.variables(["TSkin", "T"])
+        for value in power:
+            fmu.set(driven, np.array([value]))
+            rows.append(fmu.get(seen).copy())
+            fmu.step(0.5)
+    rng = np.random.default_rng(1)
+    noisy = np.array(rows) + rng.normal(0.0, 0.02, (time.size, 2))
+    columns = {"time [s]": time, "P [W]": power, "TSkin [K]": noisy[:, 0], "T [K]": noisy[:, 1]}
+    pd.DataFrame(columns).to_csv(folder / "measured.csv", index=False)
+    text = 'title = "Heating"\n[measurement]\nfile = "measured.csv"\n'
+    (folder / "case.toml").write_text(text)
+    return read_case(folder, boiler)
+
+
+@pytest.fixture(scope="module")
+def result(boiler: System, case: Case) -> CaseResult:
+    (result,) = simulate(prepare(boiler, choose(boiler, []), {}), [case])
+    return result
+
+
+def test_every_general_estimator_finds_the_loss(result: CaseResult) -> None:
+    assert {"open_loop", "disturbance_observer", "parameter_estimator", "ekf", "ukf"} <= set(
+        result.runs
+    )
+    for name, run in result.runs.items():
+        assert run.ending.name == "OK"
+        if name != "open_loop":
+            # 2 % of the loss are 0.3 W/K, three times the walk that is allowed within a second.
+            assert_allclose(run.signal("G")[-100:].mean(), TRUE_LOSS, rtol=0.02)
+            # The slowest, whose integral takes six minutes, has most of its error while it learns.
+            assert result.scores[name].nrmse < 0.25 * result.scores["open_loop"].nrmse
+
+
+def test_panels_follow_from_signals_where_none_are_declared(result: CaseResult) -> None:
+    assert [panel.title for panel in case_figure(result).panels] == [
+        "Temperature of the skin TSkin [K]",
+        "Heating power P [kW]",
+        "Temperature of the water T [K]",
+        "Error of T, estimated - measured [K]",
+        "Loss G [W/K]",
+    ]
+    assert result.case["P"].max() / 1e3 < case_figure(result).panels[1].high < 1.0
+
+
+def test_outputs_of_one_unit_share_a_panel(boiler: System) -> None:
+    """Where another signal is judged, which has a panel of its own."""
+    judged = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
+    other = replace(
+        boiler, judged=(judged,), objective=replace(boiler.objective, judged=judged.name)
+    )
+    titles = [view.title for view in views(other)]
+    assert titles[0] == "Temperature of the skin TSkin (solid), temperature of the water T (dashed)"
+    assert "Temperature of the room TRoom" in titles
+
+
+def test_table_and_page_speak_of_the_judged_signal(result: CaseResult, tmp_path: Path) -> None:
+    system = result.system
+    table = format_table(system, [result])
+    assert table.startswith("Error of T, rms / mean (over the whole recording)")
+    provenance = {
+        "workbench": "0",
+        "commit": None,
+        "python": "3",
+        "packages": {},
+        "fmu": {"file": "Vessel.fmu", "model": "Vessel", "sha256": "0" * 64},
+    }
+    summary = summarise(system, [result], provenance)
+    assert {"T_rms_K", "T_nrmse"} <= set(summary["cases"]["01_heating"]["estimators"]["ekf"])
+    # Nothing says otherwise: each deviation counts by the size of its signal.
+    assert summary["weights"] == {"TSkin": 0.02, "T": 0.02}
+    write_page(system, summary, [case_figure(result)], 1, tmp_path / "index.html")
+    text = lxml.html.fromstring((tmp_path / "index.html").read_bytes()).text_content()
+    assert "Temperature of the water estimated on one recording" in text
+    assert "0.02 1/K · |error of T|" in text
+    for word in ("Hz", "force", "friction", "brak", "omega"):
+        assert word not in text
+
+
+def test_columns_of_the_data_are_the_signals(result: CaseResult, tmp_path: Path) -> None:
+    write_estimates(result, tmp_path / "case.csv")
+    columns = list(pd.read_csv(tmp_path / "case.csv"))
+    assert columns[:4] == ["time [s]", "measured.P [W]", "measured.TSkin [K]", "measured.T [K]"]
+    assert {"ekf.G [W/K]", "ekf.sigma_G [W/K]", "ekf.T_error [K]"} <= set(columns)
+    assert not [name for name in columns if "claimed" in name]
+
+
+def test_results_are_tables_figures_and_text_in_a_notebook(result: CaseResult) -> None:
+    run = result.runs["ekf"]
+    assert list(run.to_frame())[:2] == ["time [s]", "TSkin [K]"]
+    assert len(run.plot().axes) == len(run.columns)
+    assert len(result.plot().axes) == 5
+    assert "ekf on 01_heating: ran to the end" in run.summary()
+    assert run.to_dict()["samples"] == run.time.size
+    assert "<table" in run._repr_html_()
+    assert "<table" in result._repr_html_()
+    assert "T_nrmse" in result.summary()
+
+
+def test_outputs_that_are_no_states_tell_of_states_and_loss(
+    boiler: System, case: Case, tmp_path: Path
+) -> None:
+    with open_model(boiler) as fmu:
+        linear = linear_test(fmu, boiler)
+    assert linear.observable
+    one = case_observability(boiler, {"observer": linear.scale}, case)
+    # Nothing is lost to a room of the same temperature: before it is heated only the prior holds.
+    prior = (40.0 - 1.0) / np.sqrt(12.0)
+    assert_allclose(one.tests[0].bound[:20, 0], prior, rtol=0.01)
+    assert one.tests[0].bound[-1, 0] < 0.5 * prior
+    write_windows(one, tmp_path / "case.csv")
+    draw_observability(one, tmp_path / "case.png")
+    write_observability(boiler, [linear], [one], {}, tmp_path / "observability.json")
+    assert "Vessel.bound_dG [W/K]" in pd.read_csv(tmp_path / "case.csv")
+    assert "Vessel: rank 2 of 2, observable" in format_observability(boiler, [linear], [one])

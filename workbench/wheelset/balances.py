@@ -1,0 +1,77 @@
+"""Balances of wheelset and roller, and the slip law: what a stop has beyond the model."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from workbench.case import Case
+from workbench.diagnosis.samples import Samples
+from workbench.fmu import Vector
+from workbench.system import System
+
+# Torque or slip that the measurement has beyond the model.
+UNITS = {"wheelset": "N.m", "roller": "N.m", "slip": "m/s"}
+
+_WINDOW = 0.5  # [s] of smoothing, as short as the noise of differentiated speeds allows
+
+
+def balances(
+    system: System, case: Case, recorded: Samples, values: Mapping[str, float]
+) -> dict[str, Vector]:
+    """Balances and slip law from smoothed signals, (n,), NaN where the stop does not count.
+
+    The wheelset's balance and the slip law need Fx.
+
+    Parameters
+    ----------
+    values : parameters of the model in this stop.
+    """
+    h = float(np.median(np.diff(case.time)))
+    width = max(5, round(_WINDOW / h) | 1)
+    pB, tauR, (omegaW, omegaR) = recorded.u[:, 0], recorded.u[:, 1], recorded.y.T[:2]
+
+    def smooth(signal: Vector, order: int = 0) -> Vector:
+        result: Vector = savgol_filter(signal, width, 2, deriv=order, delta=h)
+        return result
+
+    rW, rR = values["rW"], values["rR"]
+    force = values["actuation.kappa"] * np.maximum(0.0, smooth(pB) - values["actuation.p0"])
+    direction = np.sign(smooth(omegaR))
+    brake = 3.0 * values["muDC"] * force * values["rB"] * direction
+
+    def loss(omega: Vector, slot: str) -> Vector:
+        c0, c1, c2 = (values[name] for name in _losses(values, slot))
+        return (c0 + c1 * np.abs(omega) + c2 * omega**2) * direction
+
+    counts = np.zeros(case.time.size, bool)
+    for first, end in recorded.blocks:
+        counts[first:end] = True
+
+    def shown(signal: Vector) -> Vector:
+        return np.where(counts, signal, np.nan)
+
+    v = rR * smooth(omegaR)
+    found = {"slip": shown(v - rW * smooth(omegaW))}
+    if "Fx" in case:
+        Fx = smooth(recorded.y[:, 2])
+        wheelset = values["JW"] * smooth(omegaW, 1) + brake + loss(smooth(omegaW), "wheelsetLoss")
+        roller = values["JR"] * smooth(omegaR, 1) + rR * Fx + loss(smooth(omegaR), "rollerLoss")
+        found |= {"wheelset": shown(rW * Fx - wheelset), "roller": shown(smooth(tauR) - roller)}
+        found["slip"] = found["slip"] - shown(Fx * np.abs(v) / _stiffness(values))
+    return found
+
+
+def _losses(values: Mapping[str, float], slot: str) -> list[str]:
+    """Names of c0, c1, c2 of a loss, wherever the slot's component keeps them."""
+    return [
+        next(name for name in values if name.startswith(slot) and name.endswith(f".{c}"))
+        for c in ("c0", "c1", "c2")
+    ]
+
+
+def _stiffness(values: Mapping[str, float]) -> float:
+    """Creep force of both wheels per creepage at small slip [N]."""
+    reduction = 0.5 * (values["polach.kA"] + values["polach.kS"])
+    # Of one wheel at 80 kN, by Kalker's linear theory; it grows with the contact area (Hertz).
+    return 2.0 * 9.68e6 * float((values["Fz"] / 80e3) ** (2.0 / 3.0)) * reduction
