@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from workbench import diagnosis
 from workbench.case import Case
 from workbench.diagnosis import Diagnosis, Effect, read_effects
-from workbench.diagnosis.evidence import Court
-from workbench.diagnosis.extension import build, source
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.verdict import judge
+from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
 from workbench.system import OBSERVER, System
-
-_NAME = "AllEffects"
 
 
 def library_effects(system: System) -> tuple[Effect, ...]:
@@ -34,16 +32,12 @@ def build_everything(system: System, effects: Sequence[Effect], path: Path) -> N
     InputError
         If the library has errors.
     """
-    library, base = read_library(system.library), system.model(OBSERVER).name
-    text = source(
-        library, base, _NAME, effects, {}, {}, "Observer model with every effect, at zero"
-    )
-    build(library, _NAME, text, path, every_platform=False)
+    diagnosis.build_everything(system, read_library(system.library), effects, path)
 
 
 def diagnose_set(
     system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
 ) -> Diagnosis:
     """Diagnose one set of recordings, in this process alone."""
-    with Court(everything, {}, cases, 1) as court:
-        return judge(Fit(court, effects), effects, lambda _: None)
+    with Simulations(everything, system, system.given, cases, 1) as simulations:
+        return conclude(Fit(simulations, effects), effects, lambda _: None)
