@@ -11,6 +11,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -31,14 +32,16 @@ def key(library: Path, *parts: str) -> str:
 
     Parameters
     ----------
-    library : folder of the library.
+    library : its file; of package.mo, all files in its folder count.
     parts : such as the name and the source of a model that extends it.
     """
     known = {".mo", ".order", ".py", ".c", ".h"}
     digest = hashlib.sha256()
-    for root in (library, _COMPILER):
-        for file in sorted(path for path in root.rglob("*") if path.suffix in known):
-            for part in (file.relative_to(root).as_posix().encode(), file.read_bytes()):
+    whole = library.parent if library.name == "package.mo" else library
+    for root in (whole, _COMPILER):
+        files = [root] if root.is_file() else sorted(root.rglob("*"))
+        for file in (path for path in files if path.suffix in known):
+            for part in (file.relative_to(root.parent).as_posix().encode(), file.read_bytes()):
                 digest.update(len(part).to_bytes(8, "little") + part)
     for text in (*parts, platform.system(), platform.machine(), *map(_version, _TOOLS)):
         digest.update(len(text.encode()).to_bytes(8, "little") + text.encode())
@@ -50,6 +53,27 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return ""
+
+
+def keep(name: str, make: Callable[[Path], object]) -> Path:
+    """Path of the FMU that is kept under a name, written by `make` if there is none yet.
+
+    Where the folder cannot be written, it is in a temporary one, for as long as this process runs.
+    """
+    kept = folder() / f"{name}.fmu"
+    if kept.is_file():
+        with contextlib.suppress(OSError):
+            os.utime(kept)
+        return kept
+    part = Path(_scratch().name) / f"{name}.fmu"
+    if not part.is_file():
+        fetch(name, part, make)
+    return kept if kept.is_file() else part
+
+
+@cache
+def _scratch() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory(prefix="fmus-", ignore_cleanup_errors=True)
 
 
 def fetch(name: str, path: Path, make: Callable[[Path], object]) -> None:

@@ -2,24 +2,30 @@
 
 from pathlib import Path
 
+from workbench import shelf
 from workbench.errors import InputError, closest
 from workbench.fmu import FMU
 from workbench.installed import FILE, system_files
+from workbench.modelica import read_library
 from workbench.system import OBSERVER, System
-from workbench.system_file import read_system
+from workbench.system_file import read_system, with_built
+from workbench.system_parts import Model
 
 
 def load_system(which: str | Path) -> System:
     """Read a system by its name, its file, or the folder that holds its file.
 
+    A model without an FMU is compiled from the system's library, once for each state of it; that
+    needs the extra [compiler].
+
     Raises
     ------
     InputError
-        If there is none of this name, or its file has a mistake.
+        If there is none of this name, or its file or its library has a mistake.
     """
     known, path = system_files(), Path(which)
     if str(which) in known:
-        return read_system(known[str(which)])
+        return _built(read_system(known[str(which)]))
     if path.is_dir():
         path /= FILE
     if not path.is_file():
@@ -29,7 +35,34 @@ def load_system(which: str | Path) -> System:
             expected=f"a system file, or one of {', '.join(known)}",
             remedy="correct the name or path; 'workbench systems' lists what is installed",
         )
-    return read_system(path)
+    return _built(read_system(path))
+
+
+def _built(system: System) -> System:
+    missing = {role: model for role, model in system.models.items() if model.path is None}
+    if not missing:
+        return system
+    return with_built(system, {role: _build(system, model) for role, model in missing.items()})
+
+
+def _build(system: System, model: Model) -> Path:
+    """The FMU of a model for this machine, from where built ones are kept."""
+    if not system.library.is_file():
+        raise InputError(
+            where=f"{system.source}, [models]",
+            found=f"no FMU of {model.name}, and no library {system.library.name} beside the file",
+            expected="an FMU, or the Modelica library that the model is compiled from",
+            remedy='write fmu = "FILE", or put package.mo beside the system file',
+        )
+    library = read_library(system.library)
+    name = f"{library.name}.{model.name}"
+
+    def make(path: Path) -> None:
+        from workbench import compiler  # an extra: everything else runs without it
+
+        compiler.build(system.library, name, path, platforms=[compiler.native()])
+
+    return shelf.keep(shelf.key(system.library, name), make)
 
 
 def model_path(system: System, role: str) -> Path:
@@ -38,15 +71,15 @@ def model_path(system: System, role: str) -> Path:
     Raises
     ------
     InputError
-        If the system has no model in this role, or it is not built.
+        If the system has no model in this role.
     """
     model = system.models.get(role)
     if model is None or model.path is None:
         raise InputError(
             where=f"{system.source}, [models] {role}",
-            found="no such model" if model is None else "a model without an FMU",
-            expected=f"an FMU in the role '{role}'",
-            remedy=f'write {role} = {{ class = "NAME", fmu = "FILE" }}',
+            found="no such model",
+            expected=f"a model in the role '{role}'",
+            remedy=f'write {role} = {{ class = "NAME" }}',
         )
     return model.path
 

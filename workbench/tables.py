@@ -123,15 +123,19 @@ class Table:
             where=f"{self.where} {key}", found=found, expected=expected, remedy=remedy
         )
 
-    def refuse_unknown(self, keys: Iterable[str]) -> None:
+    def refuse_unknown(self, keys: str | Iterable[str]) -> None:
         """Refuse what nobody reads, which is a mistake in writing.
+
+        Parameters
+        ----------
+        keys : that are read; a text holds several, with spaces between them.
 
         Raises
         ------
         InputError
             If the table has another key.
         """
-        known = tuple(keys)
+        known = tuple(keys.split()) if isinstance(keys, str) else tuple(keys)
         for key in self.content:
             if key not in known:
                 raise InputError(

@@ -1,0 +1,395 @@
+"""What a system is made of: models, signals, quantities, conditions, and what counts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.expression import Expression
+
+
+@dataclass(frozen=True)
+class Model:
+    """Modelica class of a role, without its library, and its FMU; None: it is yet to be built."""
+
+    name: str
+    path: Path | None
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A structure between a quantity and the sensor that reads it: one mode of vibration.
+
+    Attributes
+    ----------
+    frequency : [Hz].
+    damping : ratio [1].
+    late : standard deviation of a delay beyond that of the mode, by filters of an amplifier [s].
+    """
+
+    frequency: float
+    damping: float
+    late: float
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A measured signal.
+
+    Attributes
+    ----------
+    name : in recordings and of the model's variable.
+    unit : SI, of the model's variable and of all values.
+    label : what it is, for people.
+    shown : unit in figures.
+    noise, relative_noise : standard deviation of one sample [unit], plus this share of its size.
+    relative_error : share of its size by which a filter lets it be wrong, beyond noise [1].
+    scale : typical size [unit].
+    scale_error : share by which its scale may be wrong, which gains must bear [1].
+    reading : output of the model that says what the sensor reads, imperfections included.
+    mode : between the quantity and its sensor, or None.
+    smoothed : [s] windows of a parabola and of a line that take the noise from an input where it
+        allows that, before it drives a model; empty: it is taken as it is.
+    """
+
+    name: str
+    unit: str
+    label: str
+    shown: str
+    noise: float
+    relative_noise: float
+    relative_error: float
+    scale: float
+    scale_error: float
+    reading: str
+    mode: Mode | None
+    smoothed: tuple[float, ...]
+
+    def deviation(self, values: Any) -> Any:
+        """Standard deviation of samples of these values [unit]."""
+        return self.noise + self.relative_noise * np.abs(values)
+
+    @property
+    def noise_at_scale(self) -> float:
+        """Standard deviation of a sample of typical size [unit]."""
+        return self.noise + self.relative_noise * self.scale
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A signal made of measured ones and of parameters.
+
+    Attributes
+    ----------
+    formula : in SI units.
+    """
+
+    name: str
+    unit: str
+    label: str
+    formula: Expression
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A quantity that observers estimate: a parameter of the model, which an input corrects.
+
+    Attributes
+    ----------
+    name : of the parameter.
+    correction : of the input that is added to it.
+    label : what it is, for people.
+    unit : SI.
+    low, high : range that estimates are kept in [unit].
+    prior : range before a measurement, of which any value is as likely [unit].
+    walk : how fast it may move, random walk [unit/sqrt(s)].
+    spread : standard deviation of what is known of it at the start [unit].
+    memory : time in which a deviation is forgotten [s].
+    useful : standard deviation from which on an estimate serves [unit].
+    acts_on : state whose rate shows its effect; a correction is in proportion to that. Empty: none.
+    claimed : conditions in which it may be claimed, by name; elsewhere it stands in for something
+        that the model has not.
+    """
+
+    name: str
+    correction: str
+    label: str
+    unit: str
+    low: float
+    high: float
+    prior: tuple[float, float]
+    walk: float
+    spread: float
+    memory: float
+    useful: float
+    acts_on: str
+    claimed: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Where a signal is above or below a level, in absolute value [its unit]."""
+
+    signal: str
+    level: float
+
+
+@dataclass(frozen=True)
+class Fading:
+    """Feedback fades out where a signal is small against `half`, at which half is left [unit]."""
+
+    signal: str
+    half: float
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """Two states in a fixed ratio while an output is zero, which saturates: one follows the other.
+
+    Attributes
+    ----------
+    follower, leader : states.
+    zero : output of the model that is zero while the follower rolls along.
+    """
+
+    follower: str
+    leader: str
+    zero: str
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Where a model is linearised: inputs given, some states held, all others at rest.
+
+    Attributes
+    ----------
+    inputs : by name [SI]; others are zero.
+    held : formulas of states, in parameters of the model.
+    quantities : estimated quantities that are not nominal, by name.
+    """
+
+    inputs: Mapping[str, float]
+    held: Mapping[str, Expression]
+    quantities: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What was set before a recording, and what it means.
+
+    Attributes
+    ----------
+    unit : SI of a quantity; empty for a word or a whole number.
+    least : smallest quantity; `exclusive`: above it.
+    choices : words or whole numbers that it may be.
+    count : of entries, where it is a list; 0: no list.
+    parameters : of the model by choice, which it sets.
+    sign : whether it is the sign of the recording's signals.
+    label : for people.
+    """
+
+    name: str
+    label: str
+    unit: str
+    least: float
+    exclusive: bool
+    choices: tuple[str | int, ...]
+    count: int
+    parameters: Mapping[str, Mapping[str, float]]
+    sign: bool
+
+
+@dataclass(frozen=True)
+class Objective:
+    """By what estimators are judged and tuned.
+
+    Attributes
+    ----------
+    judged : signal whose error counts.
+    weights : of the mean absolute deviation by signal [1/unit].
+    bandwidth : below which deviations count [Hz].
+    begins, ends : of the time that is judged: from the first sample above to the last one above.
+    when : what that time is, for people.
+    """
+
+    judged: str
+    weights: Mapping[str, float]
+    bandwidth: float
+    begins: Threshold | None
+    ends: Threshold | None
+    when: str
+
+
+@dataclass(frozen=True)
+class Following:
+    """What tuned gains must do: find a step of a quantity within a time, but for a share."""
+
+    quantity: str
+    within: float
+    left: float
+
+
+@dataclass(frozen=True)
+class View:
+    """What one panel of a figure shows: measured or estimated signals on one axis.
+
+    Attributes
+    ----------
+    title, note : before and after the unit.
+    low, high : of the axis in the shown unit; None: what the signals need.
+    """
+
+    title: str
+    note: str
+    signals: tuple[str, ...]
+    height: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What the diagnosis compares: a sum of readings, each times a constant."""
+
+    name: str
+    unit: str
+    formula: Expression
+
+
+@dataclass(frozen=True)
+class Leading:
+    """A slow motion that integrates the noise of inputs: a measured output leads it.
+
+    Attributes
+    ----------
+    output : the measured one.
+    together : states that its correction scales alike.
+    ripple : standard deviation of what moves it, over that of the noise of the inputs [1].
+    """
+
+    output: str
+    together: tuple[str, ...]
+    ripple: float
+
+
+@dataclass(frozen=True)
+class Rest:
+    """An input that is measured at rest, before it is applied, against what the model says of it.
+
+    Attributes
+    ----------
+    signal : the input.
+    output : of the model: its reading at rest.
+    zero : standard deviation of a good sensor's zero [unit].
+    """
+
+    signal: str
+    output: str
+    zero: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """A parameter that differs by nature from recording to recording, and needs no cause.
+
+    Attributes
+    ----------
+    by : condition whose choices have a level each; empty: one for all.
+    spread : relative standard deviation of the common level, infinite: anything.
+    """
+
+    by: str
+    spread: float
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """When samples do not count.
+
+    Attributes
+    ----------
+    reason : for people.
+    formula : in measured signals and parameters.
+    above, below : a level of its absolute value, infinite for none.
+    from_rest : whether it counts from its median before the brake is applied.
+    within : [s] around such samples that do not count either.
+    smoothed : [s] over which the formula is averaged.
+    only_while : and only while a signal is above a level, or None.
+    to_the_end : whether nothing after it counts.
+    """
+
+    reason: str
+    formula: Expression
+    above: float
+    below: float
+    from_rest: bool
+    within: float
+    smoothed: float
+    only_while: Threshold | None
+    to_the_end: bool
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What errors may go with.
+
+    Attributes
+    ----------
+    way : of the formula: its "value", "size", "rate", "integral", or "turn", an angle, whose phase
+        belongs to one recording.
+    """
+
+    name: str
+    unit: str
+    formula: Expression
+    way: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How the diagnosis compares recordings with the model.
+
+    Attributes
+    ----------
+    block : [s] whose mean errors are the unit of all statistics.
+    lasting : [s] from which on an error is no noise.
+    least : [s] of a recording that must count.
+    settling : [s] at the start, in which the simulation finds its states.
+    channels : what is compared, in this order.
+    leading : a motion that is led, or None.
+    begins : input that is applied in each recording, and by how much above its rest.
+    rest : readings before that.
+    tolerances : relative standard deviation of parameters from recording to recording.
+    levels : parameters that differ by nature.
+    exclusions : samples that do not count.
+    influences : what errors may go with, besides the measured signals.
+    """
+
+    block: float
+    lasting: float
+    least: float
+    settling: float
+    channels: tuple[Channel, ...]
+    leading: Leading | None
+    begins: Threshold | None
+    rest: Rest | None
+    tolerances: Mapping[str, float]
+    levels: Mapping[str, Level]
+    exclusions: tuple[Exclusion, ...]
+    influences: tuple[Influence, ...]
+
+
+@dataclass(frozen=True)
+class Export:
+    """Estimators that the library has as Modelica classes, for FMUs that run without Python.
+
+    Attributes
+    ----------
+    classes : by estimator, without the library's name.
+    start : of the reference model, beside which a package sets them.
+    """
+
+    classes: Mapping[str, str]
+    start: OperatingPoint
