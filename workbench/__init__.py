@@ -1,6 +1,6 @@
-"""Wheelset observer workbench: observers on FMUs, judged on measured brake stops.
+"""Observer workbench: what a machine does that its model does not, found in its recordings.
 
-The flow: case -> FMU -> observer -> run -> score -> report, one module each, in this order.
+The flow: system, case -> FMU -> observer -> run -> score -> tuning, diagnosis -> report.
 """
 
 import ast
@@ -9,13 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
+    from workbench.api import case_from_frame as case_from_frame
+    from workbench.api import diagnose as diagnose
+    from workbench.api import observe as observe
+    from workbench.api import read_cases as read_cases
+    from workbench.api import tune as tune
     from workbench.case import Case as Case
-    from workbench.case import read_case as read_case
-    from workbench.case import read_cases as read_cases
     from workbench.cosim import Run as Run
+    from workbench.diagnosis import Outcome as Outcome
     from workbench.errors import FMUError as FMUError
     from workbench.errors import InputError as InputError
     from workbench.fmu import FMU as FMU
+    from workbench.observers import Gains as Gains
+    from workbench.system import System as System
+    from workbench.systems import load_system as load_system
+    from workbench.tuning import Tuned as Tuned
 
 _MODULES = {
     name.name: node.module

@@ -75,6 +75,16 @@ def read_text(path: Path, remedy: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def header(cell: str) -> tuple[str, str | None]:
+    """Name and unit of a column, None without one.
+
+    >>> header("pB [kPa]")
+    ('pB', 'kPa')
+    """
+    match = _HEADER_CELL.fullmatch(cell.strip())
+    return (match["name"], match["unit"] or None) if match else (cell, None)
+
+
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> dict[str, Column]:

@@ -203,7 +203,8 @@ def read_point(points: Table, name: str, system: System) -> OperatingPoint:
     inputs, held, quantities = (table.table(key) for key in ("inputs", "held", "quantities"))
     inputs.refuse_unknown(one.name for one in system.inputs)
     quantities.refuse_unknown(one.name for one in system.estimated)
-    units = {one.name: one.unit for one in (*system.inputs, *system.estimated)}
+    units = {one.name: one.unit for one in system.inputs}
+    units |= {one.name: one.unit for one in system.estimated}
     return OperatingPoint(
         {key: inputs.number(key, units[key]) for key in inputs.content},
         {key: Expression(held.take(key, str), f"{held.where} {key}") for key in held.content},

@@ -1,0 +1,201 @@
+"""The workbench in a notebook: from a file to a figure in a few lines, each step a value.
+
+import workbench as wb
+
+system = wb.load_system("wheelset")
+cases = wb.read_cases("my_recordings", system)
+wb.observe(system, cases[0], "ekf").plot()
+"""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from workbench.case import Case, check_recording, read_conditions, read_only
+from workbench.case import read_cases as read_folders
+from workbench.cosim import Run, replay
+from workbench.diagnosis import Outcome, choose, read_effects
+from workbench.diagnosis import diagnose as diagnose_system
+from workbench.errors import InputError
+from workbench.installed import system_files
+from workbench.modelica import read_library
+from workbench.observers import Gains
+from workbench.observers import choose as choose_estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.recording import header
+from workbench.system import OBSERVER, System
+from workbench.systems import load_system, open_model
+from workbench.tables import Table
+from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, prepare
+from workbench.tuning import tune as tune_problem
+from workbench.units import si_factor
+
+
+def read_cases(path: str | Path | Sequence[str | Path], system: System | None = None) -> list[Case]:
+    """Read case folders, and folders of case folders.
+
+    Parameters
+    ----------
+    system : that the recordings are of; the first installed one unless another is given.
+
+    Raises
+    ------
+    InputError
+        If a path holds no case, or a case cannot be read.
+    """
+    paths = [path] if isinstance(path, str | Path) else path
+    return read_folders(
+        [Path(one) for one in paths], system or load_system(next(iter(system_files())))
+    )
+
+
+def case_from_frame(
+    system: System,
+    frame: pd.DataFrame,
+    conditions: Mapping[str, Any] | None = None,
+    name: str = "frame",
+) -> Case:
+    """A recording from a table whose columns are named `signal [unit]`, as in a file.
+
+    Parameters
+    ----------
+    frame : "time [s]" and the measured signals; other columns are ignored.
+    conditions : as in case.toml, such as {"initial_speed": "80 km/h"}.
+
+    Raises
+    ------
+    InputError
+        If a signal is missing, has no unit or another one, or conditions are not those of the
+        system.
+    """
+    where = f"table '{name}'"
+    units = {"time": "s", **{one.name: one.unit for one in system.signals.values()}}
+    found = {}
+    for column in map(str, frame.columns):
+        signal, unit = header(column)
+        if signal in units:
+            factor = si_factor(unit or "", units[signal], f"{where}, column '{column}'")
+            values = frame[column].to_numpy(float, copy=True) * factor
+            found[signal] = read_only(values)
+    asked = ["time", *(one.name for one in (*system.inputs, *system.outputs))]
+    if missing := [signal for signal in asked if signal not in found]:
+        raise InputError(
+            where=where,
+            found=f"no column '{missing[0]}' among {', '.join(map(str, frame.columns))}",
+            expected=f"a column '{missing[0]} [{units[missing[0]]}]'",
+            remedy="name the columns as signals of the system, with units",
+        )
+    time_ = found.pop("time")
+    check_recording(time_, system, f"{where}, column 'time'", None)
+    return Case(
+        name=name,
+        title=name,
+        conditions=read_conditions(Table(conditions or {}, f"{where}, conditions"), system),
+        time=time_,
+        signals=found,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=tuple(one.name for one in system.outputs),
+        source=Path(name),
+    )
+
+
+def observe(system: System, case: Case, estimator: str, gains: Gains | None = None) -> Run:
+    """Run one estimator along a recording.
+
+    Parameters
+    ----------
+    estimator : its name.
+    gains : such as those of `tune`; else what is usual for the model.
+
+    Raises
+    ------
+    InputError
+        If there is no such estimator, or the model is not fit for it.
+    """
+    (kind,) = choose_estimators(system, [estimator]).values()
+    with open_model(system, kind.role) as fmu:
+        return replay(case, kind(fmu, system, gains or usual_gains(kind, fmu, system)))
+
+
+def tune(
+    system: System,
+    estimator: str,
+    cases: Sequence[Case],
+    *,
+    generations: int = 100,
+    population: int = 15,
+    seed: int = 1,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+) -> Tuned | None:
+    """Find the gains whose worst case is best; see `workbench.tuning.tune`.
+
+    Parameters
+    ----------
+    population : candidates per gain.
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on each generation.
+
+    Returns
+    -------
+    Tuned, or None if it was interrupted before there was anything to return.
+    """
+    problem = prepare(system, estimator, cases)
+    plan = Plan(generations, population, seed)
+    with (
+        tempfile.TemporaryDirectory(prefix="tune-") as scratch,
+        evaluators(problem.job, workers or os.cpu_count() or 1) as pool,
+    ):
+        return tune_problem(pool, problem, plan, Path(scratch), progress=_Lines(plan, report))
+
+
+class _Lines(Progress):
+    """A line on each generation, with the time left."""
+
+    def __init__(self, plan: Plan, report: Callable[[str], None]) -> None:
+        self._plan, self._report, self._begin = plan, report, time.perf_counter()
+
+    def evolved(self, history: Sequence[Generation]) -> None:
+        """See Progress."""
+        done, most = len(history), self._plan.generations
+        left = (time.perf_counter() - self._begin) / done * (most + 1 - done)
+        self._report(f"[{done - 1:>3}/{most}] z {history[-1].z:.5f}, at most {left:.0f} s left")
+
+    def warn(self, message: str) -> None:
+        """See Progress."""
+        self._report(f"warning: {message}")
+
+
+def diagnose(
+    system: System,
+    cases: Sequence[Case],
+    *,
+    effects: Sequence[str] = (),
+    out: str | Path | None = None,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+) -> Outcome:
+    """Find what the system's model lacks; see `workbench.diagnosis.diagnose`.
+
+    Parameters
+    ----------
+    effects : names of those to consider; all of the library unless some are given.
+    out : folder of the extended model; a temporary one unless another is given.
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If recordings or library cannot be used.
+    """
+    library = read_library(system.library)
+    chosen = choose(effects, read_effects(library, system.models[OBSERVER].name))
+    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="diagnosis-"))
+    number = workers or os.cpu_count() or 1
+    return diagnose_system(system, cases, library, chosen, folder, number, report)
