@@ -171,7 +171,9 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
                 expected="measured inputs, which drive the model, and outputs, which correct it",
                 remedy=f"add a table [{group}.NAME] for each",
             )
-    parameters = file.table("parameters")
+    # Units are known when the model is.
+    parameters = file.table("parameters") if description else Table({}, "")
+    states = file if description else Table({}, "")
     return System(
         name=file.text("name", path.resolve().parent.name),
         title=file.take("title", str),
@@ -181,8 +183,8 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
         names={},
         given={name: parameters.number(name, units.get(name, "1")) for name in parameters.content},
         values={},
-        walks=read_of_states(file, "walk"),
-        spreads=read_of_states(file, "spread"),
+        walks=read_of_states(states, "walk", units),
+        spreads=read_of_states(states, "spread", units),
         inputs=groups["inputs"],
         outputs=groups["outputs"],
         judged=groups["judged"],

@@ -52,6 +52,7 @@ class Signal:
     mode : between the quantity and its sensor, or None.
     smoothed : [s] windows of a parabola and of a line that take the noise from an input where it
         allows that, before it drives a model; empty: it is taken as it is.
+    held : whether an input stays as it was sampled until the next sample; else it goes there.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Signal:
     reading: str
     mode: Mode | None
     smoothed: tuple[float, ...]
+    held: bool
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""

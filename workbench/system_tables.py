@@ -1,6 +1,7 @@
 """Tables of `system.toml`, one reader each."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +45,21 @@ def read_model(table: Table, path: Path) -> Model:
     return Model(table.take("class", str), (path.parent / fmu).resolve() if fmu else None)
 
 
-def read_of_states(file: Table, key: str) -> dict[str, float]:
-    """A number of each state that has it, by name."""
+def read_of_states(file: Table, key: str, units: Mapping[str, str]) -> dict[str, float]:
+    """A number of each state that has it, by name.
+
+    Parameters
+    ----------
+    units : of the model's variables.
+    """
     tables = {name: within(file, "states", name) for name in file.table("states").content}
     for table in tables.values():
         table.refuse_unknown("walk spread")
-    return {name: table.number(key, "1") for name, table in tables.items() if key in table}
+    return {
+        name: table.number(key, units.get(name, "1"))
+        for name, table in tables.items()
+        if key in table
+    }
 
 
 def within(file: Table, group: str, name: str) -> Table:
@@ -64,7 +74,7 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
         table = within(file, group, name)
         table.refuse_unknown(
             "unit shown label noise relative_noise relative_error scale scale_error reading "
-            "mode smoothed"
+            "mode smoothed held"
         )
         unit = table.take("unit", str)
         shown = table.text("shown", unit)
@@ -85,6 +95,7 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
                 reading=table.text("reading", name),
                 mode=read_mode(table.table("mode")) if "mode" in table else None,
                 smoothed=table.numbers("smoothed", "s", 2) if "smoothed" in table else (),
+                held="held" in table and table.take("held", bool),
             )
         )
     return tuple(found)
@@ -115,19 +126,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
         own.refuse_unknown(
-            [
-                "correction",
-                "label",
-                "unit",
-                "range",
-                "prior",
-                "walk",
-                "spread",
-                "memory",
-                "useful",
-                "acts_on",
-                "claimed",
-            ]
+            "correction label unit range prior walk spread memory useful acts_on claimed"
         )
         unit = own.text("unit", "1")
         low, high = own.numbers("range", unit, 2)
@@ -363,19 +362,7 @@ def read_level(levels: Table, name: str) -> Level:
 
 def read_exclusion(table: Table, system: System) -> Exclusion:
     """Samples that do not count."""
-    table.refuse_unknown(
-        [
-            "reason",
-            "is",
-            "above",
-            "below",
-            "from_rest",
-            "within",
-            "smoothed",
-            "only_while",
-            "to_the_end",
-        ]
-    )
+    table.refuse_unknown("reason is above below from_rest within smoothed only_while to_the_end")
     if ("above" in table) == ("below" in table):
         raise InputError(
             where=table.where,

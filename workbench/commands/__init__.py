@@ -8,5 +8,7 @@ COMMANDS = {
     "observability": "show when states and estimated quantities can be observed",
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
+    "systems": "list the systems that are installed",
+    "new": "write a system of one's own to begin with",
     "bench": "time calls into the FMUs, the observers, and the tuning",
 }

@@ -11,7 +11,6 @@ from workbench.case import Case, check_names, read_cases
 from workbench.errors import InputError
 from workbench.installed import system_files
 from workbench.resources import CHECKOUT, fmus, modelica
-from workbench.resources import cases as package_cases
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
@@ -58,9 +57,8 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         "cases",
         nargs="*",
         type=Path,
-        default=[nearby(package_cases())],
         metavar="CASE",
-        help="case folder, or folder of case folders (default: the package's own)",
+        help="case folder, or folder of case folders (default: those of the system)",
     )
     parser.add_argument(
         "--out",
@@ -69,6 +67,24 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         metavar="DIR",
         help="where to write (default: %(default)s)",
     )
+
+
+def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
+    """The cases that are asked for, or those that come with the system.
+
+    Raises
+    ------
+    InputError
+        If there are none, or one cannot be read.
+    """
+    if not paths and system.cases is None:
+        raise InputError(
+            where="command line",
+            found="no CASE, and a system that comes without",
+            expected="folders of recordings",
+            remedy=f"name them, or write cases = 'FOLDER' in {nearby(system.source)}",
+        )
+    return read_cases(paths or [system.cases], system)  # type: ignore[list-item]  # seen above
 
 
 def add_models(parser: argparse.ArgumentParser) -> None:
@@ -101,7 +117,7 @@ def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
         If system, models or cases cannot be read, or do not fit each other.
     """
     system = load_system(options.system)
-    cases = read_cases(options.cases, system)
+    cases = given_cases(options.cases, system)
     names = model_names(options.map, system, cases)
     if options.fmu is not None or names:
         path = options.fmu or system.model(OBSERVER).path

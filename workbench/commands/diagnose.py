@@ -7,11 +7,11 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.case import read_cases
 from workbench.commands.arguments import (
     Commands,
     add_recordings,
     add_system,
+    given_cases,
     positive,
     require_compiler,
 )
@@ -35,8 +35,8 @@ def add(commands: Commands) -> None:
         "wrong, name the physical cause, say what cannot be told apart, extend the Modelica "
         "model, and measure the gain on recordings that were held out. Writes a page to read "
         "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs "
-        "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were found. Exit "
-        "status 0 for any verdict.",
+        "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were "
+        "found. Exit status 0 for any verdict.",
         epilog="examples:\n"
         "  python -m workbench diagnose my_recordings --out results/mine\n"
         "  python -m workbench diagnose my_recordings --effects BrakeFade CylinderLag\n"
@@ -97,7 +97,7 @@ def _diagnose(options: argparse.Namespace) -> int:
         print("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return 0
     require_compiler()
-    cases = read_cases(options.cases, system)
+    cases = given_cases(options.cases, system)
     begin = time.perf_counter()
 
     def report(line: str) -> None:

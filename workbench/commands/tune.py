@@ -14,21 +14,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.case import Case, read_cases
+from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
     add_map,
     add_system,
+    given_cases,
     installing,
     model_names,
-    nearby,
     positive,
 )
 from workbench.errors import InputError
 from workbench.files import write_whole
 from workbench.pool import Pool
 from workbench.report.tuning import format_tuned, write_tuning_page
-from workbench.resources import cases as package_cases
 from workbench.system_file import with_model
 from workbench.systems import load_system
 from workbench.tuning import (
@@ -78,9 +77,9 @@ def add(commands: Commands) -> None:
         "--cases",
         nargs="+",
         type=Path,
-        default=[nearby(package_cases())],
+        default=[],
         metavar="CASE",
-        help="case folders, or folders of case folders (default: the package's own)",
+        help="case folders, or folders of case folders (default: those of the system)",
     )
     parser.add_argument(
         "--fmu",
@@ -172,7 +171,7 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
 def _tune(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     kind = tunable(system, options.estimator)
-    cases = read_cases(options.cases, system)
+    cases = given_cases(options.cases, system)
     _check(options, cases)
     system = system.with_names(model_names(options.map, system, cases))
     if options.fmu is not None:

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 
 from workbench.case import Case
+from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.samples import Samples, compared, prepare
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers.operating import corrected_states, settle
 from workbench.pool import Pool
 from workbench.system import System
 
@@ -216,10 +216,10 @@ class Simulations:
                 )
                 for v in fmu.description.variables
             }
-            effects = _effects_on_led(fmu, system)
+            moving = motion(fmu, system)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         signals = compared(system, cases)
-        self.recordings = [prepare(one, system, signals, self.nominal, effects) for one in cases]
+        self.recordings = [prepare(one, system, signals, self.nominal, moving) for one in cases]
         workers = min(workers, len(cases))
         simulated = Simulated(path, system, tuple(self.recordings))
         with simulating(simulated) as own:
@@ -302,25 +302,3 @@ class Simulations:
             # After Ctrl-C nobody waits for the others.
             for one in under_way.values():
                 one.cancel()
-
-
-def _effects_on_led(fmu: FMU, system: System) -> dict[str, float]:
-    """Effect of each input on the rate of the led output, along the slow motion it is part of.
-
-    At the design point, by the left and right eigenvectors of the slowest mode of its states.
-    """
-    leading = system.comparison.leading
-    names = [one.name for one in system.inputs]
-    if leading is None:
-        return dict.fromkeys(names, 0.0)
-    settle(fmu, system, system.design)
-    states = corrected_states(fmu, system)
-    at = [fmu.states.index(name) for name in states]
-    A = fmu.state_jacobian()[np.ix_(at, at)]
-    B = fmu.input_jacobian(fmu.variables(names))[at]
-    values, right = np.linalg.eig(A)
-    rates, left = np.linalg.eig(A.T)
-    v = right[:, np.argmax(values.real)].real
-    w = left[:, np.argmax(rates.real)].real
-    v = v / v[states.index(leading.output)]
-    return dict(zip(names, (w @ B / (w @ v)).tolist(), strict=True))

@@ -24,6 +24,7 @@ from workbench.kernel import (
     instance,
     place,
     read,
+    set_inputs,
     set_states,
     solve,
 )
@@ -41,12 +42,16 @@ class _Led(NamedTuple):
 
     Attributes
     ----------
-    states : that a correction scales alike, the leader first; empty: none is led.
-    column : of the output.
+    states : that a correction scales alike, the leader first; empty: all outputs lead.
+    column : of the output that leads alone.
+    corrected : (p,) states that all outputs lead.
+    gain : (p, l) of these corrections.
     """
 
     states: NDArray[np.intp]
     column: int
+    corrected: NDArray[np.intp]
+    gain: Matrix
 
 
 class _Work(NamedTuple):
@@ -152,7 +157,7 @@ def _step(model, work, h, renew):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(model, time, u, y, gain, led, x0, longest, errors, work):  # type: ignore[no-untyped-def]
+def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # type: ignore[no-untyped-def]
     """Fill `errors` (n, c), measured minus predicted; returns a status.
 
     A correction scales all states that move together: what depends on their ratio stays as it is,
@@ -164,7 +169,9 @@ def _predict(model, time, u, y, gain, led, x0, longest, errors, work):  # type: 
         model.u[j] = u[0, j]
     if place(model):
         return 1
-    taken = 0
+    taken, holds = 0, False
+    for j in range(held.size):
+        holds = holds or held[j]
     for k in range(time.size):
         if k > 0:
             if led.states.size:
@@ -175,17 +182,25 @@ def _predict(model, time, u, y, gain, led, x0, longest, errors, work):  # type: 
                 elif abs(leader) > 2.0 * abs(correction):
                     for i in led.states:
                         model.x[i] *= 1.0 + correction / leader
-                if set_states(model):
-                    return 1
+            for i in range(led.corrected.size):
+                for j in range(led.gain.shape[1]):
+                    model.x[led.corrected[i]] += led.gain[i, j] * errors[k - 1, j]
+            if set_states(model):
+                return 1
             interval = time[k] - time[k - 1]
             steps = max(1, math.ceil(interval / longest - 1e-6))
             for i in range(1, steps + 1):
                 for j in range(u.shape[1]):
-                    work.between[j] = u[k - 1, j] + (u[k, j] - u[k - 1, j]) * i / steps
+                    moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / steps
+                    work.between[j] = u[k - 1, j] + moved
                 status = _step(model, work, interval / steps, taken % _KEPT == 0)
                 taken += 1
                 if status:
                     return status
+            for j in range(u.shape[1]):
+                model.u[j] = u[k, j]
+            if holds and set_inputs(model, 0, u.shape[1]):
+                return 1
         if read(model):
             return 1
         for i in range(y.shape[1]):
@@ -214,7 +229,7 @@ class Predictor:
             others = [name for name in leading.together if name != leading.output]
             states = [fmu.states.index(name) for name in (leading.output, *others)]
         column = list(signals).index(leading.output) if leading is not None else 0
-        self._led = _Led(np.array(states, np.intp), column)
+        self._leading = np.array(states, np.intp), column
         self._ratio = rolling_ratio(fmu, system) if rolling is not None else 0.0
 
     def begin(self, samples: Samples) -> dict[str, float]:
@@ -250,9 +265,10 @@ class Predictor:
             self._model,
             samples.time,
             samples.u,
+            samples.held,
             samples.y,
             samples.gain,
-            self._led,
+            self._led(samples),
             x0,
             self._longest,
             errors,
@@ -260,6 +276,13 @@ class Predictor:
         )
         checked(status, fmu)
         return errors
+
+    def _led(self, samples: Samples) -> _Led:
+        lead = samples.lead
+        if lead is None:
+            return _Led(*self._leading, np.zeros(0, np.intp), np.zeros((0, 0)))
+        places = [self._fmu.states.index(name) for name in lead.states]
+        return _Led(*self._leading, np.array(places, np.intp), np.ascontiguousarray(lead.gain))
 
     def _work(self) -> _Work:
         """Work space; which states are stiff is judged where the recording begins."""

@@ -15,6 +15,14 @@ from scipy.optimize import nnls
 from scipy.signal import lfilter, lfiltic, savgol_filter
 
 from workbench.case import Case
+from workbench.diagnosis.motion import (
+    Lead,
+    Motion,
+    effects_on_led,
+    led_by,
+    noise_of,
+    random_walk,
+)
 from workbench.errors import InputError
 from workbench.recording import Matrix, Vector
 from workbench.system import Channel, Exclusion, Mode, System
@@ -43,7 +51,9 @@ class Samples:
     signals : names of the columns of y: outputs, and what is judged if it was measured.
     y : (n, c) measured.
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
-    begin : mean of each output at the start.
+    lead : how all outputs correct the states, or None where one leads alone.
+    held : (m,) whether an input is held from a sample to the next; else it goes there.
+    begin : each output at the start, by a line through its first samples.
     rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
     blocks : (b, 2) first sample and end of each block that counts.
     slopes : (c, c) of the channels by the signals.
@@ -59,6 +69,8 @@ class Samples:
     signals: tuple[str, ...]
     y: Matrix
     gain: Vector
+    lead: Lead | None
+    held: NDArray[np.bool_]
     begin: Mapping[str, float]
     rest: float
     rest_noise: float
@@ -141,7 +153,7 @@ def prepare(
     system: System,
     signals: tuple[str, ...],
     values: Mapping[str, float],
-    effects: Mapping[str, float],
+    motion: Motion,
 ) -> Samples:
     """Make a recording ready.
 
@@ -149,7 +161,7 @@ def prepare(
     ----------
     signals : that are compared, see `compared`.
     values : parameters of the model.
-    effects : of each input on the rate of the led motion.
+    motion : of the model at its design point.
 
     Raises
     ------
@@ -172,15 +184,22 @@ def prepare(
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
     deviation = {name: _deviation(clean[name]) for name in names}
-    gain, predicted = np.zeros(time.size), np.zeros(time.size)
+    gain, lead = np.zeros(time.size), None
+    ahead = np.zeros((time.size, len(signals), len(signals)))
     if (leading := compare.leading) is not None:
-        moved = leading.ripple * np.hypot.reduce(
-            [effects[name] * deviation[name] for name in case.inputs]
-        )
+        effects = effects_on_led(motion, leading.output)
+        moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))
         # Noise of an input's sample acts until half way to its neighbours.
         acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
-        noise, missing = deviation[leading.output], wrong[leading.output]
-        predicted, gain = _kalman(moved * acting, noise, missing)
+        column = signals.index(leading.output)
+        ahead[:, column, column], gain = random_walk(
+            moved * acting, deviation[leading.output], wrong[leading.output]
+        )
+    else:
+        noises = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
+        lead = led_by(motion, *noises, h)
+        count = len(case.outputs)
+        ahead[:, :count, :count] = lead.ahead
     inputs = [_smooth(clean[one.name], one.smoothed, h) for one in system.inputs]
     rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
     zero = compare.rest.zero if compare.rest else 1.0
@@ -194,12 +213,14 @@ def prepare(
         signals=signals,
         y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
         gain=gain,
-        begin={name: float(np.mean(clean[name][start])) for name in case.outputs},
+        lead=lead,
+        held=np.array([one.held for one in system.inputs]),
+        begin={name: _first(time[start], clean[name][start]) for name in case.outputs},
         rest=float(np.mean(rest)),
         rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), zero)),
         blocks=blocks,
         slopes=slopes,
-        whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, predicted),
+        whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
             "missing": int(np.sum(np.maximum(0, np.round(steps / h) - 1))),
@@ -276,25 +297,11 @@ def _deviation(values: Vector) -> float:
     return max(spread, float(rounding))
 
 
-def _kalman(process: Vector, measurement: float, missing: Mask) -> tuple[Vector, Vector]:
-    """Variance of the predicted led output, and gain, of a random walk, (n,).
-
-    Parameters
-    ----------
-    process : (n,) standard deviation of what is added up to the next sample.
-    measurement : standard deviation of a sample.
-    missing : (n,) where there is none.
-    """
-    r = max(measurement, 1e-9) ** 2
-    q = float(np.median(process)) ** 2
-    predicted, gains = np.empty_like(process), np.zeros_like(process)
-    p = 0.5 * (q + np.sqrt(q * q + 4.0 * q * r))
-    for k in range(process.size):
-        predicted[k] = p
-        if not missing[k]:
-            gains[k] = p / (p + r)
-        p = (1.0 - gains[k]) * p + process[k] ** 2
-    return predicted, gains
+def _first(time: Vector, values: Vector) -> float:
+    """Value at the start of a signal, of which a line is what few samples show."""
+    if time.size < 3:
+        return float(values[0])
+    return float(np.polynomial.Polynomial.fit(time - time[0], values, 1)(0.0))
 
 
 def _applied(clean: Mapping[str, Vector], system: System, time: Vector) -> int:
@@ -356,7 +363,7 @@ def _whitening(
     slopes: Matrix,
     blocks: NDArray[np.int64],
     usable: Mask,
-    predicted: Vector,
+    ahead: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Inverse Cholesky factors of the covariance of block means, (b, c, c).
 
@@ -378,12 +385,9 @@ def _whitening(
         elif growing:
             least = 1.01 * float(row[shared] ** 2 @ fixed[shared])
             covariance[:, c, c] = _growing(channel, clean[growing[0]], usable, blocks, least)
-    leading = system.comparison.leading
-    if leading is not None:
-        for c, row in enumerate(slopes):
-            if np.count_nonzero(row) == 1 and row[signals.index(leading.output)] == 1.0:
-                ahead = [predicted[first:end].mean() for first, end in blocks]
-                covariance[:, c, c] += np.array(ahead)
+    # Predicted outputs are uncertain too, by what led them.
+    predicted = np.array([ahead[first:end].mean(axis=0) for first, end in blocks])
+    covariance += slopes @ predicted @ slopes.T
     return np.linalg.inv(np.linalg.cholesky(covariance / size))
 
 
