@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, expm, solve_discrete_are
 
 from workbench.fmu import FMU, Matrix, Vector
+from workbench.observers.contract import rolling_ratio
 from workbench.observers.operating import corrected_states, linearised
 from workbench.system import System
 
@@ -31,6 +32,7 @@ class Motion:
     states : that outputs lead.
     A, B, C : by states, measured inputs and measured outputs.
     nominal : (p,) typical size of the states.
+    ratio : of a state that rolls along over the one that leads it, 0 where none does.
     """
 
     states: tuple[str, ...]
@@ -38,6 +40,7 @@ class Motion:
     B: Matrix
     C: Matrix
     nominal: Vector
+    ratio: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +60,14 @@ class Lead:
 
 
 def motion(fmu: FMU, system: System) -> Motion:
-    """Linearise a model at the design point; the FMU is left there."""
+    """Linearise a model at the design point; the FMU is started anew."""
     states = corrected_states(fmu, system)
     model = linearised(fmu, system).of(states)
     at = [fmu.states.index(name) for name in states]
     inputs = fmu.variables([one.name for one in system.inputs])
-    return Motion(states, model.A, fmu.input_jacobian(inputs)[at], model.C, model.nominal)
+    B = fmu.input_jacobian(inputs)[at]
+    ratio = rolling_ratio(fmu, system) if system.rolling else 0.0
+    return Motion(states, model.A, B, model.C, model.nominal, ratio)
 
 
 def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:

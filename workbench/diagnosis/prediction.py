@@ -28,7 +28,6 @@ from workbench.kernel import (
     set_states,
     solve,
 )
-from workbench.observers.contract import rolling_ratio
 from workbench.system import System
 
 _LONGEST = 1.2  # sample times, of a step: what is stepped explicitly has to be stable
@@ -223,22 +222,17 @@ class Predictor:
         readings = [system.signals[name].reading for name in signals]
         self._model = instance(fmu, inputs, system.corrections, readings)
         self._longest = _LONGEST * system.sample_time
-        leading, rolling = system.comparison.leading, system.rolling
+        leading = system.comparison.leading
         states: list[int] = []
         if leading is not None:
             others = [name for name in leading.together if name != leading.output]
             states = [fmu.states.index(name) for name in (leading.output, *others)]
         column = list(signals).index(leading.output) if leading is not None else 0
         self._leading = np.array(states, np.intp), column
-        self._ratio = rolling_ratio(fmu, system) if rolling is not None else 0.0
 
     def begin(self, samples: Samples) -> dict[str, float]:
-        """Start values of states, as measured at the start of a recording."""
-        rolling = self._system.rolling
-        known = {name: value for name, value in samples.begin.items() if name in self._fmu.states}
-        if rolling is not None and rolling.leader in known:
-            known[rolling.follower] = self._ratio * known[rolling.leader]
-        return known
+        """Start values of states, as known at the start of a recording."""
+        return {name: value for name, value in samples.begin.items() if name in self._fmu.states}
 
     def errors(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
         """Prediction errors along one recording.

@@ -53,7 +53,7 @@ class Samples:
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
     lead : how all outputs correct the states, or None where one leads alone.
     held : (m,) whether an input is held from a sample to the next; else it goes there.
-    begin : each output at the start, by a line through its first samples.
+    begin : outputs, and what rolls along, at the start.
     rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
     blocks : (b, 2) first sample and end of each block that counts.
     slopes : (c, c) of the channels by the signals.
@@ -196,11 +196,11 @@ def prepare(
             moved * acting, deviation[leading.output], wrong[leading.output]
         )
     else:
-        noises = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
-        lead = led_by(motion, *noises, h)
+        inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
+        lead = led_by(motion, inputs, outputs, h)
         count = len(case.outputs)
         ahead[:, :count, :count] = lead.ahead
-    inputs = [_smooth(clean[one.name], one.smoothed, h) for one in system.inputs]
+    driving = [_smooth(clean[one.name], one.smoothed, h) for one in system.inputs]
     rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
     zero = compare.rest.zero if compare.rest else 1.0
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
@@ -209,13 +209,15 @@ def prepare(
         name=case.name,
         time=time,
         inputs=case.inputs,
-        u=np.ascontiguousarray(np.column_stack(inputs)),
+        u=np.ascontiguousarray(np.column_stack(driving)),
         signals=signals,
         y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
         gain=gain,
         lead=lead,
         held=np.array([one.held for one in system.inputs]),
-        begin={name: _first(time[start], clean[name][start]) for name in case.outputs},
+        begin=_begin(
+            system, {n: _first(time[start], clean[n][start]) for n in case.outputs}, motion
+        ),
         rest=float(np.mean(rest)),
         rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), zero)),
         blocks=blocks,
@@ -302,6 +304,13 @@ def _first(time: Vector, values: Vector) -> float:
     if time.size < 3:
         return float(values[0])
     return float(np.polynomial.Polynomial.fit(time - time[0], values, 1)(0.0))
+
+
+def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
+    """What is known of states at the start: as measured, but a follower rolls along."""
+    if system.rolling is None or system.rolling.leader not in measured:
+        return measured
+    return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}
 
 
 def _applied(clean: Mapping[str, Vector], system: System, time: Vector) -> int:
