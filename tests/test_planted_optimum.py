@@ -358,8 +358,8 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
     assert found is not None
     assert found.history[0].z > 2 * z
 
-    optimum = np.array([best.L[0, 0], best.L[3, 0]])
-    x = np.array([gain(found, blind, name) for name in free])
+    optimum = np.array([best["L11"], best["L41"]])
+    x = np.array([gain(found, name) for name in free])
 
     def expected(x: np.ndarray) -> float:
         return expected_force(gains_of(*x, process.rate), process)
@@ -421,4 +421,4 @@ def test_search_ends_where_the_two_worst_cases_are_equally_bad(
     # Two curves that are wrong by so much cross elsewhere by their difference over that of slopes.
     margin = 4 * float(np.hypot(*errors)) / (rise_noisy - rise_lively)
     assert margin < 0.2
-    assert abs(np.log(-gain(found, blind, "L41")) - crossing) < margin
+    assert abs(np.log(-gain(found, "L41")) - crossing) < margin
