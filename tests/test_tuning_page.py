@@ -216,7 +216,7 @@ def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
     changed["provenance"]["cases"].remove(HOSTILE)
     changed["folds"] = []
     page = written(changed, tmp_path)
-    assert "tuned on one recorded stop" in text(page.find(".//h1"))
+    assert "tuned on one recording" in text(page.find(".//h1"))
     assert "the only case is 03_dry_120_3.6" in headline(page)
 
 
@@ -286,7 +286,7 @@ def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
         for name, (meaning, unit) in meanings.items()
     }
     page = written(changed | {"sensitivity": dict.fromkeys(meanings, effect)}, tmp_path)
-    assert text(page.find(".//h1")) == "Extended Kalman filter, tuned on 2 recorded stops"
+    assert text(page.find(".//h1")) == "Extended Kalman filter, tuned on 2 recordings"
     units = data(page, "gain-table")["unit"]
     assert units[["omegaW_relative", "initial"]].eq("1").all()
     assert units[["omegaW", "omegaR"]].eq("rad/s").all()

@@ -118,7 +118,8 @@ def quotient(unit: str, divisor: str) -> str:
     """
     registry = _units()
     ratio = registry.Quantity(1.0, _spelled(unit)) / registry.Quantity(1.0, _spelled(divisor))
-    above, below = [], []
+    above: list[str] = []
+    below: list[str] = []
     for name, power in ratio.to_reduced_units().unit_items():
         size = f"{abs(power):g}" if abs(power) != 1 else ""
         (above if power > 0 else below).append(registry.get_symbol(name) + size)
