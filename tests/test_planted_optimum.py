@@ -25,7 +25,6 @@ from workbench.objective import corner
 from workbench.observers import Gains, SearchSpace
 from workbench.observers.disturbance import DisturbanceObserver
 from workbench.pool import Pool
-from workbench.system import System
 from workbench.systems import load_system
 from workbench.tuning import (
     Evaluator,
