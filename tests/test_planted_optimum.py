@@ -234,7 +234,7 @@ def expected_force(gains: Gains, process: Process) -> float:
     return float(stationary(gains, process).means[2])
 
 
-NAMES = tuple(f"L{i}{j}" for i in (1, 2, 3, 4) for j in (1, 2, 3, 4)) + ("T_muWR", "T_muDC")
+NAMES = (*(f"L{i}{j}" for i in (1, 2, 3, 4) for j in (1, 2, 3, 4)), "T_muWR", "T_muDC")
 
 
 def gains_of(L11: float, L41: float, T_muDC: float) -> Gains:
