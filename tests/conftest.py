@@ -15,18 +15,11 @@ import pytest
 
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
-from workbench.objective import Weights
 from workbench.pool import Pool
 from workbench.system import System
-from workbench.systems import load_system
-from workbench.tuning import (
-    Evaluator,
-    Job,
-    SearchSpace,
-    reasoned_gains,
-    recording,
-    search_space,
-)
+from workbench.systems import load_system, open_model
+from workbench.tuning import Evaluator, Job, Problem, tunable
+from workbench.tuning import prepare as prepare_tuning
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
@@ -82,27 +75,25 @@ def stop_beginnings(system: System) -> list[Case]:
 
 
 @pytest.fixture(scope="session")
-def prepare() -> Callable[..., tuple[Job, SearchSpace]]:
-    """Prepares the tuning of an estimator on an FMU, from its reasoned gains, over cases."""
+def prepare(system: System) -> Callable[[str, Sequence[Case]], Problem]:
+    """Prepares the tuning of an estimator over cases as they were recorded."""
 
-    def prepared(name: str, path: Path, cases: Sequence[Case]) -> tuple[Job, SearchSpace]:
-        with FMU(path) as fmu:
-            gains = reasoned_gains(name, fmu)
-            space = search_space(fmu, gains, slowest=1 / 40, fastest=200.0)
-        job = Job(name, path.read_bytes(), {}, gains, tuple(map(recording, cases)), Weights())
-        return job, space
+    def prepared(name: str, cases: Sequence[Case]) -> Problem:
+        problem = prepare_tuning(system, name, cases, {})
+        kind = tunable(system, name)
+        with open_model(system, kind.role) as model:
+            space = kind.space(model, system, problem.job.gains, slowest=1 / 40, fastest=200.0)
+        return replace(problem, space=space)
 
     return prepared
 
 
 @pytest.fixture(scope="session")
 def problem(
-    prepare: Callable[..., tuple[Job, SearchSpace]],
-    minimal_path: Path,
-    stop_beginnings: list[Case],
-) -> tuple[Job, SearchSpace]:
+    prepare: Callable[[str, Sequence[Case]], Problem], stop_beginnings: list[Case]
+) -> Problem:
     """Tuning of the disturbance observer."""
-    return prepare("disturbance_observer", minimal_path, stop_beginnings)
+    return prepare("disturbance_observer", stop_beginnings)
 
 
 @pytest.fixture
@@ -113,10 +104,8 @@ def inline() -> Iterator[Callable[[Job], Pool[Evaluator]]]:
 
 
 @pytest.fixture
-def pool(
-    inline: Callable[[Job], Pool[Evaluator]], problem: tuple[Job, SearchSpace]
-) -> Pool[Evaluator]:
-    return inline(problem[0])
+def pool(inline: Callable[[Job], Pool[Evaluator]], problem: Problem) -> Pool[Evaluator]:
+    return inline(problem.job)
 
 
 # --- the C runtime ---

@@ -3,7 +3,6 @@
 import json
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,65 +12,59 @@ from numpy.testing import assert_allclose
 from workbench.__main__ import main
 from workbench.case import read_cases
 from workbench.fmu import FMU
-from workbench.objective import Weights
-from workbench.observers import (
-    DisturbanceGains,
-    DisturbanceObserver,
-    ParameterEstimator,
-    ParameterGains,
-    reasoned_settings,
-)
+from workbench.observers import Estimator, Gains, estimators
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.parameter import ParameterEstimator
 from workbench.pool import Pool
-from workbench.tuning import (
-    DEFAULTS,
-    Evaluator,
-    Job,
-    default_settings,
-    evaluate_gains,
-    read_gains,
-    reasoned_gains,
-    recordings,
-    to_vector,
-)
-from workbench.tuning.settling import HALF_SECOND, Settling
+from workbench.system import System
+from workbench.systems import open_model
+from workbench.tuning import Evaluator, Job, evaluate_gains, prepare
+from workbench.tuning.settling import Settling
 
-MODELS = {"disturbance_observer": "MinimalObserver", "parameter_estimator": "FullObserver"}
+NAMES = ("disturbance_observer", "parameter_estimator")
 
 
 @pytest.fixture(scope="module")
-def models(root: Path) -> Iterator[tuple[FMU, FMU]]:
-    fmus = root / "fmus" / "fmi2"
-    with FMU(fmus / "MinimalObserver.fmu") as minimal, FMU(fmus / "FullObserver.fmu") as full:
-        yield minimal, full
+def models(system: System) -> Iterator[dict[str, FMU]]:
+    """The models of both estimators, by the estimators' names."""
+    with open_model(system) as minimal, open_model(system, "full") as full:
+        yield dict(zip(NAMES, (minimal, full), strict=True))
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", NAMES)
 def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
-    root: Path, inline: Callable[[Job], Pool[Evaluator]], name: str
+    root: Path, system: System, inline: Callable[[Job], Pool[Evaluator]], name: str
 ) -> None:
-    path = root / "fmus" / "fmi2" / f"{MODELS[name]}.fmu"
-    claimed = tomllib.loads((DEFAULTS / f"{name}.toml").read_text())["provenance"]
-    cases = read_cases([root / "cases"])
-    with FMU(path) as fmu:
-        reasoned = reasoned_gains(name, fmu)
-    judged = recordings(cases, claimed["radius_error"])
-    job = Job(name, path.read_bytes(), {}, reasoned, judged, Weights())
-    tuned = read_gains(DEFAULTS / f"{name}.toml")[1]
-    after, before = evaluate_gains(inline(job), job, [to_vector(tuned), to_vector(reasoned)])
+    path = root / "workbench" / "wheelset" / "gains" / f"{name}.toml"
+    claimed = tomllib.loads(path.read_text())["provenance"]
+    cases = read_cases([root / "cases"], system)
+    job = prepare(system, name, cases, claimed["scale_errors"]).job
+    assert dict(system.objective.weights) == claimed["weights"]
+    tuned = read_gains(path, {name: job.gains})
+    after, before = evaluate_gains(inline(job), job, [tuned.values, job.gains.values])
     # The last digits depend on the processor.
-    assert_allclose(after, [claimed["z_k"][one.name] for one in judged], rtol=1e-6)
+    assert_allclose(after, [claimed["z_k"][one.name] for one in job.recordings], rtol=1e-6)
     assert after.max() == pytest.approx(claimed["z"], rel=1e-6)
     assert after.max() < before.max()
 
 
-def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(models: tuple[FMU, FMU]) -> None:
-    minimal, full = models
-    settings, tuned = default_settings(minimal, full)
-    assert set(tuned) == set(MODELS)
-    other, none = default_settings(full, minimal)
-    assert not none
-    assert_allclose(other.disturbance.L, reasoned_settings(full, minimal).disturbance.L)
-    assert np.abs(settings.disturbance.L - other.disturbance.L).max() > 1.0
+def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(
+    system: System, models: dict[str, FMU]
+) -> None:
+    known = estimators(system)
+    minimal, full = models.values()
+    gains = {
+        name: (usual_gains(kind, minimal, system), usual_gains(kind, full, system))
+        for name, kind in known.items()
+    }
+    tuned = {n: [one.source.startswith("tuned") for one in both] for n, both in gains.items()}
+    assert tuned.pop("disturbance_observer") == tuned.pop("disturbance_observer_disc")
+    assert tuned.pop("parameter_estimator") == [False, True]
+    assert not any(any(both) for both in tuned.values())
+    own, other = gains["disturbance_observer"]
+    assert_allclose(other.values, known["disturbance_observer"].reasoned(full, system).values)
+    assert np.abs(own.values - other.values).max() > 1.0
 
 
 def test_simulate_says_whose_gains_it_used(root: Path, tmp_path: Path) -> None:
@@ -87,43 +80,50 @@ def test_simulate_says_whose_gains_it_used(root: Path, tmp_path: Path) -> None:
     assert told[1].startswith("stationary Kalman gain")
 
 
-def slow_disturbance_observer(fmu: FMU) -> tuple[DisturbanceObserver, DisturbanceGains]:
-    gains = reasoned_gains("disturbance_observer", fmu)
-    assert isinstance(gains, DisturbanceGains)
-    L = gains.L.copy()
-    L[3] *= 0.02
-    slow = replace(gains, L=L)
-    return DisturbanceObserver(fmu, slow), slow
+def slow_disturbance_observer(fmu: FMU, system: System) -> tuple[Estimator, Gains]:
+    gains = DisturbanceObserver.reasoned(fmu, system)
+    values = gains.values.copy()
+    values[12:16] *= 0.02  # those that act on muDC
+    slow = gains.with_values(values)
+    return DisturbanceObserver(fmu, system, slow), slow
 
 
-def slow_parameter_estimator(fmu: FMU) -> tuple[ParameterEstimator, ParameterGains]:
-    gains = reasoned_gains("parameter_estimator", fmu)
-    assert isinstance(gains, ParameterGains)
-    slow = replace(gains, L=0.2 * gains.L)
-    return ParameterEstimator(fmu, slow), slow
+def slow_parameter_estimator(fmu: FMU, system: System) -> tuple[Estimator, Gains]:
+    gains = estimators(system)["parameter_estimator"].reasoned(fmu, system)
+    slow = gains.with_values(0.2 * gains.values)
+    return ParameterEstimator(fmu, system, slow), slow
 
 
 @pytest.mark.parametrize(
-    ("make", "which"), [(slow_disturbance_observer, 0), (slow_parameter_estimator, 1)]
+    ("make", "name"),
+    [
+        (slow_disturbance_observer, "disturbance_observer"),
+        (slow_parameter_estimator, "parameter_estimator"),
+    ],
 )
 def test_settling_predicts_how_much_of_a_friction_step_is_left(
-    models: tuple[FMU, FMU], make: Callable[[FMU], tuple], which: int
+    system: System,
+    models: dict[str, FMU],
+    make: Callable[[FMU, System], tuple[Estimator, Gains]],
+    name: str,
 ) -> None:
     """Reference: the observer itself along a model whose friction steps at the operating point."""
-    fmu = models[which]
+    fmu, asked = models[name], system.following
+    assert asked is not None
+    assert asked.within == 0.5
     step, rate = 0.01, 1000
-    settling = Settling(fmu)  # leaves the model in equilibrium
+    settling = Settling(fmu, system, estimators(system)[name])  # leaves the model in equilibrium
     speeds = fmu.variables(["omegaW", "omegaR"])
     fmu.start(dict(zip(("omegaW", "omegaR"), fmu.get(speeds).tolist(), strict=True)))
     inputs = fmu.variables(["pB", "tauR", "dmuDC"])
     coasting, signals = 2 * rate, []
-    for k in range(coasting + round(HALF_SECOND * rate) + 1):
+    for k in range(coasting + round(asked.within * rate) + 1):
         signals.append(fmu.get(speeds).copy())
         fmu.set(inputs, np.array([1.5e5, 0.0, step * (k >= coasting)]))
         fmu.step(1.0 / rate)
     y = np.array(signals)
     u = np.tile([1.5e5, 0.0], (len(y), 1))
-    observer, gains = make(fmu)
+    observer, gains = make(fmu, system)
     friction = observer.run(np.arange(len(y)) / rate, u, y).values[:, 3]
     left = abs(1.0 - (friction[-1] - friction[coasting]) / step)
     # The speed, and with it the slope of the creep law, falls by 6 % in these seconds.

@@ -6,7 +6,7 @@ the objective are then one linear system driven by white noise: the mean magnitu
 sqrt(2/pi) of its standard deviation, which a Lyapunov equation gives for any gains.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -21,22 +21,19 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from workbench.case import Case
-from workbench.objective import BANDWIDTH, Weights
-from workbench.observers import DisturbanceGains
-from workbench.observers.contract import FADING_SPEED
+from workbench.objective import corner
+from workbench.observers import Gains, SearchSpace
+from workbench.observers.disturbance import DisturbanceObserver
 from workbench.pool import Pool
+from workbench.systems import load_system
 from workbench.tuning import (
     Evaluator,
-    Gains,
     Job,
     Plan,
     Search,
-    SearchSpace,
     evaluate_gains,
-    gain_names,
     recording,
     search,
-    to_vector,
 )
 
 pytest.importorskip("casadi")
@@ -67,16 +64,49 @@ package Lib
   end RollingWheelset;
 end Lib;
 """
+SYSTEM = """
+title = "Wheelset without slip"
+reported = ["Fx", "slip"]
+sample_time = "20 ms"
+models.observer = { class = "RollingWheelset", fmu = "RollingWheelset.fmu" }
+
+[inputs]
+pB = { unit = "Pa", noise = "5 mbar", scale = "3 bar" }
+tauR = { unit = "N.m", noise = "40 N.m", scale = "10 kN.m" }
+
+[outputs]
+omegaW = { unit = "rad/s", noise = "0.05 rad/s", scale = "90 rad/s" }
+omegaR = { unit = "rad/s", noise = "0.003 rad/s", scale = "60 rad/s" }
+
+[judged]
+Fx = { unit = "N", noise = "80 N", scale = "20 kN" }
+
+[derived]
+speed = { is = "rR*omegaR", unit = "m/s" }
+
+[estimated]
+muWR = { correction = "dmuWR", range = [0.03, 0.55], walk = 0.05 }
+muDC = { correction = "dmuDC", range = [0.10, 0.45], walk = 0.05, acts_on = "omegaW" }
+
+[feedback]
+fades = { signal = "speed", half = "0.5 m/s" }
+
+[objective]
+judged = "Fx"
+weights = { omegaW = 1.0, omegaR = 1.0, Fx = 1e-3 }
+bandwidth = "5 Hz"
+"""
 RW, RR, JR, MU_DC, PADS = 0.46, 0.70, 1500.0, 0.275, 0.09  # as in the model
 PRESSURE = 2e5  # [Pa]
 VELOCITY = 1.0  # [m/s], so slow that a fifth of the feedback has faded out
 FORCE = PADS * PRESSURE / RW  # of friction 1 [N]
 EFFECT = -RR * FORCE / JR * np.array([RR / RW, 1.0])  # of friction on both speeds [rad/s2]
-FADING = VELOCITY**2 / (VELOCITY**2 + FADING_SPEED**2)
+FADING = VELOCITY**2 / (VELOCITY**2 + 0.5**2)  # half of it at 0.5 m/s
 AUTHORITY = 0.5  # of muDC, whose full authority is at twice the pressure
 SHARES = FADING * np.array([1.0, 1.0, AUTHORITY])  # of the rows omegaW, omegaR, muDC of L
-CORNER = 2 * np.pi * BANDWIDTH / np.sqrt(np.sqrt(2) - 1)  # of two poles, 3 dB at the bandwidth
-FORCE_ALONE = Weights(cW=0.0, cR=0.0)
+CORNER = 2 * np.pi * 5.0 / np.sqrt(np.sqrt(2) - 1)  # of two poles, 3 dB at 5 Hz
+ALL = {"omegaW": 1.0, "omegaR": 1.0, "Fx": 1e-3}
+FORCE_ALONE = {**ALL, "omegaW": 0.0, "omegaR": 0.0}
 
 
 @dataclass(frozen=True)
@@ -108,7 +138,7 @@ class Process:
 
     @property
     def rate(self) -> float:
-        """T_DC of the observer that forgets as fast: its steps are implicit [1/s]."""
+        """T_muDC of the observer that forgets as fast: its steps are implicit [1/s]."""
         return (1.0 - 1.0 / self.kept) / self.step
 
 
@@ -120,13 +150,17 @@ def record(process: Process, samples: int, rng: np.random.Generator) -> Case:
     return Case(
         name="rolling",
         title="rolling",
-        conditions=None,  # type: ignore[arg-type]
+        conditions={},
         time=process.step * np.arange(samples),
-        pB=np.full(samples, PRESSURE),
-        tauR=RR * Fx,  # the drive holds the speed
-        omegaW=omega[:, 0],
-        omegaR=omega[:, 1],
-        Fx=Fx,
+        signals={
+            "pB": np.full(samples, PRESSURE),
+            "tauR": RR * Fx,  # the drive holds the speed
+            "omegaW": omega[:, 0],
+            "omegaR": omega[:, 1],
+            "Fx": Fx,
+        },
+        inputs=("pB", "tauR"),
+        outputs=("omegaW", "omegaR"),
         source=Path("rolling"),
     )
 
@@ -169,13 +203,14 @@ class Stationary(NamedTuple):
         return self.means * np.sqrt((2 * terms.sum(axis=0) - terms[0]) / samples)
 
 
-def stationary(gains: DisturbanceGains, process: Process) -> Stationary:
+def stationary(gains: Gains, process: Process) -> Stationary:
     """The loop of process, disturbance observer (equation 9, implicit Euler) and low-pass."""
     h = process.step
-    to_friction = SHARES[:, None] * gains.L[[0, 1, 3], :2]
+    L = gains.values[:16].reshape(4, 4)
+    to_friction = SHARES[:, None] * L[[0, 1, 3], :2]
     implicit = np.eye(3)  # 1 - h A
     implicit[:2, 2] = -h * EFFECT
-    implicit[2, 2] -= h * gains.T_DC
+    implicit[2, 2] -= h * gains["T_muDC"]
     measured = np.eye(2, 3)
     K = solve(implicit + h * to_friction @ measured, h * to_friction)
     # Rows by what was before the step (10) and the white noise in it (3).
@@ -194,19 +229,23 @@ def stationary(gains: DisturbanceGains, process: Process) -> Stationary:
     return Stationary(transition, solve_discrete_lyapunov(transition, driven @ driven.T))
 
 
-def expected_force(gains: DisturbanceGains, process: Process) -> float:
+def expected_force(gains: Gains, process: Process) -> float:
     """The z that a recording without end has where only the force counts."""
     return float(stationary(gains, process).means[2])
 
 
-def gains_of(L11: float, L41: float, T_DC: float) -> DisturbanceGains:
+NAMES = (*(f"L{i}{j}" for i in (1, 2, 3, 4) for j in (1, 2, 3, 4)), "T_muWR", "T_muDC")
+
+
+def gains_of(L11: float, L41: float, T_muDC: float) -> Gains:
     """The wheelset's speed corrects itself and muDC, the roller's speed itself alone."""
-    L = np.zeros((4, 4))
-    L[0, 0], L[1, 1], L[3, 0] = L11, 10.0, L41
-    return DisturbanceGains(L, 0.0, T_DC, np.array([1.0, EFFECT[0] / AUTHORITY]))
+    given = {"L11": L11, "L22": 10.0, "L41": L41, "T_muDC": T_muDC}
+    values = np.array([given.get(name, 0.0) for name in NAMES])
+    design = {"effect": np.array([1.0, EFFECT[0] / AUTHORITY])}
+    return Gains(DisturbanceObserver.name, NAMES, values, design, "")
 
 
-def kalman_gains(process: Process) -> tuple[DisturbanceGains, float]:
+def kalman_gains(process: Process) -> tuple[Gains, float]:
     """The stationary Kalman filter as gains of the observer, and its error of the force [kN].
 
     An implicit step with L is a prediction and a correction by K = (1 - h A + h L C)^-1 h L.
@@ -223,13 +262,13 @@ def kalman_gains(process: Process) -> tuple[DisturbanceGains, float]:
     return gains_of(*L, process.rate), 1e-3 * FORCE * float(error)
 
 
-def around(gains: DisturbanceGains, free: Sequence[str]) -> SearchSpace:
+def around(gains: Gains, free: Sequence[str]) -> SearchSpace:
     """Gains of either sign up to 100, for those that are free; the others stay."""
-    values = to_vector(gains)
+    values = gains.values
     ones = np.ones(values.size)
     both = SearchSpace(0.01 * ones, 100.0 * ones, -ones, ones, ones)
     start = both.coordinates(values)
-    fixed = ~np.isin(gain_names(gains), free)
+    fixed = ~np.isin(gains.names, free)
     s = 2.0 * start - 1.0
     return replace(
         both,
@@ -239,8 +278,8 @@ def around(gains: DisturbanceGains, free: Sequence[str]) -> SearchSpace:
     )
 
 
-def gain(found: Search, gains: Gains, name: str) -> float:
-    return float(found.best[gain_names(gains).index(name)])
+def gain(found: Search, name: str) -> float:
+    return float(found.best[NAMES.index(name)])
 
 
 @pytest.fixture(scope="module")
@@ -251,11 +290,15 @@ def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., J
     package.parent.mkdir()
     package.write_text(MODEL)
     compiler.build(package, "Lib.RollingWheelset", path, platforms=[compiler.native()])
+    (folder / "system.toml").write_text(SYSTEM)
+    rolling = load_system(folder)
+    assert corner(rolling.objective) == pytest.approx(CORNER)
 
-    def prepared(gains: Gains, weights: Weights, *cases: Case) -> Job:
-        recordings = tuple(map(recording, cases))
+    def prepared(gains: Gains, weights: Mapping[str, float], *cases: Case) -> Job:
+        judged = replace(rolling, objective=replace(rolling.objective, weights=weights))
+        recordings = tuple(recording(case, judged) for case in cases)
         model = path.read_bytes()
-        return Job("disturbance_observer", model, {}, gains, recordings, weights, np.inf)
+        return Job(gains.estimator, judged, model, gains, recordings, follows=False)
 
     return prepared
 
@@ -265,19 +308,19 @@ def test_z_is_that_of_the_lyapunov_equation(
     prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], step: float
 ) -> None:
     """The low-pass follows a deviation wholly within 0.2 s, and by 39 % within 0.02 s."""
-    process, samples, weights = Process(step), 100_000, Weights()
+    process, samples = Process(step), 100_000
     best, _ = kalman_gains(process)
-    L11, L41, T_DC = best.L[0, 0], best.L[3, 0], best.T_DC
+    L11, L41, T_muDC = best["L11"], best["L41"], best["T_muDC"]
     several = [
         best,
-        gains_of(3 * L11, 3 * L41, T_DC),
-        gains_of(L11 / 3, L41 / 3, T_DC),
-        gains_of(L11, L41 / 3, 5 * T_DC),
-        gains_of(L11, 0.0, T_DC),
+        gains_of(3 * L11, 3 * L41, T_muDC),
+        gains_of(L11 / 3, L41 / 3, T_muDC),
+        gains_of(L11, L41 / 3, 5 * T_muDC),
+        gains_of(L11, 0.0, T_muDC),
     ]
-    job = prepare_rolling(best, weights, record(process, samples, np.random.default_rng(1)))
-    z = evaluate_gains(inline(job), job, list(map(to_vector, several)))[:, 0]
-    scale = weights.vector * [1.0, 1.0, 1e3]
+    job = prepare_rolling(best, ALL, record(process, samples, np.random.default_rng(1)))
+    z = evaluate_gains(inline(job), job, [gains.values for gains in several])[:, 0]
+    scale = np.array(list(ALL.values())) * [1.0, 1.0, 1e3]
     loops = [stationary(gains, process) for gains in several]
     expected = np.array([scale @ loop.means for loop in loops])
     # At most, if the three terms of z err together.
@@ -297,7 +340,7 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
     optimum with the covariance pi/2 z/n inv(H), and their expected z exceeds the least by pi/4 z/n
     times a chi2 with as many degrees of freedom as gains.
 
-    T_DC is not searched: it may change places with the effective -L11 in the transfer from omegaW
+    T_muDC is not searched: it may change places with the effective -L11 in the transfer from omegaW
     to muDC, so that there are two optima.
     """
     process, samples, free = Process(step=0.2), 20_000, ["L11", "L41"]
@@ -314,8 +357,8 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
     assert found is not None
     assert found.history[0].z > 2 * z
 
-    optimum = np.array([best.L[0, 0], best.L[3, 0]])
-    x = np.array([gain(found, blind, name) for name in free])
+    optimum = np.array([best["L11"], best["L41"]])
+    x = np.array([gain(found, name) for name in free])
 
     def expected(x: np.ndarray) -> float:
         return expected_force(gains_of(*x, process.rate), process)
@@ -377,4 +420,4 @@ def test_search_ends_where_the_two_worst_cases_are_equally_bad(
     # Two curves that are wrong by so much cross elsewhere by their difference over that of slopes.
     margin = 4 * float(np.hypot(*errors)) / (rise_noisy - rise_lively)
     assert margin < 0.2
-    assert abs(np.log(-gain(found, blind, "L41")) - crossing) < margin
+    assert abs(np.log(-gain(found, "L41")) - crossing) < margin

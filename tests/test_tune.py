@@ -6,22 +6,19 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
-from workbench.commands.arguments import FULL_OBSERVER, MINIMAL_OBSERVER
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.observers import FilterNoise, reasoned_settings
-from workbench.tuning import (
-    format_gains,
-    read_gains,
-    reasoned_gains,
-    to_vector,
-    with_tuned,
-)
+from workbench.observers import Gains
+from workbench.observers.gains_file import format_gains, read_gains
+from workbench.simulation import prepare
+from workbench.system import System
+from workbench.systems import open_model
+from workbench.tuning import tunable
 
 CASES = ("03_dry_120_3.6", "08_wet_120_3.6")
 SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
@@ -30,18 +27,26 @@ SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
 # --- gains.toml ---
 
 
+def reasoned(system: System, name: str) -> Gains:
+    kind = tunable(system, name)
+    with open_model(system, kind.role) as fmu:
+        return kind.reasoned(fmu, system)
+
+
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf", "ukf"])
-def test_gains_read_back_to_the_bit(root: Path, tmp_path: Path, name: str) -> None:
-    model = "FullObserver" if name == "parameter_estimator" else "MinimalObserver"
-    with FMU(root / "fmus" / "fmi2" / f"{model}.fmu") as fmu:
-        gains = reasoned_gains(name, fmu)
+def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -> None:
+    gains = reasoned(system, name)
+    provenance = {"z": 0.1, "cases": ['a "b"'], "z_k": {"a.b": 1}}
     path = tmp_path / "gains.toml"
-    path.write_text(format_gains(name, gains, {"z": 0.1, "cases": ['a "b"'], "z_k": {"a.b": 1}}))
-    estimator, read = read_gains(path)
-    assert estimator == name
-    assert_array_equal(to_vector(read), to_vector(gains))
-    if not isinstance(read, FilterNoise):
-        assert_array_equal(read.effect, gains.effect)  # type: ignore[union-attr]
+    path.write_text(format_gains(gains, tunable(system, name).meaning, provenance))
+    # Values to read into are not those that were written.
+    read = read_gains(path, {name: gains.with_values(np.zeros(gains.values.size))})
+    assert read.estimator == name
+    assert read.names == gains.names
+    assert_array_equal(read.values, gains.values)
+    assert set(read.design) == set(gains.design)
+    for constant, values in gains.design.items():
+        assert_array_equal(read.design[constant], values)
 
 
 @pytest.mark.parametrize(
@@ -49,15 +54,22 @@ def test_gains_read_back_to_the_bit(root: Path, tmp_path: Path, name: str) -> No
     [
         ("gains = ", "no TOML"),
         ("[gains]", "estimator = None"),
-        ('estimator = "ekf"\n[gains]\nmodel = 1', r"no omegaW_relative in \[gains\]"),
-        ('estimator = "parameter_estimator"\n[gains]', "effect = None"),
+        ('estimator = "ekf"\n[gains]\nmodel = 1', r"no omegaW in \[gains\]"),
+        (
+            'estimator = "parameter_estimator"\n[gains]\n'
+            + "".join(f"L{i}{j} = 1\n" for i in (1, 2) for j in (1, 2, 3, 4)),
+            "effect = None",
+        ),
     ],
 )
-def test_a_wrong_file_of_gains_is_refused(tmp_path: Path, text: str, match: str) -> None:
+def test_a_wrong_file_of_gains_is_refused(
+    system: System, tmp_path: Path, text: str, match: str
+) -> None:
     path = tmp_path / "gains.toml"
     path.write_text(text)
+    known = {name: reasoned(system, name) for name in ("ekf", "parameter_estimator")}
     with pytest.raises(InputError, match=match):
-        read_gains(path)
+        read_gains(path, known)
 
 
 # --- as a user runs it ---
@@ -133,6 +145,7 @@ def alive(pid: int) -> bool:
 
 def test_results_keep_their_contract(
     root: Path,
+    system: System,
     folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -151,15 +164,15 @@ def test_results_keep_their_contract(
     assert summary["z"] <= summary["z_reasoned"]
     assert len(summary["folds"]) == 2
     assert len(summary["provenance"]["fmu"]["sha256"]) == 64
-    estimator, gains = read_gains(tmp_path / "gains.toml")
-    assert estimator == "parameter_estimator"
-    assert_array_equal(to_vector(gains), [g["value"] for g in summary["gains"].values()])
+    path = tmp_path / "gains.toml"
+    gains = read_gains(path, {"parameter_estimator": reasoned(system, "parameter_estimator")})
+    assert_array_equal(gains.values, [g["value"] for g in summary["gains"].values()])
     for name in ("convergence.png", "cases.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert not list(tmp_path.glob("*.part"))
-    with FMU(MINIMAL_OBSERVER) as minimal, FMU(FULL_OBSERVER) as full:
-        settings = with_tuned(reasoned_settings(minimal, full), gains)
-    assert settings.parameter is gains
+    kind = tunable(system, "parameter_estimator")
+    simulation = prepare(system, {kind.name: kind}, path)
+    assert_array_equal(simulation.gains[kind.name].values, gains.values)
 
 
 @pytest.mark.parametrize(

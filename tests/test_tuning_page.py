@@ -18,9 +18,10 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.fmu import FMU
-from workbench.report.tuning import meanings, write_tuning_page
-from workbench.tuning import TUNABLE, gain_names, reasoned_gains
+from workbench.observers import Gains, estimators
+from workbench.report.tuning import write_tuning_page
+from workbench.system import System
+from workbench.systems import load_system, open_model
 
 HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
 CASES = {"03_dry_120_3.6": "03_dry_120_3.6", HOSTILE: "08_wet_120_3.6"}  # and where it is from
@@ -193,12 +194,12 @@ def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(
 
 def test_gains_at_a_bound_are_named_and_flagged(changed: dict[str, Any], tmp_path: Path) -> None:
     for name, gain in changed["gains"].items():
-        gain["at_bound"] = name in ("L12", "T_WR")
+        gain["at_bound"] = name in ("L12", "T_muWR")
     page = written(changed, tmp_path)
-    assert "; L12, T_WR ended at a bound" in headline(page)
+    assert "; L12, T_muWR ended at a bound" in headline(page)
     table = page.get_element_by_id("gain-table")
     flagged = [row for row in table.find("tbody") if row.find_class("warning")]
-    assert [text(row[0]) for row in flagged] == ["L12", "T_WR"]
+    assert [text(row[0]) for row in flagged] == ["L12", "T_muWR"]
     assert all("at bound" in text(row[-1]) for row in flagged)
 
 
@@ -215,7 +216,7 @@ def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
     changed["provenance"]["cases"].remove(HOSTILE)
     changed["folds"] = []
     page = written(changed, tmp_path)
-    assert "tuned on one recorded stop" in text(page.find(".//h1"))
+    assert "tuned on one recording" in text(page.find(".//h1"))
     assert "the only case is 03_dry_120_3.6" in headline(page)
 
 
@@ -247,31 +248,47 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page: Any, summary: dict[
             assert row[column] == (np.inf if effect[key] is None else effect[key])
         assert ("does not matter" in row["remark"]) == (not effect["matters"])
     units = table["unit"]
-    assert units[["L12", "L21", "T_DC"]].eq("1/s").all()
+    assert units[["L12", "L21", "T_muDC"]].eq("1/s").all()
     assert units[["L13", "L24"]].eq("1/s2").all()
     assert units[["L31", "L42"]].eq("1/rad").all()
     assert units[["L33", "L44"]].eq("1/(rad.s)").all()
     assert table.at["L43", "what it does"] == "rate of dmuDC by ∫ omegaW"
 
 
+TUNABLE = [name for name, kind in estimators(load_system("wheelset")).items() if kind.tunable]
+
+
+def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:
+    """Reasoned gains of an estimator, and what it tells of them."""
+    kind = estimators(system)[estimator]
+    with open_model(system, kind.role) as fmu:
+        gains = kind.reasoned(fmu, system)
+        return gains, kind.meanings(fmu, system, gains)
+
+
 @pytest.mark.parametrize("estimator", TUNABLE)
-def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(root: Path, estimator: str) -> None:
-    model = "FullObserver" if estimator == "parameter_estimator" else "MinimalObserver"
-    with FMU(root / "fmus" / "fmi2" / f"{model}.fmu") as fmu:
-        names = gain_names(reasoned_gains(estimator, fmu))
-    assert set(meanings(estimator)) == set(names)
+def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(
+    system: System, estimator: str
+) -> None:
+    gains, meanings = told(system, estimator)
+    assert set(meanings) == set(gains.names)
+    assert all(meaning and unit for meaning, unit in meanings.values())
 
 
 def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
-    changed: dict[str, Any], tmp_path: Path
+    system: System, changed: dict[str, Any], tmp_path: Path
 ) -> None:
     gain, effect = changed["gains"]["L11"], changed["sensitivity"]["L11"]
-    names = meanings("ekf")
-    changed |= {"estimator": "ekf", "gains": dict.fromkeys(names, gain)}
-    page = written(changed | {"sensitivity": dict.fromkeys(names, effect)}, tmp_path)
-    assert text(page.find(".//h1")) == "Extended Kalman filter, tuned on 2 recorded stops"
+    _, meanings = told(system, "ekf")
+    changed |= {"estimator": "ekf", "label": estimators(system)["ekf"].label}
+    changed["gains"] = {
+        name: gain | {"meaning": meaning, "unit": unit}
+        for name, (meaning, unit) in meanings.items()
+    }
+    page = written(changed | {"sensitivity": dict.fromkeys(meanings, effect)}, tmp_path)
+    assert text(page.find(".//h1")) == "Extended Kalman filter, tuned on 2 recordings"
     units = data(page, "gain-table")["unit"]
-    assert units[["omegaW_relative", "initial_friction"]].eq("1").all()
+    assert units[["omegaW_relative", "initial"]].eq("1").all()
     assert units[["omegaW", "omegaR"]].eq("rad/s").all()
     assert units[["muWR", "muDC"]].eq("1/sqrt(s)").all()
 
@@ -327,8 +344,8 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(
         assert row["z, reasoned"] == fold["reasoned"]
         assert row["z, tuned without them"] == fold["tuned"]
         assert row["z of the cases tuned on"] == fold["z"]
-        assert row["error of Fx, reasoned"] == fold["force_reasoned"]
-        assert row["error of Fx, tuned without them"] == fold["force"]
+        assert row["error of Fx, reasoned"] == fold["error_reasoned"]
+        assert row["error of Fx, tuned without them"] == fold["error"]
     better, lost = changed["folds"]
     better["tuned"], lost["tuned"] = 0.9 * better["reasoned"], float("inf")
     one_lost = written(changed, tmp_path)
@@ -427,8 +444,12 @@ def test_other_estimators_are_compared_and_better_ones_are_bad_news(
     assert not written(changed | {"beside": {}}, tmp_path).xpath("//*[@id='beside-table']")
     z, name = changed["z"], "disturbance observer"
     changed["beside"] = {
-        "direct_inversion": {"z": 9.0 * z, "worst": HOSTILE},
-        "ekf": {"z": 0.5 * z, "worst": "03_dry_120_3.6"},
+        "direct_inversion": {"label": "direct inversion", "z": 9.0 * z, "worst": HOSTILE},
+        "ekf": {
+            "label": "extended Kalman filter",
+            "z": 0.5 * z,
+            "worst": "03_dry_120_3.6",
+        },
     }
     beside = written(changed, tmp_path)
     table = data(beside, "beside-table")

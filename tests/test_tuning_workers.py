@@ -18,15 +18,13 @@ from workbench.tuning import (
     Candidate,
     Evaluation,
     Evaluator,
-    Job,
     Plan,
+    Problem,
     Search,
-    SearchSpace,
     Workers,
     evaluate_all,
     evaluators,
     search,
-    to_vector,
 )
 from workbench.tuning.checkpoint import load
 from workbench.tuning.search import identity
@@ -34,22 +32,20 @@ from workbench.tuning.search import identity
 SMALL = Plan(generations=4, population=1, seed=3)
 
 
-def run(
-    pool: Workers, problem: tuple[Job, SearchSpace], path: Path, plan: Plan, **options
-) -> Search:
-    job, space = problem
+def run(pool: Workers, problem: Problem, path: Path, plan: Plan, **options) -> Search:
+    job, space = problem.job, problem.space
     found = search(pool, job, space, range(len(job.recordings)), plan, path, **options)
     assert found is not None
     return found
 
 
 def test_economy_changes_nothing_but_the_work(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     plan = replace(SMALL, generations=8)
     thrifty = run(pool, problem, tmp_path / "a.json", plan)
     full = run(pool, problem, tmp_path / "b.json", replace(plan, economy=False))
-    mark = identity(*problem, range(3), plan)
+    mark = identity(problem.job, problem.space, range(3), plan)
     a, b = (load(tmp_path / name, mark) for name in ("a.json", "b.json"))
     assert a is not None
     assert b is not None
@@ -66,10 +62,10 @@ def test_economy_changes_nothing_but_the_work(
 
 
 def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     """One process of two is killed while it works."""
-    job, _ = problem
+    job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
     killed: list[int] = []
     with evaluators(job, 2) as two:
@@ -91,12 +87,12 @@ def pid(evaluator: Evaluator) -> int:
 
 
 def test_a_cluster_finds_the_same_gains(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     distributed = pytest.importorskip("distributed")
     from workbench.tuning.cluster import DaskPool
 
-    job, _ = problem
+    job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
     options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
     with distributed.LocalCluster(processes=False, **options) as cluster:
@@ -109,12 +105,12 @@ def test_a_cluster_finds_the_same_gains(
 
 
 def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
-    problem: tuple[Job, SearchSpace],
+    problem: Problem,
 ) -> None:
-    job, _ = problem
+    job = problem.job
     endless = (0,) * 100_000  # at 1 ms a case, two minutes
     with evaluators(job, 1, limit=0.3) as hasty:
-        [evaluation] = evaluate_all(hasty, [Candidate(to_vector(job.gains), np.inf, endless)], 3)
+        [evaluation] = evaluate_all(hasty, [Candidate(job.gains.values, np.inf, endless)], 3)
     assert evaluation.crashed
     assert evaluation.z == np.inf
 
@@ -140,9 +136,9 @@ def die(evaluator: Evaluator) -> Evaluation:
 
 
 def test_only_the_candidate_that_kills_workers_is_lost(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator]
+    problem: Problem, pool: Pool[Evaluator]
 ) -> None:
-    job, space = problem
+    job, space = problem.job, problem.space
     values = [space.gains(np.clip(space.start + 0.001 * i, 0, 1)) for i in range(20)]
     candidates = [Candidate(v, np.inf, (0, 1, 2)) for v in values]
     undisturbed = evaluate_all(pool, candidates, 3)
@@ -157,7 +153,7 @@ def test_only_the_candidate_that_kills_workers_is_lost(
 
 
 def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
-    problem: tuple[Job, SearchSpace],
+    problem: Problem,
     pool: Pool[Evaluator],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -185,7 +181,7 @@ def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
 
 
 def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     whole = run(pool, problem, tmp_path / "whole.json", SMALL)
 
@@ -203,7 +199,7 @@ def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
 
 
 def test_another_search_does_not_go_on_from_a_checkpoint(
-    problem: tuple[Job, SearchSpace], pool: Pool[Evaluator], tmp_path: Path
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     path = tmp_path / "checkpoint.json"
     run(pool, problem, path, SMALL)

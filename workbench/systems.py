@@ -94,6 +94,11 @@ def open_model(system: System, role: str = OBSERVER) -> FMU:
     """
     path = system.model(role).path
     assert path is not None
+    return open_file(path, system)
+
+
+def open_file(path: Path, system: System) -> FMU:
+    """Open a model file as one of a system; see `open_model`."""
     fmu = FMU(path, system.names)
     given = {name: value for name, value in system.given.items() if name in fmu.parameters}
     if given:

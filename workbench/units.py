@@ -109,17 +109,24 @@ def si_factor(unit: str, si: str, where: str) -> float:
 
 
 def quotient(unit: str, divisor: str) -> str:
-    """Unit of a quantity over another one.
+    """Unit of a quantity over another one, as Modelica writes it.
 
     >>> quotient("1/s", "(rad/s).s")
-    '1/rad/s'
-    >>> quotient("rad/s", "rad/s")
-    '1'
+    '1/(rad.s)'
+    >>> quotient("rad/s", "rad/s"), quotient("m/s2", "s")
+    ('1', 'm/s3')
     """
     registry = _units()
     ratio = registry.Quantity(1.0, _spelled(unit)) / registry.Quantity(1.0, _spelled(divisor))
-    text = f"{ratio.to_reduced_units().units:~C}".replace("**", "")
-    return "1" if text in ("", "dimensionless") else text
+    above: list[str] = []
+    below: list[str] = []
+    for name, power in ratio.to_reduced_units().unit_items():
+        size = f"{abs(power):g}" if abs(power) != 1 else ""
+        (above if power > 0 else below).append(registry.get_symbol(name) + size)
+    whole = ".".join(above) or "1"
+    if not below:
+        return whole
+    return f"{whole}/({'.'.join(sorted(below))})" if len(below) > 1 else f"{whole}/{below[0]}"
 
 
 def _spelled(unit: str) -> str:

@@ -359,13 +359,13 @@ def width(model, layout):  # type: ignore[no-untyped-def]
 
 @inlined
 def fading(layout, y):  # type: ignore[no-untyped-def]
-    """Share of the feedback at measured outputs: none at rest, all of it at speed."""
+    """Share of the feedback at measured outputs: none where they are still, all where they move."""
     if layout.half == 0.0:
         return 1.0
-    speed = 0.0
+    pace = 0.0
     for j in range(y.size):
-        speed += layout.pace[j] * y[j]
-    return speed * speed / (speed * speed + layout.half**2)
+        pace += layout.pace[j] * y[j]
+    return pace * pace / (pace * pace + layout.half**2)
 
 
 @inlined

@@ -48,7 +48,8 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
         name: _constants(design.get(name), name, len(usual), path)
         for name, usual in blank.design.items()
     }
-    return Gains(blank.estimator, blank.names, values, constants, path.name)
+    source = f"tuned, {path.name}"
+    return Gains(blank.estimator, blank.names, values, constants, source)
 
 
 def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:

@@ -36,10 +36,17 @@ class Linearised:
         return Linearised(states, A, B, C, self.D, self.nominal[at])
 
 
-def settle(fmu: FMU, system: System, point: OperatingPoint) -> tuple[Vector, Vector]:
+def settle(
+    fmu: FMU, system: System, point: OperatingPoint, *, extensions: bool = True
+) -> tuple[Vector, Vector]:
     """Hold some states and inputs until the others rest; the FMU is left there.
 
     Linearly implicit Euler over `system.settles`, in which what is slower hardly moves.
+
+    Parameters
+    ----------
+    extensions : whether states rest that no observer corrects. If not, they stay as they start,
+        such as the temperature of a disc, but for those that follow inputs alone.
 
     Returns
     -------
@@ -59,7 +66,12 @@ def settle(fmu: FMU, system: System, point: OperatingPoint) -> tuple[Vector, Vec
     u = np.array([*(point.inputs.get(name, 0.0) for name in names), *offsets])
     fmu.set(fmu.variables([*names, *system.corrections]), u)
     x = fmu.get_states()
-    free = [i for i, name in enumerate(fmu.states) if name not in held]
+    rests = np.ones(x.size, bool)
+    if not extensions:
+        A, corrected = fmu.state_jacobian(), corrected_states(fmu, system)
+        alone = (A.diagonal() < 0.0) & (np.count_nonzero(A, axis=1) == 1)
+        rests = alone | np.array([name in corrected for name in fmu.states])
+    free = [i for i, name in enumerate(fmu.states) if rests[i] and name not in held]
     h = system.settles / _STEPS
     for _ in range(_STEPS if free else 0):
         A = fmu.state_jacobian()[np.ix_(free, free)]
@@ -70,7 +82,7 @@ def settle(fmu: FMU, system: System, point: OperatingPoint) -> tuple[Vector, Vec
 
 def linearised(fmu: FMU, system: System) -> Linearised:
     """A model linearised at the design point; the FMU is left there."""
-    settle(fmu, system, system.design)
+    settle(fmu, system, system.design, extensions=False)
     names = [one.name for one in system.outputs]
     # A state is an output by itself; not every FMU differentiates it.
     unseen = [name for name in names if name not in fmu.states]

@@ -107,7 +107,6 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
             curve=_convergence(summary),
             styles={"reasoned": _REASONED, "tuned": _TUNED},
             gains_path=shlex.quote(str(folder / "gains.toml")),
-            bandwidth=summary["bandwidth"],
             follows=summary["follows"],
             negligible=NEGLIGIBLE,
             step=STEP,

@@ -16,6 +16,7 @@ from workbench.fmu import FMU, Matrix, Vector
 from workbench.objective import corner, integrate, samples, weights
 from workbench.observers import Estimator, Gains, estimators
 from workbench.system import System
+from workbench.systems import open_file
 from workbench.tuning.settling import Settling
 
 PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
@@ -28,7 +29,7 @@ class Recording(NamedTuple):
     Attributes
     ----------
     name : of the case, and how it differs from what was recorded.
-    stop : name of the case.
+    case : its name.
     steps : (n,) from the sample before [s].
     u, y : (n, m) and (n, l) measured inputs and outputs.
     judged : (n, w) measured signals that the objective weighs.
@@ -36,7 +37,7 @@ class Recording(NamedTuple):
     """
 
     name: str
-    stop: str
+    case: str
     steps: Vector
     u: Matrix
     y: Matrix
@@ -89,7 +90,7 @@ def recording(case: Case, system: System) -> Recording:
 def _scaled(one: Recording, case: Case, output: str, error: float, system: System) -> Recording:
     """The recording of a sensor whose scale is wrong by a share."""
     scaled = recording(case.with_signals({output: case[output] * (1.0 + error)}), system)
-    return scaled._replace(name=f"{one.stop}, {output} {error:+.2%}")
+    return scaled._replace(name=f"{one.case}, {output} {error:+.2%}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def load_model(job: Job) -> FMU:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "model.fmu"
         path.write_bytes(job.fmu)
-        return FMU(path, job.system.names, job.system.given)
+        return open_file(path, job.system)
 
 
 def build(job: Job, fmu: FMU, gains: Gains) -> Estimator:

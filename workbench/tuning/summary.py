@@ -41,7 +41,7 @@ def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
         "estimator": job.estimator,
         "label": estimators(job.system)[job.estimator].label,
         "judged": job.system.objective.judged,
-        "bandwidth": job.system.objective.bandwidth,
+        "bandwidth": _finite(job.system.objective.bandwidth),
         "follows": None if following is None else vars(following),
         "z": found.z,
         "z_reasoned": max(before.values()),

@@ -104,14 +104,14 @@ def errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
     return np.array(found, dtype=float)
 
 
-def split(stops: Sequence[str], folds: int) -> list[tuple[int, ...]]:
-    """Deal recordings out to folds, so that each holds different conditions and whole stops.
+def split(cases: Sequence[str], folds: int) -> list[tuple[int, ...]]:
+    """Deal recordings out to folds, so that each holds different conditions and whole cases.
 
     >>> split(["a", "b", "c", "a", "b", "c"], 2)
     [(0, 2, 3, 5), (1, 4)]
     """
-    names = list(dict.fromkeys(stops))
-    fold = [names.index(stop) % folds for stop in stops]
+    names = list(dict.fromkeys(cases))
+    fold = [names.index(case) % folds for case in cases]
     return [tuple(k for k, mine in enumerate(fold) if mine == number) for number in range(folds)]
 
 
@@ -134,12 +134,12 @@ def cross_validate(
     """
     everything = range(len(job.recordings))
     results: list[Fold] = []
-    for number, held_out in enumerate(split([one.stop for one in job.recordings], folds)):
+    for number, held_out in enumerate(split([one.case for one in job.recordings], folds)):
         found = tune(number, [k for k in everything if k not in held_out])
         if found is None or found.interrupted:
             break
         tuned, untuned = evaluate_gains(pool, job, [found.best, reasoned])
-        names = tuple(dict.fromkeys(job.recordings[k].stop for k in held_out))
+        names = tuple(dict.fromkeys(job.recordings[k].case for k in held_out))
         left_out = [case for case in cases if case.name in names]
         error, error_untuned = errors(job, left_out, [found.best, reasoned]).max(axis=1)
         worst = max(held_out, key=lambda k: float(tuned[k]))

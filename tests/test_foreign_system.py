@@ -1,0 +1,257 @@
+"""A machine that nobody here knows runs on its own description: two tanks, of which one leaks.
+
+Its only measured output is no state of the model: a level sensor's voltage, with gain and offset.
+Recordings are made from other equations, by SciPy.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import lxml.html
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.linalg import inv
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from workbench.__main__ import main
+from workbench.case import Case, read_case
+from workbench.cosim import Ending, Run, replay
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.objective import score
+from workbench.observers import Estimator, choose, estimators
+from workbench.system import System
+from workbench.systems import load_system, open_model
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench import compiler
+
+LIBRARY = """
+package Water
+  model Tanks "A pump fills the first of two tanks, the second one drains and leaks"
+    parameter Real area(unit="m2") = 0.5;
+    parameter Real pipe(unit="m2/s") = 2e-3 "Flow per difference of levels";
+    parameter Real drain(unit="m2/s") = 1e-3 "Flow per level";
+    parameter Real leak(unit="m3/s") = 1e-4;
+    parameter Real gain(unit="V/m") = 2.0;
+    parameter Real offset(unit="V") = 0.4;
+    input Real pump(unit="m3/s");
+    input Real dleak(unit="m3/s") "Correction of leak";
+    output Real h1(unit="m", start=1.0, fixed=true, nominal=1.0);
+    output Real h2(unit="m", start=0.8, fixed=true, nominal=1.0);
+    output Real reading(unit="V") = gain*h2 + offset;
+    output Real outflow(unit="m3/s") = drain*h2;
+  equation
+    area*der(h1) = pump - pipe*(h1 - h2);
+    area*der(h2) = pipe*(h1 - h2) - outflow - leak - dleak;
+  end Tanks;
+end Water;
+"""
+SYSTEM = """
+title = "Two tanks"
+reported = ["outflow"]
+sample_time = "2 s"
+shortest = "1 min"
+models.observer = { class = "Tanks", fmu = "Tanks.fmu" }
+inputs.pump = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s", label = "inflow" }
+outputs.reading = { unit = "V", noise = "0.005 V", scale = "2 V", label = "level" }
+judged.outflow = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s" }
+states.h1 = { walk = 1e-5, spread = 0.1 }
+states.h2 = { walk = 1e-5, spread = 0.1 }
+
+[estimated.leak]
+correction = "dleak"
+unit = "m3/s"
+range = ["0 m3/s", "1e-3 m3/s"]
+walk = "3e-6 m3/s"
+spread = "5e-5 m3/s"
+
+[points]
+settles = "1 h"
+design.inputs = { pump = "1e-3 m3/s" }
+"""
+CASE = 'title = "Pump on and off"\nmeasurement.file = "measured.csv"\n'
+
+AREA, PIPE, DRAIN = 0.5, 2e-3, 1e-3  # as in the model
+STEP, END, OPENS, SETTLED = 2.0, 6000.0, 2400.0, 4800.0  # [s]
+BEFORE, AFTER = 1e-4, 2.5e-4  # [m3/s] of the leak, which opens
+ESTIMATORS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
+
+
+def pump(t: float) -> float:
+    """Inflow [m3/s], which comes in turns of 20 min."""
+    return 1.2e-3 if t % 1200.0 < 600.0 else 0.9e-3
+
+
+def simulated(seed: int) -> pd.DataFrame:
+    """Recording of tanks that are not as full as the model starts, by other equations."""
+
+    def volumes(t: float, v: np.ndarray, leak: float, inflow: float) -> list[float]:
+        between = PIPE / AREA * (v[0] - v[1])
+        return [inflow - between, between - DRAIN / AREA * v[1] - leak]
+
+    time = np.arange(0.0, END + STEP, STEP)
+    v, rows = np.array([0.9, 0.7]) * AREA, []
+    for t in time:
+        rows.append(v)
+        given = (AFTER if t >= OPENS else BEFORE, pump(t))
+        # An observer takes an input for that of the step to its sample.
+        found = solve_ivp(volumes, (t, t + STEP), v, args=given, rtol=1e-9, atol=1e-12)
+        v = found.y[:, -1]
+    level = np.array(rows)[:, 1] / AREA
+    rng = np.random.default_rng(seed)
+    before = np.append(0.0, time[:-1])
+    return pd.DataFrame(
+        {
+            "time [s]": time,
+            "pump [m3/s]": [pump(t) for t in before],
+            "reading [V]": 2.0 * level + 0.4 + 0.005 * rng.standard_normal(time.size),
+            "outflow [m3/s]": DRAIN * level + 1e-5 * rng.standard_normal(time.size),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All that a user writes: library, system file and recordings; and the compiled model."""
+    folder = tmp_path_factory.mktemp("tanks")
+    (folder / "package.mo").write_text(LIBRARY)
+    compiler.build(
+        folder / "package.mo", "Water.Tanks", folder / "Tanks.fmu", platforms=[compiler.native()]
+    )
+    (folder / "system.toml").write_text(SYSTEM)
+    for seed, name in enumerate(("01_first", "02_second")):
+        (folder / "cases" / name).mkdir(parents=True)
+        (folder / "cases" / name / "case.toml").write_text(CASE)
+        simulated(seed).to_csv(folder / "cases" / name / "measured.csv", index=False)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tanks(folder: Path) -> System:
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def fmu(tanks: System) -> Iterator[FMU]:
+    with open_model(tanks) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def case(folder: Path, tanks: System) -> Case:
+    return read_case(folder / "cases" / "01_first", tanks)
+
+
+def made(fmu: FMU, tanks: System, name: str) -> Estimator:
+    kind = estimators(tanks)[name]
+    return kind(fmu, tanks, kind.reasoned(fmu, tanks))
+
+
+@pytest.fixture(scope="module")
+def runs(fmu: FMU, tanks: System, case: Case) -> dict[str, Run]:
+    return {name: replay(case, made(fmu, tanks, name)) for name in estimators(tanks)}
+
+
+def test_a_system_has_the_estimators_of_all_systems_and_no_others(tanks: System) -> None:
+    assert list(estimators(tanks)) == ["open_loop", *ESTIMATORS]
+    with pytest.raises(InputError, match="direct_inversion"):
+        choose(tanks, ["direct_inversion"])
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(
+    case: Case, tanks: System, runs: dict[str, Run], name: str
+) -> None:
+    run = runs[name]
+    assert run.ending is Ending.OK
+    settled = case.time >= SETTLED
+    leak = run.signal("leak")[settled]
+    assert leak.mean() == pytest.approx(AFTER, rel=0.02)
+    # It opened by 1.5e-4 m3/s, of which noise makes no more than a fifth.
+    assert np.abs(leak - AFTER).max() < 0.2 * (AFTER - BEFORE)
+    level = (case["reading"] - 0.4) / 2.0
+    assert run.signal("outflow")[settled].mean() == pytest.approx(
+        DRAIN * level[settled].mean(), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_every_observer_is_nearer_to_what_judges_than_the_model_alone(
+    case: Case, tanks: System, runs: dict[str, Run], name: str
+) -> None:
+    alone, own = (score(case, runs[one], tanks) for one in ("open_loop", name))
+    assert alone.nrmse is not None
+    assert own.nrmse is not None
+    assert own.nrmse < 0.5 * alone.nrmse
+
+
+def test_the_open_loop_model_goes_where_its_own_equations_lead(
+    case: Case, runs: dict[str, Run]
+) -> None:
+    """Reference: the exact solution of the linear model with the nominal leak."""
+    A = np.array([[-PIPE, PIPE], [PIPE, -PIPE - DRAIN]]) / AREA
+    levels = [np.array([1.0, 0.8])]
+    values, vectors = np.linalg.eigh(A)
+    for inflow in case["pump"][1:]:
+        rest = -np.linalg.solve(A, np.array([inflow, -BEFORE]) / AREA)
+        kept = vectors @ np.diag(np.exp(values * STEP)) @ vectors.T
+        levels.append(rest + kept @ (levels[-1] - rest))
+    # Implicit Euler: relative error h*rate/2 of a motion that decays at up to 0.01 1/s.
+    expected = 2.0 * np.array(levels)[:, 1] + 0.4
+    assert_allclose(runs["open_loop"].signal("reading"), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf"])
+def test_filters_are_the_kalman_filter_where_the_model_is_linear(
+    fmu: FMU, tanks: System, case: Case, runs: dict[str, Run], name: str
+) -> None:
+    """Reference: textbook equations in matrices, with the same implicit step."""
+    gains = estimators(tanks)[name].reasoned(fmu, tanks)
+    walk = np.array([1e-5, 1e-5, gains["leak"]])
+    A = np.array([[-PIPE, PIPE, 0.0], [PIPE, -PIPE - DRAIN, -1.0], [0.0, 0.0, 0.0]])
+    A[:2] /= AREA
+    B = np.array([[1.0, 0.0], [0.0, -1.0], [0.0, 0.0]]) / AREA
+    C, R = np.array([[0.0, 2.0, 0.0]]), gains["reading"] ** 2
+    Phi = inv(np.eye(3) - STEP * A)
+    z, P = np.array([1.0, 0.8, 0.0]), np.diag([0.1, 0.1, 5e-5]) ** 2
+    expected = [[z[2], np.sqrt(P[2, 2]), 0.0]]
+    for inflow, measured in zip(case["pump"][1:], case["reading"][1:], strict=True):
+        z = Phi @ (z + STEP * B @ [inflow, BEFORE])
+        P = Phi @ (P + STEP * np.diag(walk**2)) @ Phi.T
+        S = (C @ P @ C.T).item() + R
+        K = (P @ C.T).ravel() / S
+        innovation = measured - (C @ z).item() - 0.4
+        z = z + K * innovation
+        keep = np.eye(3) - np.outer(K, C)
+        P = keep @ P @ keep.T + R * np.outer(K, K)
+        expected.append([z[2], np.sqrt(P[2, 2]), innovation**2 / S])
+    correction, sigma, nis = np.array(expected).T
+    run = runs[name]
+    # Rounding alone: the covariance of volumes and flow has a condition number of 1e6.
+    assert_allclose(run.signal("dleak")[1:], correction[1:], rtol=1e-6, atol=1e-6 * AFTER)
+    assert_allclose(run.deviation("dleak")[1:], sigma[1:], rtol=1e-6)
+    assert_allclose(run.nis[1:], nis[1:], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf"])
+def test_tuning_improves_z_and_its_page_speaks_of_the_system(
+    folder: Path, tmp_path: Path, name: str
+) -> None:
+    chosen = ["--system", str(folder), "--cases", str(folder / "cases"), "--out", str(tmp_path)]
+    search = ["--budget", "3", "--population", "3", "--workers", "1", "--folds", "2"]
+    assert main(["tune", name, *chosen, *search]) == 0
+    # JSON has no infinity, and this objective no bandwidth.
+    summary = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
+    assert summary["z"] < summary["z_reasoned"]
+    whole = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
+    page = " ".join(part.text_content() for part in whole.xpath("//header|//main"))
+    assert "error of reading" in page
+    assert "error of outflow" in page
+    assert not re.search(r"\b(inf|None|Fx|omega\w|friction|wheel\w*|stops?|speeds?)\b", page)
