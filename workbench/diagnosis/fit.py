@@ -212,8 +212,6 @@ class Fit:
         lin: Linearised,
         active: Sequence[Effect],
         candidates: Sequence[tuple[Effect, Mapping[str, float]]] = (),
-        *,
-        tolerances: bool = True,
     ) -> Linearised:
         """Add the derivatives that are not there yet.
 
@@ -221,10 +219,8 @@ class Fit:
         ----------
         active : effects that the point has.
         candidates : others, each with the shape it is tried with.
-        tolerances : whether those by the tolerances are asked for.
         """
-        columns = self._tolerances() if tolerances else {}
-        columns |= self._present(lin.point, active)
+        columns = self._tolerances() | self._present(lin.point, active)
         for effect, shape in candidates:
             setting = {
                 name: value
@@ -342,62 +338,39 @@ class Fit:
         return middle, spread * abs(middle)
 
     def refine(
-        self,
-        best: Linearised,
-        active: Sequence[Effect],
-        rounds: int,
-        spread: Vector | None = None,
-        lender: Linearised | None = None,
+        self, best: Linearised, active: Sequence[Effect], rounds: int, spread: Vector | None = None
     ) -> Linearised:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
-
-        What a tolerance does changes little with the size of an effect. So its derivatives are
-        taken from a point before, until that leads no further; then all are those of the point.
 
         Parameters
         ----------
         best : where to begin.
-        rounds : most steps; one that made things worse is halved, which counts, or if derivatives
-            were taken from elsewhere, tried again with those of the point.
+        rounds : most evaluations; a step that made things worse is halved, which costs one.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
-        lender : of a point near by, whose derivatives by the tolerances serve to begin with.
 
         Returns
         -------
         best : the best point that was met; derivatives may be missing.
         """
-        if lender is None:
-            best = lender = self.linearise(best, active)
-        else:
-            lender = self.linearise(lender, ())
-        best = self.linearise(best, active, tolerances=False)
-        point = self._stepped(best, lender, best.spread if spread is None else spread)
-        taken, halved = 0, 0
-        while taken < rounds:
-            tried, exact = self.at(point), lender is best
+        best = self.linearise(best, active)
+        point, halved = self._stepped(best, best.spread if spread is None else spread), 0
+        for left in reversed(range(rounds)):
+            tried = self.at(point)
             fall = best.deviance - tried.deviance
-            taken += exact or fall >= _WORSE
-            if fall > -_WORSE:
+            if better := fall > -_WORSE:
                 best, halved = tried, 0
-            if exact and abs(fall) < _WORSE:
+            if left == 0 or abs(fall) < _WORSE or halved == _HALVED:
                 break
-            if exact and fall < 0.0:
+            if better:
+                best = self.linearise(best, active)
+                point = self._stepped(best, best.spread)
+            else:
                 point, halved = between(best.point, point), halved + 1
-                if halved > _HALVED:
-                    break
-                continue
-            if fall < _WORSE:
-                best = lender = self.linearise(best, active)
-            best = self.linearise(best, active, tolerances=False)
-            point = self._stepped(best, lender, best.spread)
         return best
 
-    def _stepped(self, lin: Linearised, lender: Linearised, spread: Vector) -> Point:
-        lent = [key for key in self._tolerances() if key not in lin.keys]
-        at = [lender.keys.index(key) for key in lent]
-        full = lin.extended(lent, [one.jacobian[:, at] for one in lender.evidence])
-        joint = self.quadratics(replace(full, inflation=spread))
+    def _stepped(self, lin: Linearised, spread: Vector) -> Point:
+        joint = self.quadratics(replace(lin, inflation=spread))
         return self._moved(lin.point, joint, joint.solve())
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:

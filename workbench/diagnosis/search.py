@@ -133,7 +133,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Prospect]) -> list[Fitted]:
     near = misfits < _BEHIND * misfits.min()
 
     def finished(one: Fitted) -> Fitted:
-        return fitted(fit, one.linearised, one.active, lender=best.linearised)
+        return fitted(fit, one.linearised, one.active)
 
     ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
     every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
@@ -230,7 +230,7 @@ def lesser(fit: Fit, best: Fitted, base: Fitted) -> dict[Effect, Fitted]:
         if not kept:
             return base
         start = fit.at(without(best.point, effect))
-        one = fitted(fit, start, kept, lender=best.linearised)
+        one = fitted(fit, start, kept)
         return replace(one, linearised=fit.linearise(one.linearised, kept))
 
     fits = fit.together(refitted, best.active)
@@ -252,10 +252,9 @@ def fitted(
     active: tuple[Effect, ...],
     rounds: int = _ROUNDS,
     spread: Vector | None = None,
-    lender: Linearised | None = None,
 ) -> Fitted:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""
-    lin = fit.refine(start, active, rounds, spread, lender)
+    lin = fit.refine(start, active, rounds, spread)
     return Fitted(active, lin.point, lin, lin.misfit)
 
 
