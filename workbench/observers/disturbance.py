@@ -115,21 +115,24 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         status = status or linearise(model, width(model, layout))
         fade = fading(layout, y)
         for i in range(s + q):
-            share = fade if i < s else fade * authority(model, layout, settings.effect, i - s)
-            for k in range(s + q):
-                system[i, k] = 0.0
+            share = fade
+            if i < s:
+                for k in range(s):
+                    system[i, k] = -h * model.jacobian[states[k], states[i]]
+                for k in range(q):
+                    system[i, s + k] = -h * model.jacobian[n + k, states[i]]
+                system[i, i] += 1.0
+            else:
+                share *= authority(model, layout, settings.effect, i - s)
+                for k in range(s + q):
+                    system[i, k] = 0.0
+                system[i, i] = 1.0 - h * settings.decay[i - s]
             for j in range(outputs):
                 # The integral at the end of the step is part of the implicit equation.
                 direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
-                gain = direct + h * integrated
-                change[i, 0] += h * (gain * innovation[j] + integrated * memory.integral[j])
-                add_slope(model, layout, j, h * gain, settings.places, system[i])
-            if i < s:
-                for k in range(s):
-                    system[i, k] -= h * model.jacobian[states[k], states[i]]
-                for k in range(q):
-                    system[i, s + k] -= h * model.jacobian[n + k, states[i]]
-            system[i, i] += 1.0 if i < s else 1.0 - h * settings.decay[i - s]
+                gain = h * (direct + h * integrated)
+                change[i, 0] += gain * innovation[j] + h * integrated * memory.integral[j]
+                add_slope(model, layout, j, gain, settings.places, system[i])
         status = status or solve(system, change)
         if status:
             return status
