@@ -71,6 +71,7 @@ unit = "m3/s"
 range = ["0 m3/s", "1e-3 m3/s"]
 walk = "3e-6 m3/s"
 spread = "5e-5 m3/s"
+useful = "1e-5 m3/s"
 
 [points]
 settles = "1 h"
@@ -177,9 +178,9 @@ def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(
     # It opened by 1.5e-4 m3/s, of which noise makes no more than a fifth.
     assert np.abs(leak - AFTER).max() < 0.2 * (AFTER - BEFORE)
     level = (case["reading"] - 0.4) / 2.0
-    assert run.signal("outflow")[settled].mean() == pytest.approx(
-        DRAIN * level[settled].mean(), rel=1e-3
-    )
+    outflow = run.signal("outflow")[settled].mean()
+    # Less than half the noise of a flow meter, 1.2 %.
+    assert outflow == pytest.approx(DRAIN * level[settled].mean(), rel=5e-3)
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
