@@ -62,8 +62,8 @@ models.observer = { class = "Tanks", fmu = "Tanks.fmu" }
 inputs.pump = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s", label = "inflow" }
 outputs.reading = { unit = "V", noise = "0.005 V", scale = "2 V", label = "level" }
 judged.outflow = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s" }
-states.h1 = { walk = 1e-5, spread = 0.1 }
-states.h2 = { walk = 1e-5, spread = 0.1 }
+states.h1 = { walk = "1e-5 m", spread = "0.1 m" }
+states.h2 = { walk = "1e-5 m", spread = "0.1 m" }
 
 [estimated.leak]
 correction = "dleak"
