@@ -62,8 +62,8 @@ models.observer = { class = "Tanks", fmu = "Tanks.fmu" }
 inputs.pump = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s", label = "inflow" }
 outputs.reading = { unit = "V", noise = "0.005 V", scale = "2 V", label = "level" }
 judged.outflow = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s" }
-states.h1 = { walk = 1e-5, spread = 0.1 }
-states.h2 = { walk = 1e-5, spread = 0.1 }
+states.h1 = { walk = "1e-5 m", spread = "0.1 m" }
+states.h2 = { walk = "1e-5 m", spread = "0.1 m" }
 
 [estimated.leak]
 correction = "dleak"
@@ -71,6 +71,7 @@ unit = "m3/s"
 range = ["0 m3/s", "1e-3 m3/s"]
 walk = "3e-6 m3/s"
 spread = "5e-5 m3/s"
+useful = "1e-5 m3/s"
 
 [points]
 settles = "1 h"
@@ -177,9 +178,9 @@ def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(
     # It opened by 1.5e-4 m3/s, of which noise makes no more than a fifth.
     assert np.abs(leak - AFTER).max() < 0.2 * (AFTER - BEFORE)
     level = (case["reading"] - 0.4) / 2.0
-    assert run.signal("outflow")[settled].mean() == pytest.approx(
-        DRAIN * level[settled].mean(), rel=1e-3
-    )
+    outflow = run.signal("outflow")[settled].mean()
+    # Less than half the noise of a flow meter, 1.2 %.
+    assert outflow == pytest.approx(DRAIN * level[settled].mean(), rel=5e-3)
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)

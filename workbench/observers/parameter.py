@@ -181,13 +181,15 @@ class ParameterEstimator(Estimator):
         """Integral action as fast as the linearised model bears.
 
         It is decoupled at its own frequency w by the inverse of the model's response there,
-        L = w G(iw)^+, and slowed down from the rate of the samples until the loop is stable: slow
-        enough it always is where a model is. Source: E. J. Davison (1976), IEEE Trans. Autom.
+        L = w G(iw)^+, and slowed down from the rate of the samples until the loop is stable, as
+        it always is in the end where a model is, and until noise moves no estimate by more than
+        what is useful. Source: E. J. Davison (1976), IEEE Trans. Autom.
         Control 21, 35-47.
         """
         model = linearised(fmu, system)
         (n, q), outputs = model.B.shape, len(model.C)
         noise = np.array([one.noise_at_scale for one in system.outputs])
+        useful = np.array([one.useful for one in system.estimated])
         effect = effects(fmu, system, model)
         fastest = 0.1 * np.pi / system.sample_time
         speed, L = fastest, np.zeros((q, 2 * outputs))
@@ -202,7 +204,8 @@ class ParameterEstimator(Estimator):
             dynamics = cls.error_dynamics(model.A, model.B, model.C, cls.of(L, effect))
             assert dynamics is not None
             kept = dynamics[0][: n + outputs, : n + outputs]
-            if np.linalg.eigvals(kept).real.max() <= bearable:
+            quiet = np.abs(L[:, :outputs]) @ noise <= useful
+            if np.linalg.eigvals(kept).real.max() <= bearable and quiet.all():
                 break
             speed *= 0.5
         return cls.of(0.5 * L, effect, "integral action that the linearised model bears")
