@@ -57,6 +57,8 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     "Creep force per creepage at zero slip";
   replaceable Quantities.Unchanged wheelInertia(nominal=JW, omega=omegaW)
     constrainedby Quantities.PartialWheelInertia(nominal=JW, omega=omegaW) "Inertia of the wheelset";
+  replaceable Quantities.Unchanged rollerInertia(nominal=JR, omega=omegaR)
+    constrainedby Quantities.PartialRollerInertia(nominal=JR, omega=omegaR) "Inertia of the roller";
   replaceable Quantities.Unchanged driveTorque(nominal=tauR, omega=omegaW)
     constrainedby Quantities.PartialDriveTorque(nominal=tauR, omega=omegaW) "Torque of the drive";
   replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
@@ -75,8 +77,9 @@ equation
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
   wheelInertia.actual*der(omegaW) =
     wheelRadius.actual*Fx - tauB - wheelsetLoss.tau + wheelInertia.actual*correctionW;
-  JR*der(omegaR) =
-    driveTorque.actual - rollerRadius.actual*Fx - rollerLoss.tau + JR*correctionR;
+  rollerInertia.actual*der(omegaR) =
+    driveTorque.actual - rollerRadius.actual*Fx - rollerLoss.tau
+    + rollerInertia.actual*correctionR;
   annotation (
     experiment(StopTime=40.0, Tolerance=1e-6),
     Documentation(info="<html>

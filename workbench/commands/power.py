@@ -3,14 +3,36 @@
 import argparse
 import os
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from workbench.commands.arguments import Commands, add_system, positive, require_compiler
-from workbench.power import Repertoire, diagnose_sets, open_virtual_rig, plan, summarise
+from workbench.diagnosis import Effect
+from workbench.diagnosis.thresholds import thresholds
+from workbench.power import (
+    Diagnosed,
+    Repertoire,
+    VirtualRig,
+    diagnose_sets,
+    open_virtual_rig,
+    plan,
+    summarise,
+)
 from workbench.power.diagnosing import library_effects
+from workbench.power.planting import Group, plan_sheet_errors, some
+from workbench.power.sensitivity import values, vary_sets
+from workbench.power.sheet import summarise_sheet
 from workbench.report.power import format_power, write_power
+from workbench.report.power_checks import (
+    format_sheet,
+    format_thresholds,
+    write_sheet,
+    write_thresholds,
+)
+from workbench.system import System
 from workbench.systems import load_system, model_path
 
 
@@ -26,13 +48,16 @@ def add(commands: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench power\n"
         "  python -m workbench power --clean 5 --sizes 4 --repeats 1 --pairs 5 --out /tmp/quick\n"
-        "  python -m workbench power --clean 200 --resume",
+        "  python -m workbench power --clean 200 --resume\n"
+        "  python -m workbench power --thresholds --sets 8\n"
+        "  python -m workbench power --sheet-error --repeats 2",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     for option, default, text in (
         ("--clean", 50, "sets without an effect"),
         ("--repeats", 3, "sets of each effect at each size"),
         ("--pairs", 30, "sets with two effects, at the largest size"),
+        ("--sets", 8, "sets of --thresholds, of all kinds alike"),
         ("--workers", os.cpu_count() or 1, "processes"),
     ):
         parser.add_argument(
@@ -60,6 +85,26 @@ def add(commands: Commands) -> None:
         metavar="NAME",
         help="recording of a set, may be repeated (default: those that are usual for the system)",
     )
+    checks = parser.add_mutually_exclusive_group()
+    for option, text in (
+        (
+            "--thresholds",
+            "halve and double each threshold of the diagnosis on the same recordings, "
+            "and tell what changes (into OUT/thresholds)",
+        ),
+        (
+            "--sheet-error",
+            "make recordings of a rig that differs from its data sheet in --repeats "
+            "sets of each error, and tell what is said (into OUT/sheet_error)",
+        ),
+    ):
+        checks.add_argument(
+            option,
+            action="store_const",
+            const=option[2:].replace("-", "_"),
+            dest="check",
+            help=text,
+        )
     parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
     add_system(parser)
     for option, default_path, text in (
@@ -87,34 +132,93 @@ def _power(options: argparse.Namespace) -> int:
     reference = options.fmu or model_path(system, "reference")
     rig = open_virtual_rig(system, options.case, reference)
     effects = library_effects(system)
-    repertoire = Repertoire(rig.plantables, effects)
-    sizes = sorted(set(options.sizes))
-    groups = plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
-    begin = time.perf_counter()
+    run = {"thresholds": _thresholds, "sheet_error": _sheet_error}.get(options.check, _usual)
+    print(f"sets of {len(rig.recordings)} recordings", flush=True)
+    return run(options, system, rig, effects)
 
-    def report(line: str) -> None:
-        print(f"{time.perf_counter() - begin:7.0f} s  {line}", flush=True)
 
-    report(f"{sum(map(len, groups))} sets of {len(rig.recordings)} recordings")
-    results, interrupted = diagnose_sets(
-        groups,
-        system,
-        rig,
-        effects,
-        options.out,
-        seed=options.seed,
-        workers=options.workers,
-        resume=options.resume,
-        report=report,
-    )
-    summary = summarise(results, repertoire)
-    provenance = {
+def _provenance(options: argparse.Namespace, rig: VirtualRig, interrupted: bool) -> dict[str, Any]:
+    return {
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
         "stops": list(rig.recordings),
         "interrupted": interrupted,
     }
-    write_power(summary, effects, provenance, options.out)
+
+
+def _reporter() -> Callable[[str], None]:
+    begin = time.perf_counter()
+
+    def report(line: str) -> None:
+        print(f"{time.perf_counter() - begin:7.0f} s  {line}", flush=True)
+
+    return report
+
+
+def _planned(
+    options: argparse.Namespace, rig: VirtualRig, effects: tuple[Effect, ...]
+) -> list[Group]:
+    repertoire = Repertoire(rig.plantables, effects)
+    sizes = sorted(set(options.sizes))
+    return plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
+
+
+def _usual(
+    options: argparse.Namespace, system: System, rig: VirtualRig, effects: tuple[Effect, ...]
+) -> int:
+    groups = _planned(options, rig, effects)
+    results, interrupted = _diagnosed(options, groups, system, rig, effects, options.out)
+    summary = summarise(results, Repertoire(rig.plantables, effects))
+    write_power(summary, effects, _provenance(options, rig, interrupted), options.out)
     print(format_power(summary))
     print(f"data and figures: {options.out}")
     return 130 if interrupted else 0
+
+
+def _sheet_error(
+    options: argparse.Namespace, system: System, rig: VirtualRig, effects: tuple[Effect, ...]
+) -> int:
+    out = options.out / "sheet_error"
+    groups = plan_sheet_errors(rig.sheet_errors, options.repeats, options.seed)
+    results, interrupted = _diagnosed(options, groups, system, rig, effects, out)
+    rows = summarise_sheet(results)
+    write_sheet(rows, _provenance(options, rig, interrupted), out)
+    print(format_sheet(rows))
+    print(f"data: {out}")
+    return 130 if interrupted else 0
+
+
+def _thresholds(
+    options: argparse.Namespace, system: System, rig: VirtualRig, effects: tuple[Effect, ...]
+) -> int:
+    sets = some(_planned(options, rig, effects), options.sets, options.seed)
+    results, interrupted = vary_sets(
+        sets, system, rig, effects, workers=options.workers, report=_reporter()
+    )
+    usual = values(thresholds(len(effects)))
+    out = options.out / "thresholds"
+    write_thresholds(results, usual, _provenance(options, rig, interrupted), out)
+    print(format_thresholds(results, usual))
+    print(f"data: {out}")
+    return 130 if interrupted else 0
+
+
+def _diagnosed(
+    options: argparse.Namespace,
+    groups: Sequence[Group],
+    system: System,
+    rig: VirtualRig,
+    effects: tuple[Effect, ...],
+    out: Path,
+) -> tuple[list[Diagnosed], bool]:
+    return diagnose_sets(
+        groups,
+        system,
+        rig,
+        effects,
+        out,
+        seed=options.seed,
+        workers=options.workers,
+        resume=options.resume,
+        report=_reporter(),
+    )

@@ -19,6 +19,7 @@ from workbench.case import Case
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.samples import Samples, compared, prepare
+from workbench.diagnosis.thresholds import SOUND, Soundness
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.pool import Pool
 from workbench.system import System
@@ -190,6 +191,7 @@ class Simulations:
     ----------
     path : FMU with all effects that may be asked for.
     given : values of its variables that the diagnosed model has instead of the defaults.
+    sound : which samples count.
 
     Attributes
     ----------
@@ -205,6 +207,7 @@ class Simulations:
         given: Mapping[str, float],
         cases: Sequence[Case],
         workers: int,
+        sound: Soundness = SOUND,
     ) -> None:
         with FMU(path, None, given) as fmu:
             self.nominal = dict(fmu.defaults)
@@ -219,7 +222,9 @@ class Simulations:
             moving = motion(fmu, system)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         signals = compared(system, cases)
-        self.recordings = [prepare(one, system, signals, self.nominal, moving) for one in cases]
+        self.recordings = [
+            prepare(one, system, signals, self.nominal, moving, sound) for one in cases
+        ]
         workers = min(workers, len(cases))
         simulated = Simulated(path, system, tuple(self.recordings))
         with simulating(simulated) as own:

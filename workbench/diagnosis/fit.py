@@ -18,13 +18,11 @@ from workbench.diagnosis.evidence import Item, Result, Simulations, Variation, d
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
+from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.errors import InputError
 from workbench.fmu import Vector
 
-_WORSE = 1.0  # of deviance, which no step is worth
 _HALVED = 4  # times: after that a step is given up
-_FURTHEST = 5.0  # standard deviations that no tolerance goes beyond
-_FURTHEST_LEVEL = 3.0  # the same of what differs by nature
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
 _SENSOR = "sensor"  # in place of a choice, of a sensor's delay
@@ -39,10 +37,17 @@ class Fit:
     ----------
     simulations : that give the evidence.
     effects : that may be asked for.
+    decides : thresholds, those of the usual rate of false alarms if none are given.
     """
 
-    def __init__(self, simulations: Simulations, effects: Sequence[Effect]) -> None:
+    def __init__(
+        self,
+        simulations: Simulations,
+        effects: Sequence[Effect],
+        decides: Thresholds | None = None,
+    ) -> None:
         self._simulations = simulations
+        self.decides = decides or thresholds(len(effects))
         self._compare = simulations.system.comparison
         self._effects = {effect.name: effect for effect in effects}
         self._modes = {
@@ -204,8 +209,8 @@ class Fit:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
         evidence = self._simulations.at(self.values(point))
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
-        slow = slowness(evidence, self.lasting)
-        return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away)
+        slow, excess = slowness(evidence, self.lasting), self.decides.excess
+        return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
 
     def linearise(
         self,
@@ -355,12 +360,13 @@ class Fit:
         """
         best = self.linearise(best, active)
         point, halved = self._stepped(best, best.spread if spread is None else spread), 0
+        worse = self.decides.worse
         for left in reversed(range(rounds)):
             tried = self.at(point)
             fall = best.deviance - tried.deviance
-            if better := fall > -_WORSE:
+            if better := fall > -worse:
                 best, halved = tried, 0
-            if left == 0 or abs(fall) < _WORSE or halved == _HALVED:
+            if left == 0 or abs(fall) < worse or halved == _HALVED:
                 break
             if better:
                 best = self.linearise(best, active)
@@ -382,14 +388,15 @@ class Fit:
         for key, change in zip(joint.shared, step, strict=True):
             if key in levels:
                 middle, sigma = self._expected(key)
-                reach = _FURTHEST_LEVEL * sigma
+                reach = self.decides.furthest_level * sigma
                 levels[key] = float(np.clip(levels[key] + change, middle - reach, middle + reach))
             elif key in sizes:
                 sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
         locals_ = [system.local(step) for system in joint.systems]
         count = len(self.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
-        deviations = np.clip(deviations, -_FURTHEST, _FURTHEST)
+        furthest = self.decides.furthest
+        deviations = np.clip(deviations, -furthest, furthest)
         phases = {}
         locked = [name for name, parameter in joint.shared if parameter == "amplitude"]
         for j, name in enumerate(locked):

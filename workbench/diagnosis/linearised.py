@@ -8,9 +8,8 @@ import numpy as np
 
 from workbench.diagnosis.evidence import Evidence
 from workbench.diagnosis.quadratic import Key
+from workbench.diagnosis.thresholds import Thresholds
 from workbench.fmu import Matrix, Vector
-
-_NOISE = 1.3  # mean square of whitened errors that an estimate of noise may leave
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,7 @@ class Linearised:
     lasting : blocks from which on an error is no noise.
     inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
     away : chi-squared of levels and deviations against what tolerances say of them.
+    excess : see `Thresholds`.
     """
 
     point: Point
@@ -50,6 +50,7 @@ class Linearised:
     lasting: int
     inflation: Vector
     away: float
+    excess: float = Thresholds.excess
 
     def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
         """The same with more columns, (b*m + 1, p) of each stop."""
@@ -79,7 +80,7 @@ class Linearised:
         Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
         """
         count, mean = self._squares
-        noise = count * np.minimum(mean, _NOISE)
+        noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
         rest = sum(one.rest**2 for one in self.evidence)
         return float((noise + wrong).sum()) + rest + self.away
@@ -87,8 +88,8 @@ class Linearised:
     @property
     def spread(self) -> Vector:
         """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        spread: Vector = 1.0 + self.lasting * np.maximum(0.0, self._squares[1] - _NOISE)
-        return spread
+        wrong: Vector = np.maximum(0.0, self._squares[1] - (1.0 + self.excess))
+        return 1.0 + self.lasting * wrong
 
     def weighed(self, inflation: Vector) -> float:
         """Chi-squared, each channel in units of what is wrong with it, (m,)."""

@@ -23,16 +23,14 @@ from workbench.diagnosis.motion import (
     noise_of,
     random_walk,
 )
+from workbench.diagnosis.thresholds import SOUND, Soundness
 from workbench.errors import InputError
 from workbench.recording import Matrix, Vector
 from workbench.system import Channel, Exclusion, Mode, System
 
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
 _ABREAST = 11  # samples of the running median
-_HELD = 4.0  # standard deviations that a polynomial may take away
 _RELEASED = 0.1  # share of the greatest value
-_SPIKE = 8.0  # standard deviations that no noise reaches
-_STUCK = 6  # equal samples in a row: a channel that is noisy does not repeat itself
 _WRONG = "spike, dropout or saturation"
 
 Mask = NDArray[np.bool_]
@@ -154,6 +152,7 @@ def prepare(
     signals: tuple[str, ...],
     values: Mapping[str, float],
     motion: Motion,
+    sound: Soundness = SOUND,
 ) -> Samples:
     """Make a recording ready.
 
@@ -162,6 +161,7 @@ def prepare(
     signals : that are compared, see `compared`.
     values : parameters of the model.
     motion : of the model at its design point.
+    sound : which samples count.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def prepare(
     compare, time = system.comparison, case.time
     h, steps = float(np.median(np.diff(time))), np.diff(time)
     names = (*case.inputs, *signals)
-    wrong = {name: _outliers(case[name]) for name in names}
+    wrong = {name: _outliers(case[name], sound) for name in names}
     clean = {name: _bridge(time, case[name], wrong[name]) for name in names}
     applied = _applied(clean, system, time)
     excluded = {_WRONG: np.logical_or.reduce(list(wrong.values()))}
@@ -200,7 +200,7 @@ def prepare(
         lead = led_by(motion, inputs, outputs, h)
         count = len(case.outputs)
         ahead[:, :count, :count] = lead.ahead
-    driving = [_smooth(clean[one.name], one.smoothed, h) for one in system.inputs]
+    driving = [_smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
     zero = compare.rest.zero if compare.rest else 1.0
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
@@ -245,21 +245,21 @@ def _refuse_too_few(
         )
 
 
-def _outliers(values: Vector) -> Mask:
+def _outliers(values: Vector, sound: Soundness) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
     away = np.abs(values - median_filter(values, _ABREAST))
     # The wide window knows the noise, the narrow one that a structure rings.
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, _deviation(values))
-    wrong = away > _SPIKE * scale
+    wrong = away > sound.spike * scale
     same = np.diff(values) == 0.0
     if same.mean() < 0.2:
         for first, end in _runs(same):
-            if end - first >= _STUCK - 1:
+            if end - first >= sound.stuck - 1:
                 wrong[first : end + 1] = True
         for extreme in (values.min(), values.max()):
             at = values == extreme
-            if at.sum() > 2 * _STUCK and same[at[1:]].mean() > 0.5:
+            if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
                 wrong |= at
     return wrong
 
@@ -268,7 +268,7 @@ def _bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
     return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
 
 
-def _smooth(values: Vector, windows: Sequence[float], h: float) -> Vector:
+def _smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
     """An input without most of its sensor's noise, and without lag.
 
     The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
@@ -279,7 +279,7 @@ def _smooth(values: Vector, windows: Sequence[float], h: float) -> Vector:
         window = 2 * (round(seconds / h) // 2) + 1
         if order < window <= values.size:
             smooth = savgol_filter(values, window, order)
-            moves = maximum_filter1d(np.abs(best - smooth) > _HELD * noise, window)
+            moves = maximum_filter1d(np.abs(best - smooth) > held * noise, window)
             weight = uniform_filter1d(moves.astype(np.float64), window)
             best = weight * best + (1.0 - weight) * smooth
             # Of a parabola over n samples, the variance is 9/4 of that of a mean.

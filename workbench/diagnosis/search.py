@@ -9,24 +9,15 @@ import numpy as np
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
+from workbench.diagnosis.thresholds import Thresholds
 from workbench.diagnosis.trial import Option, Prospect, Trial, shapes, tried
 from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
 
-_MOST = 4  # causes; more than that is not a diagnosis
-_SIGNIFICANT = 4.0  # standard deviations of a size
-_HINT = 2.0  # of those, while much is wrong
-WRONG = 6.0  # variance of errors that last a second, over noise, from which on much is wrong
-_HELD_OUT = 15.0  # fall of chi-squared on held-out stops
-_NEEDED = 60.0  # fall of chi-squared by an effect beside others, which may bend to its form
-_RIVALS = 5  # effects that are fitted in full before one is named
-_NEAR = 0.4  # share of the best score from which on an effect is a rival
 _BEGUN = 3  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
-_BEHIND = 3.0  # times the chi-squared of the best
 _ROUNDS = 12  # of Gauss-Newton, most
-_TIED = 10.0  # of chi-squared: decides between nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,21 +88,21 @@ def _step(
 ) -> Step | None:
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
     scores = tuple(trial.scores())
-    rivals = _rivals(scores, best) if len(best.active) < _MOST else []
+    rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
     if not rivals:
         return None
     report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
     fits = _fits(fit, best, rivals)
     if not fits:
         return None
-    equals = [one for one in fits if beyond(one, fits[0]) < _TIED]
+    equals = [one for one in fits if beyond(one, fits[0]) < fit.decides.tied]
     first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
     return Step(best, scores, (first, *(one for one in fits if one is not first)))
 
 
-def _gains(before: Fitted, after: Fitted) -> bool:
+def _gains(fit: Fit, before: Fitted, after: Fitted) -> bool:
     """Whether an effect is worth a step."""
-    return before.linearised.deviance - after.linearised.deviance > _HELD_OUT
+    return before.linearised.deviance - after.linearised.deviance > fit.decides.fall
 
 
 def beyond(one: Fitted, other: Fitted) -> float:
@@ -126,11 +117,12 @@ def beyond(one: Fitted, other: Fitted) -> float:
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Prospect]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    begun = [one for one in fit.together(partial(_begun, fit, best), rivals) if _gains(best, one)]
+    tried = fit.together(partial(_begun, fit, best), rivals)
+    begun = [one for one in tried if _gains(fit, best, one)]
     if not begun:
         return []
     misfits = _misfits(begun)
-    near = misfits < _BEHIND * misfits.min()
+    near = misfits < fit.decides.behind * misfits.min()
 
     def finished(one: Fitted) -> Fitted:
         return fitted(fit, one.linearised, one.active)
@@ -151,7 +143,7 @@ def _begun(fit: Fit, best: Fitted, rival: Prospect) -> Fitted:
     for halvings in range(_HALVINGS + 1):
         # A law bends: half the contact's stiffness is twice the slip.
         one = extended(fit, best, replace(rival, size=0.5**halvings * rival.size), _BEGUN)
-        if _gains(best, one):
+        if _gains(fit, best, one):
             break
     return one
 
@@ -203,12 +195,12 @@ def pruned(
         for effect in best.active:
             key = (effect.name, effect.label)
             size = abs(best.point.sizes[key])
-            clear = size / max(sigma[trial.joint.known.index(key)], 1e-300) / _SIGNIFICANT
-            ratios[effect] = min(clear, size / effect.matters)
+            clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
+            ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
         less = lesser(fit, best, base)
         if len(less) > 1:
             for effect, one in less.items():
-                ratios[effect] = min(ratios[effect], beyond(one, best) / _NEEDED)
+                ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
@@ -269,15 +261,15 @@ def joined(point: Point, rival: Prospect) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _rivals(scores: Sequence[Prospect], best: Fitted) -> list[Prospect]:
+def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> list[Prospect]:
     """The best variant of each effect that is large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides.
     """
-    clear, needed = _SIGNIFICANT, _HELD_OUT
-    if best.linearised.inflation.max() > WRONG:
-        clear, needed = _HINT, 0.0
+    clear, needed = decides.significant, decides.fall
+    if best.linearised.inflation.max() > decides.wrong:
+        clear, needed = decides.hint, 0.0
     able: dict[str, Prospect] = {}
     for one in scores:
         significant = (
@@ -285,5 +277,5 @@ def _rivals(scores: Sequence[Prospect], best: Fitted) -> list[Prospect]:
         )
         if significant and abs(one.size) >= one.effect.matters:
             able.setdefault(one.effect.name, one)
-    ranked = list(able.values())[:_RIVALS]
-    return [one for one in ranked if one.held_out.sum() > _NEAR * ranked[0].held_out.sum()]
+    ranked = list(able.values())[: decides.rivals]
+    return [one for one in ranked if one.held_out.sum() > decides.near * ranked[0].held_out.sum()]

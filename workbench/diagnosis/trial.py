@@ -13,8 +13,6 @@ from workbench.fmu import Matrix, Vector
 
 Option = tuple[Effect, Mapping[str, float]]
 
-_IMMATERIAL = 3.0  # standard deviations that reach from zero to a size that matters
-
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
@@ -104,7 +102,7 @@ class Trial:
         stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
         prior = self.joint.prior.columns(transforms[0])
         for j, (_, matters) in enumerate(others, start=len(self._known)):
-            prior.N[j, j] += (_IMMATERIAL / matters) ** 2
+            prior.N[j, j] += (self._fit.decides.immaterial / matters) ** 2
         return stops, prior
 
     def covariance(self) -> Matrix:

@@ -13,7 +13,6 @@ from workbench.diagnosis.fit import Fit, variant
 from workbench.diagnosis.linearised import lasting
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
-    WRONG,
     Fitted,
     Reporter,
     Step,
@@ -31,11 +30,6 @@ from workbench.fmu import Matrix, Vector
 Verdict = Literal["nothing", "found", "unexplained"]
 
 _QUANTILE = 1.96  # of a normal distribution, 95 %
-_TWIN = 0.98  # cosine of signatures from which on an effect is fitted in full, to be told apart
-_CLOSE = 40.0  # of chi-squared: less does not tell fitted effects apart, whose laws are simplified
-_CLOSE_SHARE = 0.001  # of what the effect explains: a rival may owe that to its exact form
-_IDLE = 0.05  # share of the explainable below which an effect beside others is no cause
-_EXPLAINED = 0.97  # share of lasting errors that a right cause explains, and wrong ones do not
 _FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 
@@ -136,9 +130,10 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         best, trial = examine(fit, less[idle], catalogue, report)
         best, trial = pruned(fit, catalogue, best, base, trial, report)
         less = lesser(fit, best, base)
-    clean = float(best.linearised.inflation.max()) < WRONG
+    clean = float(best.linearised.inflation.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
-    if not clean and not (best.active and (interrupted or _share(base, best) > _EXPLAINED)):
+    explained = _share(base, best) > 1.0 - fit.decides.left
+    if not clean and not (best.active and (interrupted or explained)):
         verdict = "unexplained"
     names, cosines = _confusability(trial, catalogue)
     causes: list[Cause] = []
@@ -174,7 +169,7 @@ def _idle(fit: Fit, best: Fitted, less: Mapping[Effect, Fitted]) -> Effect | Non
         for effect, one in less.items()
     }
     weakest = min(shares, key=lambda effect: shares[effect])
-    return weakest if shares[weakest] < _IDLE else None
+    return weakest if shares[weakest] < fit.decides.idle else None
 
 
 def _explained(fit: Fit, less: Fitted, best: Fitted, *, fast: bool) -> tuple[float, float]:
@@ -290,14 +285,14 @@ def _twins(
     less : the best fit without the effect.
     """
     row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
-    alike = {name for name in names if row[name] > _TWIN}
+    alike = {name for name in names if row[name] > 1.0 - fit.decides.twin}
     found: list[str] = []
     judged = {one.name for one in best.active}
     for step in steps:
         winner = step.rivals[0]
         rivals = {rival.active[-1].name: rival for rival in step.rivals}
         if winner.active[-1] is effect:
-            found += [name for name, one in rivals.items() if _close(step.before, one, winner)]
+            found += [name for name, one in rivals.items() if _close(fit, step.before, one, winner)]
             judged |= set(rivals)
         elif effect.name in rivals:
             alike |= set(rivals)
@@ -306,14 +301,15 @@ def _twins(
         if score.effect.name in alike - judged:
             others.setdefault(score.effect.name, score)
     fits = fit.together(partial(extended, fit, less), list(others.values()))
-    found += [name for name, one in zip(others, fits, strict=True) if _close(less, one, best)]
+    found += [name for name, one in zip(others, fits, strict=True) if _close(fit, less, one, best)]
     active = {one.name for one in best.active}
     return tuple(name for name in dict.fromkeys(found) if name not in active)
 
 
-def _close(before: Fitted, one: Fitted, best: Fitted) -> bool:
+def _close(fit: Fit, before: Fitted, one: Fitted, best: Fitted) -> bool:
     """Whether chi-squared does not tell two effects apart, either of which explains."""
-    return beyond(one, best) < max(_CLOSE, _CLOSE_SHARE * beyond(before, best))
+    form = max(fit.decides.form, fit.decides.form_share * beyond(before, best))
+    return beyond(one, best) < form
 
 
 def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:

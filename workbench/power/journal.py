@@ -86,7 +86,7 @@ def diagnosed(
 
 
 def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire) -> float | None:
-    if len(planting.gains) != 1:
+    if planting.kind != "single":
         return None
     ((name, gain),) = planting.gains.items()
     planted = repertoire.plantable(name)

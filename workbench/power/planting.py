@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-Kind = Literal["clean", "single", "pair", "outside"]
+Kind = Literal["clean", "single", "pair", "outside", "sheet"]
 
 
 class Findable(Protocol):
@@ -55,6 +55,21 @@ class Plantable:
     sensed: bool = False
     shapes: Mapping[str, float] = field(default_factory=dict)
     outside: float = math.nan
+
+
+@dataclass(frozen=True)
+class SheetError:
+    """A way in which the machine differs from its data sheet, which the diagnosis is given.
+
+    Attributes
+    ----------
+    name, gain : of the rig's effect, and its size, SI.
+    effect : of the library's which is this error; empty if the library has none.
+    """
+
+    name: str
+    gain: float
+    effect: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,6 +163,26 @@ def plan(
     # All kinds advance alike, so that a run that is cut short has something of each.
     ranked = [((i + 0.5) / len(kind), group) for kind in kinds for i, group in enumerate(kind)]
     return [group for _, group in sorted(ranked, key=lambda one: one[0])]
+
+
+def plan_sheet_errors(errors: Sequence[SheetError], repeats: int, seed: int) -> list[Group]:
+    """Plan sets of a rig that differs from its data sheet, each error alone, in so many sets."""
+    groups: list[Group] = []
+    for n in range(repeats):
+        for one in errors:
+            own = _seed(seed, f"{one.name} {one.gain:g}", n)
+            groups.append((Planting("sheet", own, 1.0, {one.name: one.gain}, (one.effect,)),))
+    return groups
+
+
+def some(groups: Sequence[Group], count: int, seed: int) -> list[Planting]:
+    """So many sets of a plan, of all kinds alike, drawn from those of a kind."""
+    order = np.random.default_rng(seed).permutation(len(groups))
+    kinds: dict[Kind, list[Planting]] = {}
+    for i in order:
+        kinds.setdefault(groups[i][0].kind, []).append(groups[i][0])
+    ranked = [(i, one) for kind in kinds.values() for i, one in enumerate(kind)]
+    return [one for _, one in sorted(ranked, key=lambda pair: pair[0])[:count]]
 
 
 def _each(

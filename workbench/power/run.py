@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from workbench import diagnosis
-from workbench.case import read_cases
+from workbench.case import Case, read_cases
 from workbench.diagnosis import Effect
 from workbench.pool import Pool, WorkerError
 from workbench.power.diagnosing import build_everything, diagnose_set
 from workbench.power.journal import Diagnosed, Journal, diagnosed
-from workbench.power.planting import Group, Repertoire
+from workbench.power.planting import Group, Planting, Repertoire
 from workbench.power.virtual_rig import VirtualRig
 from workbench.system import System
 
@@ -38,6 +38,12 @@ class Setup:
     rig: VirtualRig
     everything: Path
     effects: tuple[Effect, ...]
+
+    def recorded(self, planting: Planting, simulated: Any) -> list[Case]:
+        """What the rig's sensors make of what happened, read back from files."""
+        with tempfile.TemporaryDirectory() as folder:
+            self.rig.write(simulated, planting.gains, Path(folder))
+            return read_cases([Path(folder)], self.system)
 
     @property
     def repertoire(self) -> Repertoire:
@@ -148,9 +154,7 @@ def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
         try:
             if simulated is None:
                 simulated = setup.rig.simulate(planting.seed, planting.gains)
-            with tempfile.TemporaryDirectory() as folder:
-                setup.rig.write(simulated, planting.gains, Path(folder))
-                cases = read_cases([Path(folder)], setup.system)
+            cases = setup.recorded(planting, simulated)
             found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
         except Exception as error:  # one set must not end a run of hours; it is counted
             seconds = time.perf_counter() - begin

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.errors import InputError
-from workbench.power.planting import Plantable
+from workbench.power.planting import Plantable, SheetError
 from workbench.system import System
 
 
@@ -22,6 +22,10 @@ class VirtualRig(Protocol):
     @property
     def plantables(self) -> tuple[Plantable, ...]:
         """What can be planted."""
+
+    @property
+    def sheet_errors(self) -> tuple[SheetError, ...]:
+        """Ways in which the machine may differ from its data sheet."""
 
     @property
     def recordings(self) -> tuple[str, ...]:

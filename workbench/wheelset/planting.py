@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.fmu import CoSimulation
-from workbench.power.planting import Plantable
+from workbench.power.planting import Plantable, SheetError
 from workbench.wheelset import rig
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
@@ -53,6 +53,7 @@ PLANTABLE = (
     _one("wheel_load", "WheelLoad"),
     _one("creep_stiffness", "CreepStiffness"),
     _one("wheel_inertia", "WheelInertia"),
+    _one("roller_inertia", "RollerInertia"),
     _one("torque_gain", "DriveTorqueGain", sensed=True),
     _one("adhesion_recovery", "AdhesionRecovery", shapes={"Er": 250e3}),
     _one("wheelset_losses", "WheelsetLosses"),
@@ -68,6 +69,15 @@ PLANTABLE = (
     _one("friction_ripple", outside=0.01),
     _one("drive_beat", sensed=True, outside=0.005),
     _one("force_drift", sensed=True, outside=2.0),
+)
+
+# More than a careful sheet has wrong: a mode is measured to 10 %, an inertia computed to 1 %.
+SHEET_ERRORS = (
+    *(SheetError("structure", gain) for gain in (0.25, -0.25)),
+    *(SheetError("creep_stiffness", gain, "CreepStiffness") for gain in (0.1, -0.1)),
+    *(SheetError("roller_inertia", gain, "RollerInertia") for gain in (0.015, -0.015)),
+    SheetError("noise", 2.0),
+    SheetError("tolerances", 1.0),
 )
 
 
@@ -88,6 +98,11 @@ class PlantedStops:
     def plantables(self) -> tuple[Plantable, ...]:
         """What can be planted."""
         return PLANTABLE
+
+    @property
+    def sheet_errors(self) -> tuple[SheetError, ...]:
+        """What the data sheet may have wrong."""
+        return SHEET_ERRORS
 
     @property
     def recordings(self) -> tuple[str, ...]:

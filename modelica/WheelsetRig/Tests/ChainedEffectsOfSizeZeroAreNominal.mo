@@ -56,7 +56,8 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
       redeclare WheelRadius wheelRadius, redeclare Effects.RollerRadius rollerRadius,
       redeclare Effects.WheelLoad wheelLoad,
       redeclare Effects.CreepStiffness creepStiffness,
-      redeclare Effects.WheelInertia wheelInertia, redeclare Effects.DriveTorqueGain driveTorque,
+      redeclare Effects.WheelInertia wheelInertia,
+      redeclare Effects.RollerInertia rollerInertia, redeclare Effects.DriveTorqueGain driveTorque,
       redeclare Effects.AdhesionRecovery adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
       redeclare Effects.RollerLosses rollerLoss, redeclare SpeedSensor speedSensorW,
       redeclare Sensors.LoggerTimeSkew speedSensorR, redeclare ForceSensor forceSensor);

@@ -43,6 +43,9 @@ class Effects:
     wheelset_losses: float = _gain("1", "losses of the wheelset times 1 + gain", least=-1.0)
     roller_losses: float = _gain("1", "losses of the roller times 1 + gain", least=-1.0)
     wheel_inertia: float = _gain("1", "inertia of the wheelset times 1 + gain", least=-0.9)
+    roller_inertia: float = _gain(
+        "1", "inertia of the roller times 1 + gain, unknown to the drive", least=-0.5
+    )
     torque_gain: float = _gain("1", "measured torque times 1 + gain")
     fx_gain: float = _gain("1", "load cell times 1 + gain")
     fx_offset: float = _gain("N", "added to the load cell, in either direction")
@@ -62,6 +65,12 @@ class Effects:
         "1", "not in the catalogue: measured torque times 1 + gain*sin(2 pi 0.2 Hz t)"
     )
     force_drift: float = _gain("N/s", "not in the catalogue: added to the load cell times t")
+    # What the data sheet may have wrong besides.
+    structure: float = _gain(
+        "1", "sheet: frequency of the longitudinal mode times 1 + gain", least=-0.9
+    )
+    noise: float = _gain("1", "sheet: noise of all sensors times 1 + gain", least=-1.0)
+    tolerances: float = _gain("1", "sheet: scatter of the stops times 1 + gain", least=-1.0)
     # Faults of the acquisition.
     spikes: float = _gain("1/s", "corrupts: isolated wrong samples in each channel", least=0.0)
     dropouts: float = _gain("1/s", "corrupts: samples that are missing", least=0.0)

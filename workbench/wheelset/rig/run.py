@@ -49,6 +49,16 @@ _POLACH = {
     "dry": {"polach.kA": 1.0, "polach.kS": 0.4, "polach.A": 0.4, "polach.B": 0.6},
     "wet": {"polach.kA": 0.3, "polach.kS": 0.1, "polach.A": 0.4, "polach.B": 0.2},
 }
+# Springs and dampers of the longitudinal mode, in series: with these powers of its frequency, its
+# shape and its share of the critical damping stay.
+_MODE = {
+    name: power
+    for i in (1, 2)
+    for name, power in (
+        *((f"longitudinal[{i}].c", 2), (f"longitudinal[{i}].d", 1)),
+        *((f"axleBox[{i}].c[1]", 2), (f"axleBox[{i}].d[1]", 1)),
+    )
+}
 _RUN_IN = 1.0  # [s] before the recording, in which the model settles under the wheelset's drag
 _STANDSTILL = 0.05  # [m/s]
 _REST = 2.0  # [s] recorded after standstill
@@ -125,7 +135,7 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
     InputError
         If the FMU is not a model of the rig, or the wheelset does not stop in 300 s.
     """
-    drawn = _draw(np.random.default_rng([seed, scenario.number, 0]))
+    drawn = _draw(np.random.default_rng([seed, scenario.number, 0]), effects)
     phases = _phases(np.random.default_rng([seed, scenario.number, 6]))
     with CoSimulation(fmu_path) as fmu:
         rows, standstill = _brake_to_standstill(fmu, scenario, drawn, phases, effects)
@@ -135,9 +145,10 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
     return Stop(scenario, seed, drawn, phases, time, truth, standstill, model)
 
 
-def _draw(rng: np.random.Generator) -> Drawn:
+def _draw(rng: np.random.Generator, effects: Effects) -> Drawn:
     """Draw from the tolerances of the data sheet, one sigma each."""
-    JW, JR, Fz, muDC, muWR = 1.0 + rng.normal(0.0, [0.01, 0.002, 0.003, 0.02, 0.02])
+    scatter = (1.0 + effects.tolerances) * rng.normal(0.0, [0.01, 0.002, 0.003, 0.02, 0.02])
+    JW, JR, Fz, muDC, muWR = 1.0 + scatter
     coasting = round(rng.uniform(3.0, 5.0), 3)
     return Drawn(float(JW), float(JR), float(Fz), float(muDC), float(muWR), coasting)
 
@@ -154,7 +165,7 @@ def _parameters(
         "rW": nominal["rW"] + effects.wheel_radius,
         "rR": nominal["rR"] + effects.roller_radius,
         "JW": nominal["JW"] * drawn.JW * (1.0 + effects.wheel_inertia),
-        "JR": nominal["JR"] * drawn.JR,
+        "JR": nominal["JR"] * drawn.JR * (1.0 + effects.roller_inertia),
         "Fz": nominal["Fz"] * drawn.Fz * (1.0 + effects.wheel_load),
         "muWR": scenario.muWR * drawn.muWR,
         "muDC": FRICTION,
@@ -165,6 +176,8 @@ def _parameters(
             1.0 + effects.wheelset_losses
         )
         changed[f"rollerLoss.{c}"] = nominal[f"rollerLoss.{c}"] * (1.0 + effects.roller_losses)
+    for name, power in _MODE.items():
+        changed[name] = nominal[name] * (1.0 + effects.structure) ** power
     changed |= _POLACH[scenario.conditions.wheel_rail]
     for k in ("polach.kA", "polach.kS"):
         changed[k] *= 1.0 + effects.creep_stiffness

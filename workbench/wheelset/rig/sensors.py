@@ -73,7 +73,7 @@ def sample(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
         + (e.fx_offset + e.force_drift * time),
     }
     readings = {
-        name: _read(ideal[name], sensor, _rng(stop, _NOISE + i))
+        name: _read(ideal[name], sensor, 1.0 + e.noise, _rng(stop, _NOISE + i))
         for i, (name, sensor) in enumerate(MEASURED.items())
     }
     if e.fx_limit:
@@ -114,8 +114,8 @@ def _corrupt(reading: Vector, rate: float, time: Vector, rng: np.random.Generato
     return corrupted
 
 
-def _read(ideal: Vector, sensor: Sensor, rng: np.random.Generator) -> Vector:
-    deviation = sensor.noise + sensor.relative * np.abs(ideal)
+def _read(ideal: Vector, sensor: Sensor, times: float, rng: np.random.Generator) -> Vector:
+    deviation = times * (sensor.noise + sensor.relative * np.abs(ideal))
     noisy = ideal + deviation * rng.standard_normal(ideal.size)
     reading: Vector = np.round(noisy / sensor.resolution) * sensor.resolution
     return reading

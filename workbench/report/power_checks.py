@@ -1,0 +1,71 @@
+"""What the diagnosis makes of other thresholds, and of a wrong data sheet: files and tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from workbench.files import write_json
+from workbench.power.sensitivity import FACTORS, Varied
+
+
+def write_thresholds(
+    results: Sequence[Varied],
+    usual: Mapping[str, float],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write thresholds.json.
+
+    Parameters
+    ----------
+    usual : value of each threshold.
+    """
+    sets = [
+        {
+            "rig": one.planting.options,
+            "kind": one.planting.kind,
+            "planted": one.planting.effects,
+            "said": one.said,
+            "changed": [asdict(other) for other in one.changed],
+        }
+        for one in results
+    ]
+    write_json(out / "thresholds.json", {"provenance": provenance, "usual": usual, "sets": sets})
+
+
+def format_thresholds(results: Sequence[Varied], usual: Mapping[str, float]) -> str:
+    """Table of what changes, and the thresholds that change nothing."""
+    lines = [f"{len(results)} sets, each threshold times {' and '.join(map(str, FACTORS))}", ""]
+    idle = []
+    for name, value in usual.items():
+        rows = [
+            (change, one) for one in results for change in one.changed if change.threshold == name
+        ]
+        if not rows:
+            idle.append(f"{name} {value:.4g}")
+        for change, one in rows:
+            lines.append(
+                f"{name} {value:.4g} -> {change.value:.4g}: {', '.join(one.said)} becomes "
+                f"{', '.join(change.said)} ({one.planting.options})"
+            )
+    return "\n".join([*lines, "", f"nothing changes by: {', '.join(idle)}"])
+
+
+def write_sheet(
+    rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
+) -> None:
+    """Write sheet_error.json."""
+    write_json(out / "sheet_error.json", {"provenance": provenance, "sets": list(rows)})
+
+
+def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was said, and the number of wrong names."""
+    lines = [f"{'wrong in the sheet':<26} {'verdict':<12} causes"]
+    for row in rows:
+        error = " ".join(f"{name}={gain:+g}" for name, gain in row["wrong"].items())
+        causes = ", ".join(" or ".join(group) for group in row["causes"])
+        mark = "  WRONG NAME" if row["wrong_name"] else ""
+        lines.append(f"{error:<26} {row['verdict']:<12} {causes or row['error']}{mark}")
+    wrong = sum(row["wrong_name"] for row in rows)
+    return "\n".join([*lines, "", f"{wrong} of {len(rows)} sets have a wrong name"])
