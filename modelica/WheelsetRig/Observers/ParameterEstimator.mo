@@ -1,14 +1,14 @@
 within WheelsetRig.Observers;
 model ParameterEstimator "Full model, its frictions set by a PI controller from measured speeds"
-  extends PartialObserver(effect_muWR=49.3865394, effect_muDC=-104.6887);
+  extends PartialObserver(effect_muWR=42.4198268, effect_muDC=-105.223644);
   parameter Real L11(unit="s/rad") = 0.0 "From dy of the wheelset to muWR";
   parameter Real L12(unit="s/rad") = 0.0 "From dy of the roller to muWR";
-  parameter Real L13(unit="1/rad") = 33.1644318 "From the integral of dy of the wheelset to muWR";
-  parameter Real L14(unit="1/rad") = -50.4330981 "From the integral of dy of the roller to muWR";
+  parameter Real L13(unit="1/rad") = 42.9677889 "From the integral of dy of the wheelset to muWR";
+  parameter Real L14(unit="1/rad") = -65.3440139 "From the integral of dy of the roller to muWR";
   parameter Real L21(unit="s/rad") = 0.0 "From dy of the wheelset to muDC";
-  parameter Real L22(unit="s/rad") = -1.98202309 "From dy of the roller to muDC";
+  parameter Real L22(unit="s/rad") = -1.98202191 "From dy of the roller to muDC";
   parameter Real L23(unit="1/rad") = 0.0 "From the integral of dy of the wheelset to muDC";
-  parameter Real L24(unit="1/rad") = -21.2359617 "From the integral of dy of the roller to muDC";
+  parameter Real L24(unit="1/rad") = -21.2359491 "From the integral of dy of the roller to muDC";
 
   output Units.FrictionCoefficient muWR = frictionWR.acting
     "Friction wheel-rail at zero slip velocity, estimated";
