@@ -11,6 +11,12 @@ from workbench.tuning.checkpoint import Generation
 
 
 def draw_convergence(history: Sequence[Generation], path: Path) -> None:
+    """Draw `convergence` to a file."""
+    with replacing(path) as stream:
+        convergence(history).savefig(stream, format="png", dpi=120)
+
+
+def convergence(history: Sequence[Generation]) -> Figure:
     """Best z and share of work saved, by generation."""
     figure = Figure(figsize=(8, 5), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -24,8 +30,7 @@ def draw_convergence(history: Sequence[Generation], path: Path) -> None:
     bottom.legend()
     for axes in (top, bottom):
         axes.grid(alpha=0.3)
-    with replacing(path) as stream:
-        figure.savefig(stream, format="png", dpi=120)
+    return figure
 
 
 def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:

@@ -5,14 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from workbench.case import Case
 from workbench.errors import FMUError, InputError, closest
 from workbench.fmu import Vector
-from workbench.observers import Estimator, SearchSpace, estimators
+from workbench.observers import Estimator, Gains, SearchSpace, estimators
 from workbench.system import System
 from workbench.systems import open_model
 from workbench.tuning.checkpoint import Generation
@@ -27,6 +28,9 @@ from workbench.tuning.validation import (
     untuned_filters,
 )
 from workbench.tuning.workers import Workers
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +73,47 @@ class Tuned:
     sensitivities: Sequence[Sensitivity] = ()
     beside: Mapping[str, Vector] = field(default_factory=dict)
     folds: Sequence[Fold] = ()
+
+    @property
+    def gains(self) -> Gains:
+        """The gains that were found, for whoever runs the estimator."""
+        return self.problem.job.gains.with_values(self.search.best, "tuned")
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gains by name: what each does, its unit, its value, and that before tuning."""
+        names, meanings = self.gains.names, self.problem.meanings
+        return pd.DataFrame(
+            {
+                "meaning": [meanings[name][0] for name in names],
+                "unit": [meanings[name][1] for name in names],
+                "value": self.gains.values,
+                "reasoned": self.problem.job.gains.values,
+            },
+            index=pd.Index(names, name="gain"),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All that is known of the tuning, as in summary.json."""
+        from workbench.tuning.summary import summarise
+
+        return summarise(self, len(self.folds))
+
+    def summary(self) -> str:
+        """Table of cases, and what is to be said of gains and folds."""
+        from workbench.report.tuning import format_tuned
+
+        return format_tuned(self.to_dict())
+
+    def plot(self) -> "Figure":
+        """Figure of how the search converged."""
+        from workbench.tuning.figures import convergence
+
+        return convergence(self.search.history)
+
+    def _repr_html_(self) -> str:
+        """Gains as a table, for notebooks."""
+        table: str = self.to_frame().to_html()
+        return table
 
 
 class Progress:
