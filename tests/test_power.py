@@ -32,7 +32,7 @@ from workbench.power.planting import Group, Kind
 from workbench.power.statistics import intervals_cover, named_all, named_right
 from workbench.report.power import format_power, write_power
 from workbench.systems import load_system
-from workbench.wheelset.planting import PLANTABLE, PlantedStops
+from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
 ROOT = Path(__file__).parents[1]
@@ -81,7 +81,7 @@ def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside
     )
     faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
     rig = {field.name for field in dataclasses.fields(Effects)} - faults_of_the_acquisition
-    assert {one.name for one in PLANTABLE} == rig
+    assert {one.name for one in (*PLANTABLE, *SHEET_ERRORS)} == rig
 
 
 def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from workbench.fmu import FMU
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
@@ -20,6 +21,7 @@ from workbench.wheelset.rig import (
 )
 from workbench.wheelset.rig.brake import Brake, Valve
 from workbench.wheelset.rig.pads import Pads
+from workbench.wheelset.rig.run import MODE
 from workbench.wheelset.rig.wheel import OutOfRoundWheel
 
 ROOT = Path(__file__).parents[1]
@@ -129,6 +131,8 @@ def test_phase_is_told_where_its_effect_is_planted(tmp_path: Path) -> None:
         ("wheelset_losses", 1.0),
         ("roller_losses", 1.0),
         ("wheel_inertia", 0.3),
+        ("roller_inertia", 0.015),
+        ("structure", 0.25),
     ],
 )
 def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -> None:
@@ -137,6 +141,35 @@ def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -
     n = int(np.searchsorted(nominal.time, nominal.drawn.coasting + 3.0))
     # The simulation repeats to the bit, so any difference is the effect's.
     assert not np.array_equal(planted.truth["slip"][:n], nominal.truth["slip"][:n])
+
+
+# --- a data sheet that is wrong ---
+
+
+@pytest.mark.parametrize("gain", [0.25, -0.25])
+def test_longitudinal_mode_moves_and_is_damped_as_before(gain: float) -> None:
+    """Eigenvalues at 30 m/s: of what moves, the mode of the sheet, 21.6 Hz, with 5 %."""
+    modes = []
+    for change in (0.0, gain):
+        with FMU(REFERENCE) as fmu:
+            changed = {name: fmu.defaults[name] * (1.0 + change) ** n for name, n in MODE.items()}
+            fmu.start({**changed, "omegaW": 30.0 / WHEEL_RADIUS, "omegaR": 30.0 / ROLLER_RADIUS})
+            values = np.linalg.eigvals(fmu.state_jacobian())
+        frequencies = abs(values) / (2.0 * np.pi)
+        modes.append(values[np.argmin(abs(frequencies - 21.6 * (1.0 + change)))])
+    # Bodies that it moves have other springs too: half a percent of frequency, a tenth of damping.
+    assert abs(modes[1]) / abs(modes[0]) == pytest.approx(1.0 + gain, rel=0.005)
+    damping = [-mode.real / abs(mode) for mode in modes]
+    assert damping[1] == pytest.approx(damping[0], rel=0.1)
+    assert damping[0] == pytest.approx(0.05, abs=0.01)
+
+
+def test_tolerances_scatter_in_proportion() -> None:
+    usual = dataclasses.asdict(make(speed=20.0).drawn)
+    wide = dataclasses.asdict(make("tolerances=1", speed=20.0).drawn)
+    assert wide.pop("coasting") == usual.pop("coasting")
+    for name, value in usual.items():
+        assert wide[name] - 1.0 == pytest.approx(2.0 * (value - 1.0), rel=1e-9), name
 
 
 # --- brake ---

@@ -53,6 +53,18 @@ def added(planted: str, stop: Stop) -> dict[str, np.ndarray]:
 # --- noise ---
 
 
+def test_noise_of_every_sensor_grows_by_the_same_factor() -> None:
+    stop = make()
+    time = recorded(stop)
+    silent, usual, loud = (
+        sample(stop, plant(CONSTANT_PADS, [f"noise={gain}"]), time) for gain in (-1.0, 0.0, 2.0)
+    )
+    for name in CHANNELS:
+        # Of the same random numbers; rounding to the resolution adds at most 4 % to the lesser.
+        ratio = np.std(loud[name] - silent[name]) / np.std(usual[name] - silent[name])
+        assert ratio == pytest.approx(3.0, rel=0.04), name
+
+
 @pytest.mark.parametrize(
     ("name", "signal", "noise", "relative", "resolution"),
     [

@@ -65,7 +65,8 @@ class Varied:
 def values(one: Thresholds) -> dict[str, float]:
     """Each threshold by its name."""
     found = dataclasses.asdict(one)
-    return {**found, **found.pop(_SAMPLES)}
+    samples = found.pop(_SAMPLES)
+    return {**found, **samples}
 
 
 def changed(one: Thresholds, name: str, factor: float) -> Thresholds:

@@ -51,7 +51,7 @@ _POLACH = {
 }
 # Springs and dampers of the longitudinal mode, in series: with these powers of its frequency, its
 # shape and its share of the critical damping stay.
-_MODE = {
+MODE = {
     name: power
     for i in (1, 2)
     for name, power in (
@@ -176,7 +176,7 @@ def _parameters(
             1.0 + effects.wheelset_losses
         )
         changed[f"rollerLoss.{c}"] = nominal[f"rollerLoss.{c}"] * (1.0 + effects.roller_losses)
-    for name, power in _MODE.items():
+    for name, power in MODE.items():
         changed[name] = nominal[name] * (1.0 + effects.structure) ** power
     changed |= _POLACH[scenario.conditions.wheel_rail]
     for k in ("polach.kA", "polach.kS"):

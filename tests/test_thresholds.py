@@ -1,0 +1,182 @@
+"""What decides in a diagnosis, and what is said of a rig that differs from its data sheet."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom, chi2, norm
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.__main__ import main
+from workbench.diagnosis.thresholds import RATE, thresholds
+from workbench.power import Diagnosed, Named, Planting, diagnose_sets, open_virtual_rig
+from workbench.power.diagnosing import build_everything, library_effects
+from workbench.power.planting import plan_sheet_errors, some
+from workbench.power.run import Setup
+from workbench.power.sensitivity import FACTORS, Varied, changed, values, vary
+from workbench.power.sheet import named_wrong, summarise_sheet
+from workbench.report.power_checks import format_sheet, format_thresholds
+from workbench.systems import load_system
+from workbench.wheelset.planting import SHEET_ERRORS, PlantedStops
+from workbench.wheelset.rig import SCENARIOS, Scenario
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
+SYSTEM = load_system("wheelset")
+EFFECTS = library_effects(SYSTEM)
+DERIVED = ("significant", "fall", "immaterial", "tied")
+
+rates = st.floats(1e-6, 0.2)
+counts = st.integers(1, 500)
+
+# --- from one rate of false alarms ---
+
+
+@given(rates, counts)
+def test_thresholds_are_the_quantiles_of_their_statistics(rate: float, candidates: int) -> None:
+    one = thresholds(candidates, rate)
+    # To rounding: inverse functions of double precision.
+    assert 2.0 * candidates * norm.sf(one.significant) == pytest.approx(rate, rel=1e-9)
+    assert candidates * chi2.sf(one.fall, 1) == pytest.approx(rate, rel=1e-9)
+    assert 2.0 * norm.sf(one.immaterial) == pytest.approx(rate, rel=1e-9)
+    assert np.exp(-0.5 * one.tied) == pytest.approx(rate, rel=1e-9)
+
+
+@given(rates, st.floats(1.01, 4.0), counts)
+def test_fewer_false_alarms_ask_for_more(rate: float, times: float, candidates: int) -> None:
+    rare, usual = (values(thresholds(candidates, one)) for one in (rate, times * rate))
+    for name in DERIVED:
+        assert rare[name] > usual[name], name
+    assert {n: v for n, v in rare.items() if n not in DERIVED} == {
+        n: v for n, v in usual.items() if n not in DERIVED
+    }
+
+
+@given(rates, counts)
+def test_more_candidates_ask_for_more(rate: float, candidates: int) -> None:
+    few, many = thresholds(candidates, rate), thresholds(candidates + 1, rate)
+    assert many.significant > few.significant
+    assert many.fall > few.fall
+
+
+def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate() -> None:
+    """By chance: sizes over their deviations, of 28 candidates in 50 000 clean sets."""
+    sets = 50_000
+    sizes = np.random.default_rng(1).standard_normal((sets, 28))
+    alarms = int((abs(sizes).max(axis=1) > thresholds(28).significant).sum())
+    low, high = binom.interval(0.999, sets, RATE)
+    assert low <= alarms <= high
+
+
+# --- half and twice ---
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+@pytest.mark.parametrize("name", values(thresholds(28)))
+def test_one_threshold_is_changed_and_no_other(name: str, factor: float) -> None:
+    usual = values(thresholds(28))
+    found = values(changed(thresholds(28), name, factor))
+    # What is counted stays a whole number.
+    assert found.pop(name) == pytest.approx(factor * usual[name], abs=0.5 * (name == "rivals"))
+    assert found == {other: value for other, value in usual.items() if other != name}
+
+
+def short(name: str, speed: float) -> Scenario:
+    """A standard stop from a lower speed [km/h]."""
+    usual = SCENARIOS[name]
+    conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
+    return dataclasses.replace(usual, conditions=conditions)
+
+
+def test_thresholds_change_what_is_said_of_an_effect_that_is_barely_worth_a_word(
+    tmp_path: Path,
+) -> None:
+    """Of the gain of a load cell, what is clear says the same by all that may be halved."""
+    rig = PlantedStops((short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)), REFERENCE)
+    setup = Setup(SYSTEM, rig, tmp_path / "AllEffects.fmu", EFFECTS)
+    build_everything(SYSTEM, EFFECTS, setup.everything)
+    found = vary(setup, Planting("single", 12, 8.0, {"fx_gain": 0.016}, ("FxGain",)))
+    assert found.said == ("found", "FxGain")
+    table = format_thresholds([found], values(thresholds(len(EFFECTS))))
+    assert "nothing changes by: " in table
+    assert all(change.said[:2] != found.said[:2] for change in found.changed)
+
+
+def test_sets_are_of_all_kinds_alike() -> None:
+    groups = [
+        (Planting(kind, seed, 1.0, {}, ()),)
+        for kind, count in (("clean", 9), ("single", 90), ("pair", 2))
+        for seed in range(count)
+    ]
+    kinds = [one.kind for one in some(groups, 9, 1)]
+    assert [kinds.count(kind) for kind in ("clean", "single", "pair")] == [4, 3, 2] or [
+        kinds.count(kind) for kind in ("clean", "single", "pair")
+    ] == [3, 4, 2]
+
+
+def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
+    one = Varied(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
+    assert "nothing changes by: significant" in format_thresholds([one], {"significant": 4.0})
+
+
+# --- a data sheet that is wrong ---
+
+
+def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name() -> None:
+    names = {effect.name for effect in EFFECTS}
+    assert {one.effect for one in SHEET_ERRORS} - {""} <= names
+    (rig,) = {type(open_virtual_rig(SYSTEM, [], REFERENCE))}
+    assert rig is PlantedStops
+    groups = plan_sheet_errors(SHEET_ERRORS, 3, 1)
+    assert len({group[0].seed for group in groups}) == len(groups) == 3 * len(SHEET_ERRORS)
+
+
+def said(effect: str, *causes: tuple[str, ...]) -> Diagnosed:
+    planting = Planting("sheet", 1, 1.0, {"roller_inertia": 0.015}, (effect,))
+    named = tuple(Named(first, {}, tuple(twins)) for first, *twins in causes)
+    return Diagnosed(planting, "found" if named else "nothing", named, None, None, 1.0)
+
+
+def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:
+    twins = ("DriveTorqueGain", "RollerInertia")
+    assert not named_wrong(said("RollerInertia"))
+    assert not named_wrong(said("RollerInertia", ("RollerInertia",)))
+    assert not named_wrong(said("RollerInertia", twins))
+    assert named_wrong(said("RollerInertia", ("DriveTorqueGain",)))
+    assert named_wrong(said("RollerInertia", twins, ("BrakeFade",)))
+    assert named_wrong(said("", ("BrakeFade",)))  # noise has no name
+    table = format_sheet(summarise_sheet([said("RollerInertia", twins), said("", ("BrakeFade",))]))
+    assert "DriveTorqueGain or RollerInertia" in table
+    assert "1 of 2 sets have a wrong name" in table
+
+
+@pytest.mark.parametrize("gain", [0.015, -0.015])
+def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain: float, tmp_path: Path) -> None:
+    """Of three stops: two directions, three speeds."""
+    names = ("01_dry_80_1.5", "03_dry_120_3.6", "05_dry_120_2.7_rev")
+    rig = PlantedStops(tuple(SCENARIOS[name] for name in names), REFERENCE)
+    planting = Planting("sheet", 41, 1.0, {"roller_inertia": gain}, ("RollerInertia",))
+    (found,), _ = diagnose_sets(
+        [(planting,)],
+        SYSTEM,
+        rig,
+        EFFECTS,
+        tmp_path,
+        seed=1,
+        workers=1,
+        resume=False,
+        report=lambda _: None,
+    )
+    assert found.verdict in ("found", "nothing", "unexplained")
+    assert not named_wrong(found)
+
+
+def test_command_makes_one_check_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["power", "--thresholds", "--sheet-error"])
+    assert "not allowed with" in capsys.readouterr().err
