@@ -74,10 +74,11 @@ class Evidence:
 
 
 class Simulated(NamedTuple):
-    """What a simulator is made from: an FMU and the recordings."""
+    """What a simulator is made from: an FMU, values that differ from its own, the recordings."""
 
     path: Path
     system: System
+    given: Mapping[str, float]
     recordings: tuple[Samples, ...]
 
 
@@ -85,7 +86,7 @@ class Simulator:
     """An FMU along recordings, in one process."""
 
     def __init__(self, given: Simulated) -> None:
-        self._fmu = FMU(given.path)
+        self._fmu = FMU(given.path, None, given.given)
         self._recordings = given.recordings
         signals = given.recordings[0].signals
         self._predictor = Predictor(self._fmu, given.system, signals)
@@ -221,7 +222,7 @@ class Simulations:
         signals = compared(system, cases)
         self.recordings = [prepare(one, system, signals, self.nominal, moving) for one in cases]
         workers = min(workers, len(cases))
-        simulated = Simulated(path, system, tuple(self.recordings))
+        simulated = Simulated(path, system, self.given, tuple(self.recordings))
         with simulating(simulated) as own:
             self.begin = [own.begin(k) for k in range(len(cases))]
         self._alone = workers == 1
