@@ -320,10 +320,8 @@ def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
     """Channels as declared; else what is measured, one by one."""
     measured = {one.name: one for one in (*system.outputs, *system.judged)}
     if not table.content:
-        return tuple(
-            Channel(name, one.unit, one.label, one.unit, Expression(name, str(system.source)))
-            for name, one in measured.items()
-        )
+        usual = {name: {"is": name, "unit": one.unit} for name, one in measured.items()}
+        table = Table(usual, table.where)
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
