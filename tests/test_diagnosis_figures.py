@@ -11,7 +11,6 @@ from workbench.system import System
 
 from .diagnosis_pages import residuals
 
-
 LASTING = 10  # blocks of 50 ms
 
 

@@ -203,7 +203,7 @@ def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
     rng, draws = np.random.default_rng(6), 40
     kept = rng.random(6000) > 0.3
     case = noisy(6)
-    case = case.part(kept)
+    case = stop(case.time[kept], {name: values[kept] for name, values in case.signals.items()})
     samples, n = ready(case), case.time.size
     # As `noisy` makes it, and 1.2 for ripple; pressure counts by the lever of three discs.
     lever = 3 * 0.30 * 0.1086 * 0.30 * 0.70 / 0.46
