@@ -8,6 +8,8 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.diagnosis import Residuals
+from workbench.diagnosis.residuals import Balance
+from workbench.systems import load_system
 
 STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
 PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second
@@ -38,10 +40,12 @@ def residuals(gap: bool) -> Residuals:
     kept = (time < 10.0) | (time > 15.0) if gap else time >= 0.0
     after = rng.normal(size=(kept.sum(), 3))
     step = np.where(time[kept] > 12.0, 10.0, 0.0)
+    slip = np.where(kept, 1e-3, np.nan)
     return Residuals(
         name="stop",
         time=time,
-        values={"slip": np.where(kept, 1e-3, np.nan)},
+        balances=(Balance("slip", "Slip, as measured", "m/s", "mm/s", slip),),
+        channels=load_system("wheelset").comparison.channels,
         block_time=time[kept],
         before=after + step[:, None],
         after=after,

@@ -16,14 +16,16 @@ pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
 from workbench.diagnosis import Diagnosis, read_effects
-from workbench.diagnosis.evidence import Court
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.verdict import judge
+from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
+from workbench.systems import load_system
 from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
 
 ROOT = Path(__file__).parent.parent
+SYSTEM = load_system("wheelset")
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 LABELLED = ROOT.parent / "shared" / "recordings" / "labelled"
@@ -76,8 +78,9 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
     def run(cases: Sequence[Case]) -> Diagnosis:
-        with Court(everything, {}, cases, 2) as court:
-            return judge(Fit(court, EFFECTS), EFFECTS, lambda _: None)
+        # Alone: the tests themselves run side by side.
+        with Simulations(everything, SYSTEM, {}, cases, 1) as simulations:
+            return conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
 
     return run
 
@@ -87,7 +90,7 @@ def recorded(folder: Path, effects: Effects, seed: int, names: Sequence[str] = S
     for scenario in select(names):
         stop = simulate(scenario, seed, effects, ROOT / "fmus" / "fmi2" / "Reference.fmu")
         write_recording(stop, effects, 200, folder / scenario.name)
-    return read_cases([folder])
+    return read_cases([folder], SYSTEM)
 
 
 @pytest.fixture(scope="session")
@@ -153,14 +156,14 @@ def test_nothing_is_found_where_nothing_is_missing(
 def test_nothing_is_found_without_a_measured_force(
     clean: list[Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
-    assert diagnosed([replace(case, Fx=None) for case in clean]).verdict == "nothing"
+    assert diagnosed([case.without(["Fx"]) for case in clean]).verdict == "nothing"
 
 
 def test_fade_is_found_without_a_measured_force(
     tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
     cases = recorded(tmp_path, Effects(fade=5e-4), 12)
-    found = diagnosed([replace(case, Fx=None) for case in cases])
+    found = diagnosed([case.without(["Fx"]) for case in cases])
     assert [cause.effect.name for cause in found.causes] == ["BrakeFade"]
 
 
@@ -230,7 +233,7 @@ def test_an_independent_simulator_is_seen_through(
     folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
     name, parameter, size = SEEN[folder]
-    found = diagnosed(read_cases([LABELLED / folder]))
+    found = diagnosed(read_cases([LABELLED / folder], SYSTEM))
     assert [cause.effect.name for cause in found.causes] == [name]
     one = found.causes[0].parameters[parameter]
     # Its discs cool and its cylinders lag by formulas of its own: 2 % beside the interval.
@@ -239,20 +242,16 @@ def test_an_independent_simulator_is_seen_through(
     assert found.gain.after < 0.25 * found.gain.before
 
 
-def kept(case: Case, samples: np.ndarray) -> Case:
-    signals = {name: getattr(case, name)[samples] for name in ("time", "pB", "tauR")}
-    speeds = {name: getattr(case, name)[samples] for name in ("omegaW", "omegaR")}
-    return replace(case, **signals, **speeds, Fx=None if case.Fx is None else case.Fx[samples])
-
-
 def slow(case: Case) -> Case:
     """At 50 Hz."""
-    return kept(case, np.arange(0, case.time.size, 4))
+    return case.part(slice(None, None, 4))
 
 
 def uneven(case: Case) -> Case:
     """Three samples in ten are missing."""
-    return kept(case, np.random.default_rng(1).random(case.time.size) > 0.3)
+    kept = np.random.default_rng(1).random(case.time.size) > 0.3
+    signals = {name: values[kept] for name, values in case.signals.items()}
+    return replace(case, time=case.time[kept], signals=signals)
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
@@ -260,7 +259,7 @@ def uneven(case: Case) -> Case:
 def test_clean_recordings_of_an_independent_simulator_stay_clean(
     sampled: Callable[[Case], Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
-    cases = [sampled(case) for case in read_cases([LABELLED / "clean"])]
+    cases = [sampled(case) for case in read_cases([LABELLED / "clean"], SYSTEM)]
     assert diagnosed(cases).verdict == "nothing"
 
 
@@ -268,7 +267,9 @@ def test_clean_recordings_of_an_independent_simulator_stay_clean(
 def test_a_pole_ring_is_named_from_uneven_samples(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
-    (cause,) = diagnosed([uneven(case) for case in read_cases([LABELLED / "pole_ring"])]).causes
+    (cause,) = diagnosed(
+        [uneven(case) for case in read_cases([LABELLED / "pole_ring"], SYSTEM)]
+    ).causes
     assert cause.effect.name == "PoleRingEccentricity"
     assert cause.parameters["amplitude"].low <= 2e-3 <= cause.parameters["amplitude"].high
 
@@ -280,7 +281,9 @@ def test_two_stops_of_an_independent_simulator_are_enough(
 ) -> None:
     """One in each direction, of different pressures."""
     name, parameter, size = SEEN[folder]
-    cases = [case for case in read_cases([LABELLED / folder]) if case.name[:2] in ("04", "05")]
+    cases = [
+        case for case in read_cases([LABELLED / folder], SYSTEM) if case.name[:2] in ("04", "05")
+    ]
     (cause,) = diagnosed(cases).causes
     assert cause.effect.name == name
     assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
@@ -293,15 +296,20 @@ def late(values: np.ndarray) -> np.ndarray:
 
 # What a wrong sensor makes of recordings is known exactly, whoever made them.
 WRONG_SENSORS: dict[str, tuple[Callable[[Case], Case], str, str, float]] = {
-    "gain of the load cells": (lambda c: replace(c, Fx=0.99 * c.Fx), "FxGain", "gain", -0.01),
+    "gain of the load cells": (
+        lambda c: c.with_signals({"Fx": 0.99 * c["Fx"]}),
+        "FxGain",
+        "gain",
+        -0.01,
+    ),
     "late wheel speed": (
-        lambda c: replace(c, omegaW=late(c.omegaW)),
+        lambda c: c.with_signals({"omegaW": late(c["omegaW"])}),
         "SpeedSignalDelay",
         "delay",
         5e-3,
     ),
     "wheel radius": (
-        lambda c: replace(c, omegaW=c.omegaW * 0.46 / (0.46 - 5e-4)),
+        lambda c: c.with_signals({"omegaW": c["omegaW"] * 0.46 / (0.46 - 5e-4)}),
         "WheelRadius",
         "delta",
         -5e-4,
@@ -315,7 +323,7 @@ def test_a_wrong_sensor_on_an_independent_simulator_is_named(
     sensor: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
     wrong, name, parameter, size = WRONG_SENSORS[sensor]
-    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"])])
+    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"], SYSTEM)])
     assert found.verdict == "found"
     (cause,) = found.causes
     assert name in (cause.effect.name, *cause.confusable_with)
@@ -328,8 +336,10 @@ def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
     """300 N over a stop, a hundredth of the force, which no effect of the catalogue does."""
-    cases = read_cases([LABELLED / "clean"])
-    drifting = [replace(c, Fx=c.Fx + np.linspace(0.0, 300.0, c.time.size)) for c in cases]
+    cases = read_cases([LABELLED / "clean"], SYSTEM)
+    drifting = [
+        c.with_signals({"Fx": c["Fx"] + np.linspace(0.0, 300.0, c.time.size)}) for c in cases
+    ]
     assert diagnosed(drifting).verdict == "unexplained"
 
 
@@ -338,7 +348,7 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
     wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
-    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"])])
+    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"], SYSTEM)])
     assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
 
 
@@ -346,9 +356,9 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
 def test_two_wrong_sensors_are_found_though_either_hides_the_other(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
-    cases = read_cases([LABELLED / "clean"])
+    cases = read_cases([LABELLED / "clean"], SYSTEM)
     found = diagnosed(
-        [replace(c, tauR=1.015 * c.tauR, Fx=c.Fx - 100.0) for c in cases if c.Fx is not None]
+        [c.with_signals({"tauR": 1.015 * c["tauR"], "Fx": c["Fx"] - 100.0}) for c in cases]
     )
     groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
     assert len(groups) == 2
@@ -363,10 +373,13 @@ def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(
     """The law of the pads leaves 350 times the noise, the pole ring 2 times."""
 
     def eccentric(case: Case) -> Case:
-        angle = np.cumsum(case.omegaW * np.diff(case.time, prepend=case.time[0]))
-        return replace(case, omegaW=case.omegaW * (1.0 + 1e-3 * np.cos(angle)))
+        omegaW = case["omegaW"]
+        angle = np.cumsum(omegaW * np.diff(case.time, prepend=case.time[0]))
+        return case.with_signals({"omegaW": omegaW * (1.0 + 1e-3 * np.cos(angle))})
 
-    found = diagnosed([eccentric(case) for case in read_cases([LABELLED / "speed_friction"])])
+    found = diagnosed(
+        [eccentric(case) for case in read_cases([LABELLED / "speed_friction"], SYSTEM)]
+    )
     law, ring = found.causes
     assert law.effect.name == "SpeedDependentPadFriction"
     assert law.parameters["slope"].low <= 0.22 <= law.parameters["slope"].high

@@ -9,23 +9,42 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, Conditions
+from workbench.case import Case, read_cases
 from workbench.diagnosis import choose, read_effects
-from workbench.diagnosis.evidence import FORCE_DELAY, Bench, Column, Evidence
+from workbench.diagnosis.evidence import (
+    Evidence,
+    Simulated,
+    Simulations,
+    Simulator,
+    Variation,
+    delay,
+)
 from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
+from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import StopSystem, add, covariance, minimum
-from workbench.diagnosis.samples import Samples, prepare
+from workbench.diagnosis.samples import Samples, compared
+from workbench.diagnosis.samples import prepare as prepare_samples
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 from workbench.modelica import read_library
+from workbench.systems import load_system
 
 ROOT = Path(__file__).parent.parent
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
-DRY = Conditions(27.8, 2.7e5, "dry", ("dry", "dry", "dry"), 1)
+SYSTEM = load_system("wheelset")
+DRY = {
+    "initial_speed": 27.8,
+    "brake_pressure": 2.7e5,
+    "wheel_rail": "dry",
+    "discs": ("dry", "dry", "dry"),
+    "direction": 1,
+}
+INPUTS, OUTPUTS = ("pB", "tauR"), ("omegaW", "omegaR")
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +80,23 @@ def simulated(fmu: Path, parameters: dict[str, float]) -> Case:
                 ]
                 model.set(inputs, np.array(between))
                 model.step(h / 10)
-    omegaW, omegaR, Fx = np.array(rows).T
-    return Case("stop", "a stop", DRY, time, pB, tauR, omegaW, omegaR, Fx, Path("none.csv"))
+    read = dict(zip(("omegaW", "omegaR", "Fx"), np.array(rows).T, strict=True))
+    return stop(time, {"pB": pB, "tauR": tauR, **read})
+
+
+def stop(time: Vector, signals: dict[str, Vector]) -> Case:
+    return Case("stop", "a stop", DRY, time, signals, INPUTS, OUTPUTS, Path("none.csv"))
+
+
+def prepare(case: Case, fmu: FMU) -> Samples:
+    signals = compared(SYSTEM, [case])
+    return prepare_samples(case, SYSTEM, signals, fmu.defaults, motion(fmu, SYSTEM))
+
+
+def errors_of(case: Case, fmu: FMU, values: dict[str, float]) -> tuple[Samples, Matrix]:
+    """Prediction errors of all samples."""
+    ready = prepare(case, fmu)
+    return ready, Predictor(fmu, SYSTEM, ready.signals).errors(ready, values)
 
 
 @pytest.mark.parametrize(
@@ -74,9 +108,8 @@ def test_prediction_agrees_with_an_error_controlled_integrator(
 ) -> None:
     case = simulated(everything, effects)
     with FMU(everything) as fmu:
-        stop = prepare(case, fmu.defaults)
-        errors = Predictor(fmu).errors(stop, {"muWR": 0.4, **effects})
-    moving = slice(200, int(stop.blocks[-1, 1]))
+        ready, errors = errors_of(case, fmu, {"muWR": 0.4, **effects})
+    moving = slice(200, int(ready.blocks[-1, 1]))
     # Steps of 5 ms, force of 14 kN: 1 N where the force is smooth, and 25 N for the samples at the
     # two kinks of the ramp; a wheel out of round shakes the force by 0.9 kN at 9 Hz, of which
     # 5 % is lost. The noise of one sample is 80 N and 10 mm/s.
@@ -91,7 +124,7 @@ def test_an_effect_of_size_zero_predicts_what_the_observer_model_does(everything
     both = []
     for path in (MINIMAL, everything):
         with FMU(path) as fmu:
-            both.append(Predictor(fmu).errors(prepare(case, fmu.defaults), {"muWR": 0.4}))
+            both.append(errors_of(case, fmu, {"muWR": 0.4})[1])
     moving = slice(200, 2800)
     np.testing.assert_allclose(both[0][moving], both[1][moving], rtol=0, atol=1e-7)
 
@@ -111,21 +144,21 @@ def noisy(seed: int, spikes: tuple[int, ...] = ()) -> Case:
     for k in spikes:
         signals["Fx"][k] += 5e3
         signals["omegaR"][k] += 1.0
-    return Case("stop", "a stop", DRY, time, **signals, source=Path("none.csv"))
+    return stop(time, signals)
 
 
 def ready(case: Case) -> Samples:
     with FMU(MINIMAL) as fmu:
-        return prepare(case, fmu.defaults)
+        return prepare(case, fmu)
 
 
 def test_spikes_are_set_aside_with_their_blocks() -> None:
     spikes = (1503, 2407, 3801)
-    stop = ready(noisy(1, spikes))
-    assert stop.set_aside["spike, dropout or saturation"] == len(spikes)
+    samples = ready(noisy(1, spikes))
+    assert samples.set_aside["spike, dropout or saturation"] == len(spikes)
     for k in spikes:
-        assert not any(first <= k < end for first, end in stop.blocks)
-        assert stop.gain[k] == 0.0
+        assert not any(first <= k < end for first, end in samples.blocks)
+        assert samples.gain[k] == 0.0
 
 
 def test_pressure_loses_its_noise_but_no_time() -> None:
@@ -134,9 +167,9 @@ def test_pressure_loses_its_noise_but_no_time() -> None:
     true = 2.7e5 * (1.0 - np.exp(-np.clip(time - 4.0, 0.0, None) / 0.5))
     true *= np.exp(-np.clip(time - 14.0, 0.0, None) / 0.5)
     noise = 500.0 * np.random.default_rng(8).standard_normal(time.size)
-    case = replace(noisy(3), time=time, pB=true + noise, tauR=np.zeros(time.size))
-    case = replace(case, omegaW=39.0 / 0.46 + noise * 1e-5, omegaR=39.0 / 0.70 + noise * 1e-6)
-    pB = ready(replace(case, Fx=None)).u[:, 0]
+    speeds = {"omegaW": 39.0 / 0.46 + noise * 1e-5, "omegaR": 39.0 / 0.70 + noise * 1e-6}
+    case = stop(time, {"pB": true + noise, "tauR": np.zeros(time.size), **speeds})
+    pB = ready(case).u[:, 0]
     held = (time > 9.0) & (time < 12.5)
     # 400 samples in a mean, 30 in a parabola of three times its variance.
     assert np.std(pB[held] - true[held]) < 2.0 * 500.0 / np.sqrt(400.0)
@@ -148,14 +181,16 @@ def test_pressure_loses_its_noise_but_no_time() -> None:
 
 def test_noise_is_whitened_to_variance_one() -> None:
     case = noisy(2)
-    stop = ready(case)
+    samples = ready(case)
     smooth = np.column_stack(
-        [case.omegaR * 0 + 40.0 - 1.2 * np.maximum(0.0, case.time - 3.0)] * 2
+        [np.zeros(case.time.size) + 40.0 - 1.2 * np.maximum(0.0, case.time - 3.0)] * 2
     ) * np.array([0.70 / 0.46, 1.0])
     force = 15e3 * np.clip(case.time - 3.0, 0.0, 1.0)
-    errors = np.column_stack([case.omegaW, case.omegaR, case.Fx]) - np.column_stack([smooth, force])
-    means = stop.channels(errors, 0.46, 0.70)
-    white = np.einsum("bij,bj->bi", stop.whitening, means)
+    errors = np.column_stack([case[name] for name in ("omegaW", "omegaR", "Fx")]) - np.column_stack(
+        [smooth, force]
+    )
+    means = samples.channels(errors)
+    white = np.einsum("bij,bj->bi", samples.whitening, means)
     # 500 blocks: a variance is known to 6 %. The roller's channel allows for the prediction's own
     # variance, which pure measurement noise does not have.
     assert white[:, 0].var() == pytest.approx(1.0, abs=0.25)
@@ -167,9 +202,9 @@ def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
     """The right gain leaves innovations white: a mean over a second has the variance of a mean."""
     rng, draws = np.random.default_rng(6), 40
     kept = rng.random(6000) > 0.3
-    case, names = noisy(6), ("time", "pB", "tauR", "omegaW", "omegaR", "Fx")
-    case = replace(case, **{name: getattr(case, name)[kept] for name in names})
-    stop, n = ready(case), case.time.size
+    case = noisy(6)
+    case = stop(case.time[kept], {name: values[kept] for name, values in case.signals.items()})
+    samples, n = ready(case), case.time.size
     # As `noisy` makes it, and 1.2 for ripple; pressure counts by the lever of three discs.
     lever = 3 * 0.30 * 0.1086 * 0.30 * 0.70 / 0.46
     torque = 1.2 * np.hypot(40.0, lever * 500.0) * rng.standard_normal((n, draws))
@@ -179,10 +214,10 @@ def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
     for k in range(n):
         errors[k] = away + 0.003 * rng.standard_normal(draws)
         if k + 1 < n:
-            away = away - stop.gain[k] * errors[k] + pushed[k]
-    expected = np.linalg.inv(stop.whitening)[:, 1]
+            away = away - samples.gain[k] * errors[k] + pushed[k]
+    expected = np.linalg.inv(samples.whitening)[:, 1]
     scale = np.sqrt((expected**2).sum(axis=1))
-    means = np.array([errors[first:end].mean(axis=0) for first, end in stop.blocks])
+    means = np.array([errors[first:end].mean(axis=0) for first, end in samples.blocks])
     white = means / scale[:, None]
     lasting = white[: len(white) // 20 * 20].reshape(-1, 20, draws).mean(axis=1)
     # 20 seconds of 40 draws: a variance is known to 5 %.
@@ -190,10 +225,10 @@ def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
 
 
 def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
-    stop = ready(noisy(3))
+    samples = ready(noisy(3))
     for frequency in (2.0, 8.0, 15.0):
-        wave = np.sin(2.0 * np.pi * frequency * stop.time)
-        read = stop.behind_structure(wave)[2000:]
+        wave = np.sin(2.0 * np.pi * frequency * samples.time)
+        read = samples.behind_structure(2, wave)[2000:]
         s, mode = 1j * frequency, 21.6
         gain = abs(mode**2 / (s**2 + 2 * 0.05 * mode * s + mode**2))
         # Matched poles: 1 % of the amplitude, and 1 % for the samples missing the crest.
@@ -228,7 +263,7 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
 
 def linearised(errors: Matrix) -> Linearised:
     evidence = (Evidence(errors, 0.0, np.zeros((errors.size + 1, 0))),)
-    return Linearised(Point({}, {}, np.zeros((1, 5)), {}), (), evidence, np.ones(3), 0.0)
+    return Linearised(Point({}, {}, np.zeros((1, 5)), {}), (), evidence, 20, np.ones(3), 0.0)
 
 
 def test_deviance_is_chi_squared_where_errors_are_noise() -> None:
@@ -287,11 +322,11 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
     effects = {effect.name: effect for effect in EFFECTS}
     film, single, lag = (effects[n] for n in ("WaterFilm", "SingleDiscWaterFilm", "CylinderLag"))
     named = ("03_dry_120_3.6", "13_onedisc_100_2.7", "11_brakewet_120_2.7_rev")
-    cases = read_cases([ROOT / "cases" / name for name in named])
+    cases = read_cases([ROOT / "cases" / name for name in named], SYSTEM)
 
     def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
-        with Court(everything, {}, of, 1) as court:
-            fit = Fit(court, EFFECTS)
+        with Simulations(everything, SYSTEM, {}, of, 1) as simulations:
+            fit = Fit(simulations, EFFECTS)
             point = replace(fit.start(), sizes={("WaterFilm", "film"): 0.3})
             values = fit.values(point)
             both = [[fit.present(one, k) for k in range(len(of))] for one in (film, lag)]
@@ -328,17 +363,17 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
 
 
 def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
-    stop, point = ready(noisy(6)), {FORCE_DELAY: 0.002, "muWR": 0.4}
+    samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
-    bench = Bench(MINIMAL, [stop])
+    simulator = Simulator(Simulated(MINIMAL, SYSTEM, {}, (samples,)))
     with FMU(MINIMAL) as fmu:
         nominal = {name: fmu.defaults[name] for name in steps} | point
-    about = bench.at(0, nominal)
-    found = bench.derivatives(0, nominal, [Column((n,), h) for n, h in steps.items()], about)
+    about = simulator.at(0, nominal)
+    found = simulator.derivatives(0, nominal, [Variation((n,), h) for n, h in steps.items()], about)
     found = np.column_stack([about.jacobian, found])
-    for j, (name, step) in enumerate({FORCE_DELAY: 1e-3, **steps}.items()):
-        sides = [bench.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
+    for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
+        sides = [simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
         central = (sides[0].residual - sides[1].residual) / step
         # Forward over a step in which curvature adds no more than a hundredth.
         np.testing.assert_allclose(found[:, j], central, atol=0.01 * np.abs(central).max())
-    bench.close()
+    simulator.close()

@@ -15,9 +15,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.case import Case
-from workbench.report.diagnosis_figures import LASTING, stop_figure
+from workbench.diagnosis.residuals import Balance
+from workbench.report.diagnosis_figures import lasting_blocks, recording_figure
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import CaseFigure
+from workbench.system import System
 
 from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
 
@@ -116,7 +118,7 @@ def test_every_stop_has_a_figure_and_the_clearest_comes_first(page: Any, results
     panels = page.xpath("//article[figure][1]//g[@class='axes']/text[@class='title']")
     first = [text(panel) for panel in panels[:8]]
     assert [title.split()[0] for title in first] == [
-        *("Roller", "Brake", "Slip:", "Roller", "Creep", "Wheelset", "Roller", "Slip")
+        *("Speed", "Brake", "Slip:", "Speed", "Creep", "Wheelset", "Roller", "Slip")
     ]
 
 
@@ -214,8 +216,8 @@ def test_gain_is_drawn_for_every_stop_and_for_all(page: Any, summary: dict[str, 
     (dots,) = page.find_class("dots")
     gain = summary["gain"]
     names = [text(label) for label in dots.xpath("./text[@text-anchor='end']")]
-    assert sorted(names) == sorted([*gain["stops"], "all stops"])
-    values = [{**gain["stops"], "all stops": gain}[name] for name in names]
+    assert sorted(names) == sorted([*gain["recordings"], "all recordings"])
+    values = [{**gain["recordings"], "all recordings": gain}[name] for name in names]
     circles = [float(x) for x in dots.xpath("./circle/@cx")]
     diamonds = [
         float(re.match(r"M([\d.]+)", d)[1])
@@ -237,7 +239,7 @@ def test_extended_model_is_shown_as_written_with_the_next_command(
     shown = section(page, "model").xpath(".//pre/code")
     assert shown[0].text_content().strip() == Path(summary["model"]["modelica"]).read_text().strip()
     assert "redeclare" in shown[0].text_content()
-    assert f"diagnose NEW_STOPS --model {summary['model']['fmu']}" in shown[1].text_content()
+    assert f"diagnose NEW_RECORDINGS --model {summary['model']['fmu']}" in shown[1].text_content()
     assert "simulate" not in shown[1].text_content()
 
 
@@ -254,18 +256,21 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
 
 
 @pytest.fixture
-def figure(dry_case: Case) -> CaseFigure:
-    return stop_figure(residuals(gap=False), dry_case, "with FxOffset", LASTING)
+def figure(dry_case: Case, system: System) -> CaseFigure:
+    span = lasting_blocks(system)
+    return recording_figure(residuals(gap=False), dry_case, system, "with FxOffset", span)
 
 
-def written(summary: dict[str, Any], figures: list[CaseFigure], folder: Path) -> Any:
+def written(
+    system: System, summary: dict[str, Any], figures: list[CaseFigure], folder: Path
+) -> Any:
     """The page of a summary that was changed, without an extended model."""
     changed = {**summary, "model": dict.fromkeys(summary["model"])}
-    return lxml.html.fromstring(write_diagnosis_page(changed, figures, folder).read_bytes())
+    return lxml.html.fromstring(write_diagnosis_page(system, changed, figures, folder).read_bytes())
 
 
 def test_the_unexplained_is_no_cause(
-    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
 ) -> None:
     unexplained = {
         **summary,
@@ -275,7 +280,7 @@ def test_the_unexplained_is_no_cause(
         "partial": ["BrakeFade"],
         "sentence": "Something is missing.",
     }
-    page = written(unexplained, [figure], tmp_path)
+    page = written(system, unexplained, [figure], tmp_path)
     assert text(page.find_class("headline")[0]) == "Unexplained. Something is missing."
     causes = section(page, "causes")
     assert not causes.xpath("article")
@@ -285,44 +290,50 @@ def test_the_unexplained_is_no_cause(
 
 
 def test_a_deviation_beyond_its_tolerance_is_flagged(
-    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
 ) -> None:
     deviations = {"a": {"muDC": 2.6, "JR": -2.4}, "b": {"muDC": -2.6, "JR": 0.0}}
-    page = written({**summary, "deviations": deviations}, [figure], tmp_path)
+    page = written(system, {**summary, "deviations": deviations}, [figure], tmp_path)
     table = page.get_element_by_id("deviation-table")
     assert [text(cell) for cell in table.find_class("warning")] == ["⚠ +2.60", "⚠ -2.60"]
 
 
 def test_observers_are_compared_at_every_stop_that_could_be_judged(
-    summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
 ) -> None:
     errors = {name: {"before": 0.021, "after": 0.004} for name in STOPS}
     errors["03_dry_120_3.6"] = {"before": 0.03, "after": None}
-    page = written({**summary, "observers": {"ekf": errors}}, [figure], tmp_path)
+    page = written(system, {**summary, "observers": {"ekf": errors}}, [figure], tmp_path)
     table = page.get_element_by_id("observer-table")
     assert [[text(cell) for cell in row] for row in table.find("tbody")] == [
         ["01_dry_80_1.5", "2.10", "0.40"],
         ["03_dry_120_3.6", "3.00", "n/a"],
         ["05_dry_120_2.7_rev", "2.10", "0.40"],
     ]
-    without = written({**summary, "observers": {}}, [figure], tmp_path)
+    without = written(system, {**summary, "observers": {}}, [figure], tmp_path)
     assert not without.xpath("//*[@id='observer-table']")
 
 
 def test_pages_of_six_and_fourteen_long_stops_stay_small(
-    summary: dict[str, Any], dry_case: Case, tmp_path: Path
+    system: System, summary: dict[str, Any], dry_case: Case, tmp_path: Path
 ) -> None:
     """Residuals of noise, of every kind, are the longest that curves can be."""
     one = residuals(gap=True)
     rng = np.random.default_rng(2)
-    values = {name: rng.normal(size=one.time.size) for name in ("wheelset", "roller", "slip")}
-    long = dataclasses.replace(one, values=values)
+    balances = tuple(
+        Balance(name, name, "N.m", "N.m", rng.normal(size=one.time.size))
+        for name in ("wheelset", "roller", "slip")
+    )
+    long = dataclasses.replace(one, balances=balances)
     for count, most in ((6, 3e6), (14, 3e6)):
         figures = [
-            dataclasses.replace(stop_figure(long, dry_case, "with X", LASTING), name=f"stop_{k}")
+            dataclasses.replace(
+                recording_figure(long, dry_case, system, "with X", lasting_blocks(system)),
+                name=f"stop_{k}",
+            )
             for k in range(count)
         ]
-        written(summary, figures, tmp_path)
+        written(system, summary, figures, tmp_path)
         assert (tmp_path / "index.html").stat().st_size < most
 
 

@@ -55,8 +55,10 @@ def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_
 def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
     headline = text(forceless.find_class("headline")[0])
     assert headline.startswith("Nothing.")
-    assert "Without a measured force" in headline
-    assert any("Fx was not measured" in text(one) for one in forceless.find_class("warning"))
+    assert "Without a measured creep force, fewer effects" in headline
+    assert any(
+        "Creep force Fx was not measured" in text(one) for one in forceless.find_class("warning")
+    )
     titles = [text(title) for title in forceless.xpath("//text[@class='title']")]
     assert not [title for title in titles if "force" in title or "balance" in title]
 

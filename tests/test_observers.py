@@ -278,9 +278,7 @@ def test_forward_and_reverse_are_mirror_images(
     assert_allclose(reverse.estimate, signs * forward.estimate, rtol=1e-6, atol=1e-3)
 
 
-def test_without_gains_the_observer_is_the_open_loop_model(
-    fmu: FMU, gains: Gains
-) -> None:
+def test_without_gains_the_observer_is_the_open_loop_model(fmu: FMU, gains: Gains) -> None:
     case, _ = recorded_stop(fmu, muDC=drying)
     zero = gains.with_values(np.array([0.0] * 16 + [-1.0, -1.0]))
     free = replay(case, DisturbanceObserver(fmu, WHEELSET, zero))
@@ -332,7 +330,9 @@ SPRINGING_BACK = ("08_wet_120_3.6", "09_wet_160_4.2_wsp")
 def test_a_standing_wheelset_has_no_chattering_force(
     made: dict[str, Estimator], root: Path, name: str
 ) -> None:
-    cases = [case for case in read_cases([root / "cases"], WHEELSET) if case.name not in SPRINGING_BACK]
+    cases = [
+        case for case in read_cases([root / "cases"], WHEELSET) if case.name not in SPRINGING_BACK
+    ]
     assert len(cases) == 12
     assert chattering(made[name], cases) == []
 

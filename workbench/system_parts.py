@@ -253,10 +253,18 @@ class View:
 
 @dataclass(frozen=True)
 class Channel:
-    """What the diagnosis compares: a sum of readings, each times a constant."""
+    """What the diagnosis compares: a sum of readings, each times a constant.
+
+    Attributes
+    ----------
+    label : what it is, for people.
+    shown : unit in figures of its errors.
+    """
 
     name: str
     unit: str
+    label: str
+    shown: str
     formula: Expression
 
 

@@ -300,19 +300,12 @@ def read_comparison(table: Table, system: System) -> Comparison:
     block = table.number("block", "s", _BLOCK * system.sample_time)
     lasting = table.number("lasting", "s", _LASTING * block)
     tolerances, levels = table.table("tolerances"), table.table("levels")
-    channels = tuple(
-        Channel(one.name, one.unit, one.formula) for one in read_derived(table.table("channels"))
-    )
-    default = tuple(
-        Channel(one.name, one.unit, Expression(one.name, str(system.source)))
-        for one in (*system.outputs, *system.judged)
-    )
     return Comparison(
         block=block,
         lasting=lasting,
         least=table.number("least", "s", 2.0 * lasting),
         settling=table.number("settling", "s", 0.0),
-        channels=channels or default,
+        channels=read_channels(table.table("channels"), system),
         leading=read_leading(table.table("leads")) if "leads" in table else None,
         begins=read_threshold(table.table("begins"), system) if "begins" in table else None,
         rest=read_rest(table.table("rest"), system) if "rest" in table else None,
@@ -321,6 +314,25 @@ def read_comparison(table: Table, system: System) -> Comparison:
         exclusions=tuple(read_exclusion(one, system) for one in table.tables("excluded")),
         influences=read_influences(table.table("influences")),
     )
+
+
+def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
+    """Channels as declared; else what is measured, one by one."""
+    measured = {one.name: one for one in (*system.outputs, *system.judged)}
+    if not table.content:
+        usual = {name: {"is": name, "unit": one.unit} for name, one in measured.items()}
+        table = Table(usual, table.where)
+    found = []
+    for name in table.content:
+        own = Table(table.take(name, dict), f"{table.where} {name}")
+        own.refuse_unknown("is unit label shown")
+        unit = own.take("unit", str)
+        shown = own.text("shown", unit)
+        si_factor(shown, unit, f"{own.where} shown")
+        label = own.text("label", measured[name].label if name in measured else name)
+        formula = Expression(own.take("is", str), f"{own.where} is")
+        found.append(Channel(name, unit, label, shown, formula))
+    return tuple(found)
 
 
 def read_influences(table: Table) -> tuple[Influence, ...]:

@@ -17,11 +17,7 @@ from workbench.commands.arguments import (
 )
 from workbench.diagnosis import choose, diagnose, read_effects
 from workbench.modelica import read_library
-from workbench.report.diagnosis import (
-    format_diagnosis,
-    summarise_diagnosis,
-    write_diagnosis,
-)
+from workbench.report.diagnosis import write_diagnosis
 from workbench.system import OBSERVER
 from workbench.system_file import with_model
 from workbench.systems import load_system, open_model
@@ -116,9 +112,8 @@ def _diagnose(options: argparse.Namespace) -> int:
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
             "effects": [effect.name for effect in effects],
         }
-    summary = summarise_diagnosis(outcome, cases, provenance)
-    page = write_diagnosis(outcome, cases, summary, options.out, options.workers)
+    page = write_diagnosis(outcome, provenance, options.out, options.workers)
     report("done")
-    print(format_diagnosis(summary))
+    print(f"\n{outcome.summary()}")
     print(f"to read: {page}, data and figures beside it")
-    return 130 if summary["interrupted"] else 0
+    return 130 if outcome.diagnosis.interrupted else 0

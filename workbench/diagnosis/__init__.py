@@ -8,7 +8,6 @@ switched on by a parameter.
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,8 @@ from workbench.diagnosis.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.evidence import Simulated, Simulations, delay, simulating
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
-from workbench.diagnosis.samples import channels, compared
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
@@ -52,49 +51,6 @@ __all__ = [
 EVERYTHING, EXTENDED = "AllEffects", "Extended"
 # Observers that are tried with both models: one with a gain for all, one that makes it as it goes.
 _TRIED = (DisturbanceObserver, ExtendedKalmanFilter)
-
-
-@dataclass(frozen=True)
-class Extension:
-    """The extended model: its source, its FMU, and how far its predictions are from the fit's.
-
-    Attributes
-    ----------
-    difference : largest, in standard deviations of the noise of a sample mean.
-    """
-
-    modelica: Path
-    fmu: Path
-    difference: float
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A diagnosis and all that shows it.
-
-    Attributes
-    ----------
-    levels : calibrated values by parameter and choice of a condition, or by a sensor's delay:
-        (value, unit).
-    deviations : by recording and parameter, in standard deviations of its tolerance.
-    set_aside : number of samples by recording and reason.
-    channels : what was compared, with units.
-    blocks : length of a block [s].
-    observers : by observer and recording, error of the judged signal (rms over mean [1]) with the
-        model before and after; empty where nothing was extended or it was not measured, and for
-        effects that turn with a shaft, whose phase an observer does not know.
-    """
-
-    diagnosis: Diagnosis
-    residuals: Sequence[Residuals]
-    dependences: Sequence[Dependence]
-    levels: dict[tuple[str, str], tuple[float, str]]
-    deviations: dict[str, dict[str, float]]
-    set_aside: dict[str, dict[str, int]]
-    channels: dict[str, str]
-    block: float
-    observers: dict[str, dict[str, tuple[float, float]]]
-    extension: Extension | None
 
 
 def diagnose(
@@ -154,8 +110,9 @@ def diagnose(
                 report("observers with both models")
                 observers = _observers(system, cases, extension.fmu)
             levels = {key: float(value) for key, value in best.point.levels.items()}
-            signals = compared(system, cases)
             return Outcome(
+                system=system,
+                cases=tuple(cases),
                 diagnosis=diagnosis,
                 residuals=found,
                 dependences=dependences(simulations, found),
@@ -165,8 +122,6 @@ def diagnose(
                     for name, row in zip(fit.names, best.point.deviations, strict=True)
                 },
                 set_aside={one.name: one.set_aside for one in simulations.recordings},
-                channels={one.name: one.unit for one in channels(system, signals)},
-                block=system.comparison.block,
                 observers=observers,
                 extension=extension,
             )
@@ -236,7 +191,7 @@ def _extend(
     build(library, EXTENDED, text, path, every_platform=every_platform)
     point, difference = diagnosis.best.point, 0.0
     delays = {delay(name) for name in system.signals}
-    with simulating(Simulated(path, system, tuple(simulations.recordings))) as extended:
+    with simulating(Simulated(path, system, {}, tuple(simulations.recordings))) as extended:
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value

@@ -75,7 +75,7 @@ class Effect:
         pair `cosine` and `sine`, "cosine".
     step : change of `size` that is small and clearly visible, in its SI unit.
     matters : least size worth a finding, in the same unit: what tolerances, or differences between
-        an observer model and a real rig, may fake.
+        an observer model and a real machine, may fake.
     shapes : other parameters that are fitted once the effect is found, each with values to try.
     hidden : why recorded stops cannot show the effect; empty if they can.
     text : what it is, for people.

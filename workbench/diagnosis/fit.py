@@ -136,7 +136,7 @@ class Fit:
             raise InputError(
                 where=f"conditions of {self._simulations.cases[k].name}",
                 found=f"no '{said.condition}', which an effect of the library asks for",
-                expected="a condition that stops have",
+                expected="a condition that recordings have",
                 remedy="correct the annotation of the effect",
             )
         entries = states if isinstance(states, tuple) else (states,)

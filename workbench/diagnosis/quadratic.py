@@ -7,7 +7,7 @@ import numpy as np
 
 from workbench.fmu import Matrix, Vector
 
-# (effect, parameter), (quantity, surface) of a level, (STOP, quantity) of a tolerance.
+# (effect, parameter), (quantity, choice) of a level, ("", quantity) of what differs by nature.
 Key = tuple[str, str]
 
 

@@ -19,7 +19,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.samples import Samples, channels
 from workbench.fmu import Matrix, Vector
-from workbench.system import System
+from workbench.system import Channel, System
 
 BEGINNING, DIRECTION = "time since the beginning", "direction"
 _APPLIED = 0.05  # share of its greatest value from which on an input is applied
@@ -27,15 +27,32 @@ _RUNNING = 50  # sample times of a mean, before an input is differentiated
 _BINS = 12
 
 
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What a measurement has beyond the model in one equation of the machine.
+
+    Attributes
+    ----------
+    name : in files.
+    title : for people.
+    unit, shown : SI, and the one of figures.
+    values : (n,) NaN where the recording does not count.
+    """
+
+    name: str
+    title: str
+    unit: str
+    shown: str
+    values: Vector
+
+
 class Balances(Protocol):
     """What a companion knows of its machine."""
 
-    UNITS: Mapping[str, str]
-
     def balances(
         self, system: System, case: Case, recorded: Samples, values: Mapping[str, float]
-    ) -> dict[str, Vector]:
-        """What a measurement has beyond the model, by UNITS, (n,), NaN where it does not count."""
+    ) -> Sequence[Balance]:
+        """Balances of one recording, with these parameters of the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +63,8 @@ class Residuals:
     ----------
     name : of the recording.
     time : (n,) [s] of the balances.
-    values : by name, (n,); units : by name.
+    balances : that the system's companion knows.
+    channels : that are compared.
     block_time : (b,) [s].
     before, after : (b, c) prediction errors of the nominal and of the last model, by channel.
     sigma : (b, c) their standard deviation by noise.
@@ -54,8 +72,8 @@ class Residuals:
 
     name: str
     time: Vector
-    values: Mapping[str, Vector]
-    units: Mapping[str, str]
+    balances: tuple[Balance, ...]
+    channels: tuple[Channel, ...]
     block_time: Vector
     before: Matrix
     after: Matrix
@@ -89,8 +107,8 @@ def residuals(
             Residuals(
                 name=case.name,
                 time=case.time,
-                values=known.balances(system, case, one, fitted) if known else {},
-                units=known.UNITS if known else {},
+                balances=tuple(known.balances(system, case, one, fitted)) if known else (),
+                channels=channels(system, one.signals),
                 block_time=case.time[one.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
                 after=unwhitened[1],
@@ -118,7 +136,7 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
     signs = [sign(case, system) for case in simulations.cases]
     pairs = list(zip(signs, found, strict=True))
     table = []
-    for c, channel in enumerate(channels(system, simulations.recordings[0].signals)):
+    for c, channel in enumerate(found[0].channels):
         before = [mark * one.before[:, c] / one.sigma[:, c] for mark, one in pairs]
         after = [mark * one.after[:, c] / one.sigma[:, c] for mark, one in pairs]
         for name in influences[0]:

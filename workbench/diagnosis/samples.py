@@ -31,7 +31,7 @@ from workbench.system import Channel, Exclusion, Mode, System
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
 _ABREAST = 11  # samples of the running median
 _RELEASED = 0.1  # share of the greatest value
-_WRONG = "spike, dropout or saturation"
+FAULTY, MISSING = "spike, dropout or saturation", "missing"  # reasons of every system
 
 Mask = NDArray[np.bool_]
 
@@ -174,7 +174,7 @@ def prepare(
     wrong = {name: _outliers(case[name], sound) for name in names}
     clean = {name: _bridge(time, case[name], wrong[name]) for name in names}
     applied = _applied(clean, system, time)
-    excluded = {_WRONG: np.logical_or.reduce(list(wrong.values()))}
+    excluded = {FAULTY: np.logical_or.reduce(list(wrong.values()))}
     for one in compare.exclusions:
         excluded[one.reason] = _excluded(one, clean, system, time, h, applied)
     excluded["settling"] = time < time[0] + compare.settling
@@ -225,7 +225,7 @@ def prepare(
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
-            "missing": int(np.sum(np.maximum(0, np.round(steps / h) - 1))),
+            MISSING: int(np.sum(np.maximum(0, np.round(steps / h) - 1))),
             **{reason: int(mask.sum()) for reason, mask in excluded.items()},
         },
     )

@@ -67,21 +67,21 @@ class Cause:
 class Gain:
     """Prediction error on held-out stops; 1 is noise alone.
 
-    Root mean square of means over a second, or over 50 ms where a cause turns with the wheel, in
-    units of the noise of such a mean.
+    Root mean square of means over a lasting time, or over a block where a cause turns with a shaft,
+    in units of the noise of such a mean.
 
     Attributes
     ----------
     before, after : of the nominal and of the extended model, with levels calibrated alike.
     low, high : 95 % interval of `after`, from drawing stops with replacement.
-    stops : (before, after) by name of the stop.
+    recordings : (before, after) by name.
     """
 
     before: float
     after: float
     low: float
     high: float
-    stops: Mapping[str, tuple[float, float]]
+    recordings: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     causes: list[Cause] = []
     gain = None
     if verdict == "found":
-        report("held-out stops")
+        report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
         before, after = (held_out(fit, one, fast=fast) for one in (base, best))
         gain = _gain(fit.names, before, after)
@@ -189,7 +189,7 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
 
     Parameters
     ----------
-    fast : of means over 50 ms instead of a second.
+    fast : of blocks instead of means over a lasting time.
     """
     joint = fit.quadratics(fit.linearise(one.linearised, one.active))
     stops = joint.stops()
@@ -217,7 +217,7 @@ def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
         after=float(np.sqrt(after.mean())),
         low=float(low),
         high=float(high),
-        stops={
+        recordings={
             name: (float(np.sqrt(b)), float(np.sqrt(a)))
             for name, b, a in zip(names, before, after, strict=True)
         },

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: prediction errors and residuals of a stop, dependences, twins, gain."""
+"""Figures of a diagnosis: prediction errors of a recording, dependences, twins, gain."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,40 +12,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workbench.case import Case
-from workbench.diagnosis import Residuals
-from workbench.diagnosis.residuals import RESIDUALS
-from workbench.diagnosis.samples import BLOCK, CHANNELS
+from workbench.diagnosis import Outcome, Residuals
+from workbench.diagnosis.outcome import duration
+from workbench.errors import InputError, closest
 from workbench.fmu import Matrix, Vector
 from workbench.report.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.report.views import capital, named, per_shown, shown_unit
+from workbench.system import Channel, System
+from workbench.units import si_factor
 
 NOMINAL, EXTENDED, NOISE = "0", "2", "raw"  # styles of curves
-LASTING = 10  # blocks of 50 ms: half a second, as the residuals are smoothed
-FAST = 1  # block: what turns with the wheel does not last
+FAST = 1  # block: what turns with a shaft does not last
 _BAND = 2.0  # standard deviations
 _ROOM = 1.1  # of a panel over its largest value
-
-# Scale and name of a channel in figures: title, factor from SI units, unit.
-_ERRORS = {
-    "slip": ("Slip", 1e3, "mm/s"),
-    "omegaR": ("Roller speed omegaR", 1.0, "rad/s"),
-    "Fx": ("Creep force Fx", 1.0, "N"),
-}
-_RESIDUALS = {
-    "wheelset": ("Wheelset balance: torque that the model lacks [N.m]", 1.0),
-    "roller": ("Roller balance: torque that the model lacks [N.m]", 1.0),
-    "slip": ("Slip law: slip that the model lacks [mm/s]", 1e3),
-}
-_SLIP = ("Slip, as measured [mm/s]", 1e3)  # without Fx, what the contact explains is not known
 
 
 @dataclass(frozen=True, eq=False)
 class Lasting:
-    """Prediction errors of a stop that last some blocks, at the middle of each.
+    """Prediction errors of a recording that last some blocks, at the middle of each.
 
     Attributes
     ----------
-    before, after : (b, m) running means, of the nominal and of the last model, in CHANNELS.
-    sigma : (b, m) their standard deviation by noise.
+    before, after : (b, c) running means, of the nominal and of the last model, by channel.
+    sigma : (b, c) their standard deviation by noise.
     """
 
     before: Matrix
@@ -53,12 +42,17 @@ class Lasting:
     sigma: Matrix
 
     def noises(self) -> tuple[Vector, Vector]:
-        """Root mean square before and after in units of the noise, (m,); noise leaves 1."""
+        """Root mean square before and after in units of the noise, (c,); noise leaves 1."""
         before, after = (
             np.sqrt(np.mean((errors / self.sigma) ** 2, axis=0))
             for errors in (self.before, self.after)
         )
         return before, after
+
+
+def lasting_blocks(system: System) -> int:
+    """Blocks of half a lasting time: long enough for noise to fall, short enough to show a form."""
+    return max(1, round(0.5 * system.comparison.lasting / system.comparison.block))
 
 
 def lasting(one: Residuals, span: int) -> Lasting:
@@ -74,22 +68,61 @@ def lasting(one: Residuals, span: int) -> Lasting:
 
 
 def at_blocks(one: Residuals) -> dict[str, Vector]:
-    """Residuals at the middle of each block, (b,), SI; they are smooth over more than a block."""
+    """Balances at the middle of each block, (b,), SI; they are smooth over more than a block."""
     found = {}
-    for name in RESIDUALS:
-        if name in one.values:
-            known = np.isfinite(one.values[name])
-            found[name] = np.interp(one.block_time, one.time[known], one.values[name][known])
+    for balance in one.balances:
+        known = np.isfinite(balance.values)
+        found[balance.name] = np.interp(one.block_time, one.time[known], balance.values[known])
     return found
 
 
-def stop_figure(one: Residuals, case: Case, extension: str, span: int) -> CaseFigure:
-    """Describe the figure of a stop: where and when the simulation is wrong, against the noise.
+def recording_figures(outcome: Outcome) -> list[CaseFigure]:
+    """Figures of all recordings, the one that shows best what was found first."""
+    system, found = outcome.system, outcome.diagnosis
+    added = [cause.effect.name for cause in found.causes] or found.partial
+    extension = f"with {', '.join(added)}" if added else ""
+    span = FAST if outcome.turns else lasting_blocks(system)
+    pairs = list(zip(outcome.residuals, outcome.cases, strict=True))
+    pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(found.causes)))
+    return [recording_figure(one, case, system, extension, span) for one, case in pairs]
+
+
+def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
+    """The figure of a recording by name, or the first one without a name.
+
+    Raises
+    ------
+    InputError
+        If there is no such recording.
+    """
+    known = {figure.name: figure for figure in figures}
+    if not recording:
+        return figures[0]
+    if recording not in known:
+        raise InputError(
+            where=f"recording '{recording}'",
+            found=f"no recording of this name{closest(recording, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    return known[recording]
+
+
+def _clearness(one: Residuals, span: int, found: bool) -> float:
+    """How clearly a recording shows what was found, or else how wrong the nominal model is."""
+    before, after = lasting(one, span).noises()
+    return float(np.max(before**2 - after**2 if found else before**2))
+
+
+def recording_figure(
+    one: Residuals, case: Case, system: System, extension: str, span: int
+) -> CaseFigure:
+    """Describe the figure of a recording: where and when the simulation is wrong, beyond noise.
 
     Parameters
     ----------
     extension : what the last model is called; empty if nothing was added to the nominal one.
-    span : blocks over which errors are averaged, LASTING or FAST.
+    span : blocks over which errors are averaged, `lasting_blocks` or FAST.
     """
     errors = lasting(one, span)
     gaps = [run.stop for run in _runs(one.block_time)[:-1]]
@@ -98,36 +131,24 @@ def stop_figure(one: Residuals, case: Case, extension: str, span: int) -> CaseFi
         return np.insert(values, gaps, np.nan)
 
     middles = [0.5 * (one.block_time[gap - 1] + one.block_time[gap]) for gap in gaps]
-    panels = [
-        _ranged("Roller speed omegaR, as measured [rad/s]", 0.45, case.omegaR, one, case, parted),
-        _ranged("Brake pressure pB, as measured [bar]", 0.45, case.pB / 1e5, one, case, parted),
-    ]
-    for c, channel in enumerate(CHANNELS[: errors.sigma.shape[1]]):
-        title, factor, unit = _ERRORS[channel]
-        sigma = factor * errors.sigma[:, c]
-        curves = [
-            Curve(NOISE, parted(np.zeros(sigma.size)), parted(_BAND * sigma)),
-            Curve(NOMINAL, parted(factor * errors.before[:, c])),
-        ]
-        if extension:
-            curves.append(Curve(EXTENDED, parted(factor * errors.after[:, c])))
-        shown = np.concatenate([curve.values for curve in curves] + [_BAND * sigma])
-        panels.append(_symmetric(f"{title}: measured - predicted [{unit}]", 1.1, curves, shown))
-    for name, values in at_blocks(one).items():
-        title, factor = _RESIDUALS[name] if "wheelset" in one.values else _SLIP
-        curve = Curve("measured", parted(factor * values))
-        panels.append(_symmetric(title, 0.8, [curve], curve.values))
+    panels = [_measured(system, name, one, case, parted) for name in _context(system)]
+    for c, channel in enumerate(one.channels):
+        panels.append(_errors(channel, errors, c, bool(extension), parted))
+    for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
+        factor = si_factor(balance.shown, balance.unit, balance.title)
+        curve = Curve("measured", parted(values / factor))
+        panels.append(_symmetric(f"{balance.title} [{balance.shown}]", 0.8, [curve], curve.values))
     legend = [
         (NOMINAL, "error of the nominal model, levels calibrated"),
         (NOISE, f"±{_BAND:g} standard deviations of the noise"),
-        ("measured", "measured; residual of the nominal model"),
+        ("measured", "measured" + "; residual of the nominal model" * bool(one.balances)),
     ]
     if extension:
         legend.insert(1, (EXTENDED, f"error of the model {extension}"))
     return CaseFigure(
         name=case.name,
         title=case.title,
-        finding=_finding(errors, extension, span),
+        finding=_finding(one.channels, errors, extension, span * system.comparison.block),
         time=np.insert(one.block_time, gaps, middles),
         window=None,
         legend=tuple(legend),
@@ -171,11 +192,11 @@ def draw_confusability(
 
 
 def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
-    """Draw the error of each stop, held out of the fit, before and after."""
-    stops: Mapping[str, Mapping[str, float]] = gain["stops"]
-    rows = [*stops, "all stops"]
-    before = [*(one["before"] for one in stops.values()), gain["before"]]
-    after = [*(one["after"] for one in stops.values()), gain["after"]]
+    """Draw the error of each recording, held out of the fit, before and after."""
+    recordings: Mapping[str, Mapping[str, float]] = gain["recordings"]
+    rows = [*recordings, "all recordings"]
+    before = [*(one["before"] for one in recordings.values()), gain["before"]]
+    after = [*(one["after"] for one in recordings.values()), gain["after"]]
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(7.5, 1.5 + 0.3 * len(rows)), layout="constrained")
         axes = sheet.subplots()
@@ -184,12 +205,14 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
         axes.plot(before, heights, "o", color=LIGHT[NOMINAL], label="nominal model")
         axes.plot(after, heights, "D", color=LIGHT[EXTENDED], label="extended model")
         interval = [gain["low"], gain["high"]]
-        axes.plot(interval, [len(stops)] * 2, "|-", color=LIGHT[EXTENDED], label="95 % interval")
+        axes.plot(
+            interval, [len(recordings)] * 2, "|-", color=LIGHT[EXTENDED], label="95 % interval"
+        )
         axes.axvline(1.0, color=LIGHT["measured"], linewidth=0.8)
         axes.set_xscale("log")
         axes.set_yticks(heights, rows)
         axes.invert_yaxis()
-        axes.set_xlabel("error on stops held out, in units of the noise")
+        axes.set_xlabel("error on recordings held out, in units of the noise")
         sheet.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
         save_figure(sheet, paths)
 
@@ -208,18 +231,59 @@ def _sums(values: Matrix, span: int) -> Matrix:
     return np.column_stack([np.convolve(column, window, "same") for column in values.T])
 
 
-def _ranged(
-    title: str,
-    height: float,
-    values: Vector,
+def _context(system: System) -> tuple[str, ...]:
+    """Signals that say what happens: the led one, and what begins a recording or all inputs."""
+    leading, begins = system.comparison.leading, system.comparison.begins
+    first = [leading.output] if leading is not None else []
+    driven = [one.name for one in system.inputs] if begins is None else [begins.signal]
+    return tuple(dict.fromkeys([*first, *driven]))
+
+
+def _measured(
+    system: System,
+    signal: str,
     one: Residuals,
     case: Case,
     parted: Callable[[Vector], Vector],
 ) -> Panel:
+    """A signal as measured, at the blocks."""
+    unit = shown_unit(system, signal)
+    values = system.signal(signal, case.signals) / per_shown(system, signal, unit)
     curve = Curve("measured", parted(np.interp(one.block_time, case.time, values)))
     low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
     room = 0.08 * (high - low) or 1.0
-    return Panel(title, low - room, high + room, height, (curve,))
+    title = f"{capital(named(system, signal))}, as measured [{unit}]"
+    return Panel(title, low - room, high + room, 0.45, (curve,))
+
+
+def _errors(
+    channel: Channel,
+    errors: Lasting,
+    column: int,
+    extended: bool,
+    parted: Callable[[Vector], Vector],
+) -> Panel:
+    """Errors of a channel before and, if there is an extended model, after, against their noise."""
+    factor = _shown(channel)
+    sigma = errors.sigma[:, column] / factor
+    curves = [
+        Curve(NOISE, parted(np.zeros(sigma.size)), parted(_BAND * sigma)),
+        Curve(NOMINAL, parted(errors.before[:, column] / factor)),
+    ]
+    if extended:
+        curves.append(Curve(EXTENDED, parted(errors.after[:, column] / factor)))
+    shown = np.concatenate([curve.values for curve in curves] + [_BAND * sigma])
+    title = f"{capital(_called(channel))}: measured - predicted [{channel.shown}]"
+    return _symmetric(title, 1.1, curves, shown)
+
+
+def _called(channel: Channel) -> str:
+    return channel.name if channel.label == channel.name else f"{channel.label} {channel.name}"
+
+
+def _shown(channel: Channel) -> float:
+    """SI value of a channel that is one of its shown unit."""
+    return si_factor(channel.shown, channel.unit, f"channel {channel.name}")
 
 
 def _symmetric(title: str, height: float, curves: Sequence[Curve], shown: Vector) -> Panel:
@@ -227,20 +291,20 @@ def _symmetric(title: str, height: float, curves: Sequence[Curve], shown: Vector
     return Panel(title, -reach, reach, height, tuple(curves))
 
 
-def _finding(errors: Lasting, extension: str, span: int) -> str:
+def _finding(channels: Sequence[Channel], errors: Lasting, extension: str, seconds: float) -> str:
     """Errors of each channel in units of their noise, and the largest in its own unit."""
     before, after = errors.noises()
     worst = int(np.argmax(before))
-    title, factor, unit = _ERRORS[CHANNELS[worst]]
-    rms = factor * float(np.sqrt(np.mean(errors.before[:, worst] ** 2)))
+    clearest = channels[worst]
+    rms = float(np.sqrt(np.mean(errors.before[:, worst] ** 2))) / _shown(clearest)
     arrows = ", ".join(
-        f"{channel} {b:.1f}" + (f" to {a:.1f}" if extension else "")
-        for channel, b, a in zip(CHANNELS, before, after, strict=False)
+        f"{channel.name} {b:.1f}" + (f" to {a:.1f}" if extension else "")
+        for channel, b, a in zip(channels, before, after, strict=True)
     )
     change = f", from the nominal model to that {extension}" if extension else ""
     return (
-        f"Errors in means over {BLOCK * span:g} s, in units of their noise{change}: {arrows}. "
-        f"Clearest in {title[0].lower() + title[1:]}, {rms:.3g} {unit} rms with the nominal model."
+        f"Errors in means over {duration(seconds)}, in units of their noise{change}: {arrows}. "
+        f"Clearest in {_called(clearest)}, {rms:.3g} {clearest.shown} rms with the nominal model."
     )
 
 

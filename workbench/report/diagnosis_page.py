@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from workbench.diagnosis.outcome import duration
 from workbench.files import write_whole
-from workbench.report.diagnosis_figures import EXTENDED, NOMINAL
+from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, lasting_blocks
 from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
 from workbench.report.templates import environment
+from workbench.report.views import called, capital, named
+from workbench.system import System
 
-_BLOCKS = 900  # of a curve, two points each; errors have one value in 50 ms
+_BLOCKS = 900  # of a curve, two points each
 _FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
 _SIMILAR = 0.7  # cosine from which on a pair is worth a word
 _PAIRS = 8  # that are put in words
@@ -26,14 +29,14 @@ _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of th
 
 
 def write_diagnosis_page(
-    summary: Mapping[str, Any], figures: Sequence[CaseFigure], folder: Path
+    system: System, summary: Mapping[str, Any], figures: Sequence[CaseFigure], folder: Path
 ) -> Path:
     """Write the page into the folder, beside the files of each figure; returns its path.
 
     Parameters
     ----------
     summary : as written to summary.json.
-    figures : one for each stop, the one that shows most first.
+    figures : one for each recording, the one that shows most first.
     """
     modelica = summary["model"]["modelica"]
     text = (
@@ -51,6 +54,7 @@ def write_diagnosis_page(
             dots=None if summary["gain"] is None else _dots(summary["gain"]),
             styles={"nominal": NOMINAL, "extended": EXTENDED},
             flagged=_FLAGGED,
+            words=_words(system, summary, figures),
             source=None if modelica is None else Path(modelica).read_text(),
             # What is written into the folder is linked from there.
             files={
@@ -63,6 +67,26 @@ def write_diagnosis_page(
     path = folder / "index.html"
     write_whole(path, text)
     return path
+
+
+def _words(
+    system: System, summary: Mapping[str, Any], figures: Sequence[CaseFigure]
+) -> dict[str, Any]:
+    """What the page calls signals, times and what is judged."""
+    compare, objective = system.comparison, system.objective
+    judged = [one for one in system.judged if one.name not in summary["channels"]]
+    leading = compare.leading
+    return {
+        "inputs": " and ".join(one.label for one in system.inputs),
+        "led": "" if leading is None else " and ".join(called(system, n) for n in leading.together),
+        "missing": capital(" and ".join(named(system, one.name) for one in judged)),
+        "block": duration(compare.block),
+        "shown": duration(lasting_blocks(system) * compare.block),
+        "error": f"error of the {called(system, objective.judged)}, rms over mean "
+        f"{objective.when}".rstrip(),
+        # Balances stand below the errors of channels.
+        "balances": figures[0].panels[-1].curves[0].style == "measured",
+    }
 
 
 def _dependences(table: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -130,10 +154,10 @@ def _pairs(confusability: Mapping[str, Any]) -> list[tuple[str, str, float]]:
 
 
 def _dots(gain: Mapping[str, Any]) -> dict[str, Any]:
-    """Pairs of dots on a logarithmic axis, in pixels: the worst stop first, then all of them."""
-    stops = sorted(gain["stops"].items(), key=lambda item: -item[1]["before"])
+    """Pairs of dots on a logarithmic axis, in pixels: the worst recording first, then all."""
+    recordings = sorted(gain["recordings"].items(), key=lambda item: -item[1]["before"])
     values = [1.0, gain["low"], gain["high"], gain["before"], gain["after"]]
-    values += [one[key] for _, one in stops for key in ("before", "after")]
+    values += [one[key] for _, one in recordings for key in ("before", "after")]
     low, high = np.log(min(values) / 1.15), np.log(max(values) * 1.15)
     left, width, row, top = _DOTS["left"], _DOTS["width"], _DOTS["row"], _DOTS["top"]
 
@@ -147,13 +171,13 @@ def _dots(gain: Mapping[str, Any]) -> dict[str, Any]:
             "before": at(one["before"]),
             "after": at(one["after"]),
         }
-        for k, (name, one) in enumerate([*stops, ("all stops", gain)])
+        for k, (name, one) in enumerate([*recordings, ("all recordings", gain)])
     ]
     powers = range(int(np.floor(low / np.log(10.0))), int(np.ceil(high / np.log(10.0))) + 1)
     marks = [factor * 10.0**power for power in powers for factor in (1, 2, 5)]
     return {
         **_DOTS,
-        "stops": stops,
+        "recordings": recordings,
         "rows": rows,
         "interval": (at(gain["low"]), at(gain["high"])),
         "noise": at(1.0),

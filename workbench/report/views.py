@@ -32,13 +32,22 @@ def _view(system: System, signals: Sequence[str], height: float = 1.0) -> View:
         for name, line in zip(signals, lines, strict=True)
     ]
     title = ", ".join(names)
-    return View(title[0].upper() + title[1:], "", tuple(signals), height, None, None)
+    return View(capital(title), "", tuple(signals), height, None, None)
 
 
 def named(system: System, signal: str) -> str:
     """Label and name of a signal, or its name where it has no other."""
     text = called(system, signal)
     return signal if text == signal else f"{text} {signal}"
+
+
+def capital(text: str) -> str:
+    """A text as it begins a title.
+
+    >>> capital("speed of the roller")
+    'Speed of the roller'
+    """
+    return text[:1].upper() + text[1:]
 
 
 def called(system: System, signal: str) -> str:

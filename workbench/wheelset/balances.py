@@ -6,22 +6,20 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from workbench.case import Case
+from workbench.diagnosis.residuals import Balance
 from workbench.diagnosis.samples import Samples
 from workbench.fmu import Vector
 from workbench.system import System
-
-# Torque or slip that the measurement has beyond the model.
-UNITS = {"wheelset": "N.m", "roller": "N.m", "slip": "m/s"}
 
 _WINDOW = 0.5  # [s] of smoothing, as short as the noise of differentiated speeds allows
 
 
 def balances(
     system: System, case: Case, recorded: Samples, values: Mapping[str, float]
-) -> dict[str, Vector]:
-    """Balances and slip law from smoothed signals, (n,), NaN where the stop does not count.
+) -> list[Balance]:
+    """Balances and slip law from smoothed signals.
 
-    The wheelset's balance and the slip law need Fx.
+    Balances and the slip law need Fx: without it, what the contact explains is not known.
 
     Parameters
     ----------
@@ -52,14 +50,19 @@ def balances(
         return np.where(counts, signal, np.nan)
 
     v = rR * smooth(omegaR)
-    found = {"slip": shown(v - rW * smooth(omegaW))}
-    if "Fx" in case:
-        Fx = smooth(recorded.y[:, 2])
-        wheelset = values["JW"] * smooth(omegaW, 1) + brake + loss(smooth(omegaW), "wheelsetLoss")
-        roller = values["JR"] * smooth(omegaR, 1) + rR * Fx + loss(smooth(omegaR), "rollerLoss")
-        found |= {"wheelset": shown(rW * Fx - wheelset), "roller": shown(smooth(tauR) - roller)}
-        found["slip"] = found["slip"] - shown(Fx * np.abs(v) / _stiffness(values))
-    return found
+    slip = shown(v - rW * smooth(omegaW))
+    if "Fx" not in case:
+        return [Balance("slip", "Slip, as measured", "m/s", "mm/s", slip)]
+    Fx = smooth(recorded.y[:, 2])
+    wheelset = values["JW"] * smooth(omegaW, 1) + brake + loss(smooth(omegaW), "wheelsetLoss")
+    roller = values["JR"] * smooth(omegaR, 1) + rR * Fx + loss(smooth(omegaR), "rollerLoss")
+    torque = "balance: torque that the model lacks"
+    law = slip - shown(Fx * np.abs(v) / _stiffness(values))
+    return [
+        Balance("wheelset", f"Wheelset {torque}", "N.m", "N.m", shown(rW * Fx - wheelset)),
+        Balance("roller", f"Roller {torque}", "N.m", "N.m", shown(smooth(tauR) - roller)),
+        Balance("slip", "Slip law: slip that the model lacks", "m/s", "mm/s", law),
+    ]
 
 
 def _losses(values: Mapping[str, float], slot: str) -> list[str]:
