@@ -27,8 +27,8 @@ pytest.register_assert_rewrite(
     "tests.case_folders", "tests.diagnosis_pages", "tests.runtime_instances"
 )
 
-from .diagnosis_pages import PLANTED, STOPS
-from .runtime_instances import Fmu, compile_model
+from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
+from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
 
