@@ -33,7 +33,7 @@ NAMES = {
     "muDC": "padLevel",
     "rW": "rollingRadius",
     "rR": "radiusOfRoller",
-    "JR": "rollerInertia",
+    "JR": "inertiaOfRoller",
 }
 
 
