@@ -365,7 +365,7 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
 def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
-    simulator = Simulator(Simulated(MINIMAL, SYSTEM, {}, (samples,)))
+    simulator = Simulator(Simulated(MINIMAL, SYSTEM, (samples,)))
     with FMU(MINIMAL) as fmu:
         nominal = {name: fmu.defaults[name] for name in steps} | point
     about = simulator.at(0, nominal)

@@ -1,24 +1,21 @@
 """Observers on models with an effect plugged in: other states, another radius."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case, Conditions, read_case
-from workbench.cosim import Outcome, observe
+from workbench.case import Case, read_case
+from workbench.cosim import Ending, replay
 from workbench.fmu import FMU
-from workbench.objective import Weights, score
-from workbench.observers import (
-    DisturbanceObserver,
-    Estimator,
-    ExtendedKalmanFilter,
-    UnscentedKalmanFilter,
-    stationary_gains,
-)
+from workbench.objective import score
+from workbench.observers import Estimator, Gains
+from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.observers.unscented import UnscentedKalmanFilter
+from workbench.systems import load_system
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -26,6 +23,7 @@ pytest.importorskip("rumoca")
 from workbench.diagnosis.extension import build
 from workbench.modelica import read_library
 
+SYSTEM = load_system("wheelset")
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 WORN = 0.45  # m, wheel radius of Worn
 
@@ -80,23 +78,30 @@ def fading_stop(extended: dict[str, FMU]) -> tuple[Case, float]:
     case = Case(
         name="fading",
         title="fading",
-        conditions=Conditions(120 / 3.6, 2.7e5, "dry", ("dry",) * 3, 1),
+        conditions={"wheel_rail": "dry", "direction": 1},
         time=t,
-        pB=pB,
-        tauR=tauR,
-        omegaW=omegaW,
-        omegaR=omegaR,
-        Fx=Fx,
+        signals={"pB": pB, "tauR": tauR, "omegaW": omegaW, "omegaR": omegaR, "Fx": Fx},
+        inputs=("pB", "tauR"),
+        outputs=("omegaW", "omegaR"),
         source=Path("fading"),
     )
     return case, float(fmu.get_states()[2])
 
 
+def observer(fmu: FMU) -> DisturbanceObserver:
+    return DisturbanceObserver(fmu, SYSTEM, gains_of(fmu))
+
+
+def gains_of(fmu: FMU) -> Gains:
+    """Reasoned gains; the FMU is left at its operating point."""
+    return DisturbanceObserver.reasoned(fmu, SYSTEM)
+
+
 def force_error(case: Case, estimator: Estimator) -> float:
     """Error of Fx, rms over mean while braking."""
-    run = observe(case, estimator)
-    assert run.outcome is Outcome.OK
-    error = score(case, run, RR, Weights()).Fx_nrmse
+    run = replay(case, estimator)
+    assert run.ending is Ending.OK
+    error = score(case, run, SYSTEM).nrmse
     assert error is not None
     return error
 
@@ -105,10 +110,7 @@ def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
     minimal: FMU, extended: dict[str, FMU], fading_stop: tuple[Case, float]
 ) -> None:
     case, _ = fading_stop
-    without, knowing = (
-        force_error(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
-        for fmu in (minimal, extended["Fading"])
-    )
+    without, knowing = (force_error(case, observer(fmu)) for fmu in (minimal, extended["Fading"]))
     # Measured: 0.05 % and 0.007 %; what is left is of the step.
     assert knowing < 0.5 * without
 
@@ -116,10 +118,10 @@ def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
 def test_a_state_without_effect_changes_no_estimate(
     minimal: FMU, extended: dict[str, FMU], dry_case: Case
 ) -> None:
-    gains = stationary_gains(minimal)
+    gains = gains_of(minimal)
     recording = dry_case.time, dry_case.u, dry_case.y
     expected, found = (
-        DisturbanceObserver(fmu, gains).run(*recording).values
+        DisturbanceObserver(fmu, SYSTEM, gains).run(*recording).values
         for fmu in (minimal, extended["Warming"])
     )
     # Rounding only, amplified by the stiff slip.
@@ -131,8 +133,7 @@ def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(
 ) -> None:
     case, temperature = fading_stop
     fmu = extended["Fading"]
-    observer = DisturbanceObserver(fmu, stationary_gains(fmu))
-    observer.run(case.time, case.u, case.y)
+    observer(fmu).run(case.time, case.u, case.y)
     start = fmu.defaults["padFriction.T"]
     assert temperature - start > 50.0
     # Steps of 5 ms, in the order of 1e-3 of the stop.
@@ -146,36 +147,33 @@ def test_the_effect_costs_nothing_on_a_recorded_stop(
     folder = root.parent / "shared" / "recordings" / "labelled" / "fade" / "04_dry_160_4.2"
     if not folder.is_dir():
         pytest.skip("no such recordings")
-    case = read_case(folder)
-    without, knowing = (
-        force_error(case, DisturbanceObserver(fmu, stationary_gains(fmu)))
-        for fmu in (minimal, extended["Fading"])
-    )
+    case = read_case(folder, SYSTEM)
+    without, knowing = (force_error(case, observer(fmu)) for fmu in (minimal, extended["Fading"]))
     # The observer learns the fade anyway; noise of the sensors is all of the 0.15 %.
     assert knowing < 1.1 * without
 
 
 def test_the_operating_point_is_an_equilibrium_of_every_model(extended: dict[str, FMU]) -> None:
     for fmu in extended.values():
-        gains = stationary_gains(fmu)
+        gains = gains_of(fmu)
         # Of some 100 rad/s2 that pads and creep force have; the search ends at 1e-9 m/s of slip.
         assert abs(fmu.derivatives()[fmu.states.index("omegaW")]) < 1e-4
         assert fmu.get(fmu.variables(["Fx"]))[0] > 5e3
-        assert np.isfinite(gains.L).all()
-        assert np.abs(gains.effect).min() > 10.0
+        assert np.isfinite(gains.values).all()
+        assert np.abs(gains.design["effect"]).min() > 10.0
 
 
 def test_a_cylinder_that_lags_is_full_at_the_operating_point(
     minimal: FMU, extended: dict[str, FMU]
 ) -> None:
-    expected, found = (stationary_gains(fmu) for fmu in (minimal, extended["Lagging"]))
-    assert_allclose(found.L, expected.L, rtol=1e-9)
-    assert_allclose(found.effect, expected.effect, rtol=1e-9)
+    expected, found = (gains_of(fmu) for fmu in (minimal, extended["Lagging"]))
+    assert_allclose(found.values, expected.values, rtol=1e-9)
+    assert_allclose(found.design["effect"], expected.design["effect"], rtol=1e-9)
 
 
 def test_discs_are_at_their_start_at_the_operating_point(extended: dict[str, FMU]) -> None:
     fmu = extended["Fading"]
-    stationary_gains(fmu)
+    gains_of(fmu)
     assert fmu.get_states()[2] == fmu.defaults["padFriction.T"]
 
 
@@ -185,8 +183,8 @@ def test_a_worn_wheel_at_standstill_has_no_creep_force(
 ) -> None:
     """The radius of rolling is the model's, not the parameter rW: that would leave 7 kN."""
     fmu = extended["Worn"]
-    case = replace(dry_case, omegaW=dry_case.omegaW * fmu.defaults["rW"] / WORN)
-    run = observe(case, method(fmu))
+    case = dry_case.with_signals({"omegaW": dry_case["omegaW"] * fmu.defaults["rW"] / WORN})
+    run = replay(case, method(fmu, SYSTEM, method.reasoned(fmu, SYSTEM)))
     resting = case.time > case.time[-1] - 0.5
     # 100 N is the noise of the load cell itself (80 N) with a margin for the drive's torque.
     assert np.abs(run.signal("Fx")[resting]).max() < 100.0

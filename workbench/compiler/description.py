@@ -15,6 +15,7 @@ from workbench.compiler.flat import Variable
 from workbench.errors import InputError
 
 _REGISTRY: "pint.UnitRegistry[float]" = pint.UnitRegistry()
+_REGISTRY.define("@alias ohm = Ohm")  # as Modelica writes it
 _BASE_UNITS = {
     "kilogram": "kg",
     "meter": "m",
@@ -205,6 +206,8 @@ def base_units(unit: str) -> tuple[dict[str, int], float]:
 
     >>> base_units("N.m")
     ({'kg': 1, 'm': 2, 's': -2}, 1.0)
+    >>> base_units("Ohm")
+    ({'A': -2, 'kg': 1, 'm': 2, 's': -3}, 1.0)
     """
     spelled = re.sub(r"([A-Za-z])(-?\d+)", r"\1**\2", unit).replace(".", "*")
     try:

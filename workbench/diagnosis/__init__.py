@@ -191,7 +191,7 @@ def _extend(
     build(library, EXTENDED, text, path, every_platform=every_platform)
     point, difference = diagnosis.best.point, 0.0
     delays = {delay(name) for name in system.signals}
-    with simulating(Simulated(path, system, {}, tuple(simulations.recordings))) as extended:
+    with simulating(Simulated(path, system, tuple(simulations.recordings))) as extended:
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value

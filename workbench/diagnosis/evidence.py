@@ -75,11 +75,10 @@ class Evidence:
 
 
 class Simulated(NamedTuple):
-    """What a simulator is made from: an FMU, values that differ from its own, the recordings."""
+    """What a simulator is made from: an FMU and the recordings."""
 
     path: Path
     system: System
-    given: Mapping[str, float]
     recordings: tuple[Samples, ...]
 
 
@@ -87,7 +86,7 @@ class Simulator:
     """An FMU along recordings, in one process."""
 
     def __init__(self, given: Simulated) -> None:
-        self._fmu = FMU(given.path, None, given.given)
+        self._fmu = FMU(given.path)
         self._recordings = given.recordings
         signals = given.recordings[0].signals
         self._predictor = Predictor(self._fmu, given.system, signals)
@@ -227,7 +226,7 @@ class Simulations:
             prepare(one, system, signals, self.nominal, moving, sound) for one in cases
         ]
         workers = min(workers, len(cases))
-        simulated = Simulated(path, system, self.given, tuple(self.recordings))
+        simulated = Simulated(path, system, tuple(self.recordings))
         with simulating(simulated) as own:
             self.begin = [own.begin(k) for k in range(len(cases))]
         self._alone = workers == 1

@@ -29,6 +29,7 @@ from workbench.recording import Matrix, Vector
 from workbench.system import Channel, Exclusion, Mode, System
 
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
+_ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 _RELEASED = 0.1  # share of the greatest value
 FAULTY, MISSING = "spike, dropout or saturation", "missing"  # reasons of every system
@@ -216,7 +217,9 @@ def prepare(
         lead=lead,
         held=np.array([one.held for one in system.inputs]),
         begin=_begin(
-            system, {n: _first(time[start], clean[n][start]) for n in case.outputs}, motion
+            system,
+            {n: _first(time[start], clean[n][start], deviation[n]) for n in case.outputs},
+            motion,
         ),
         rest=float(np.mean(rest)),
         rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), zero)),
@@ -247,7 +250,10 @@ def _refuse_too_few(
 
 def _outliers(values: Vector, sound: Soundness) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
-    away = np.abs(values - median_filter(values, _ABREAST))
+    # Odd at the ends: there too, the median of what rises or falls is the middle sample.
+    beside = _ABREAST // 2
+    extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
+    away = np.abs(values - median_filter(extended, _ABREAST)[beside:-beside])
     # The wide window knows the noise, the narrow one that a structure rings.
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, _deviation(values))
@@ -299,11 +305,15 @@ def _deviation(values: Vector) -> float:
     return max(spread, float(rounding))
 
 
-def _first(time: Vector, values: Vector) -> float:
-    """Value at the start of a signal, of which a line is what few samples show."""
-    if time.size < 3:
-        return float(values[0])
-    return float(np.polynomial.Polynomial.fit(time - time[0], values, 1)(0.0))
+def _first(time: Vector, values: Vector, noise: float) -> float:
+    """Value at the start of a signal: by a line through as many samples as lie along one."""
+    count = time.size
+    while count > 2:
+        line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
+        if np.std(values[:count] - line(time[:count])) < _ALONG * noise:
+            return float(line(time[0]))
+        count //= 2
+    return float(values[0])
 
 
 def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
