@@ -2,8 +2,8 @@
 
 The extended-FMI pattern of Brembeck et al. (2014): set and read continuous states, evaluate
 derivatives, linearise, step, save and roll back. Standard Model Exchange offers all of it except
-the step, which is done here: linearly implicit, because the slip mode of a wheelset has time
-constants from milliseconds at speed to microseconds at standstill.
+the step, which is done here: linearly implicit, because machines have
+motions of microseconds beside those of seconds.
 """
 
 import ctypes
@@ -90,7 +90,7 @@ class FMU:
     Parameters
     ----------
     path : the FMU file.
-    names : names to use for variables that the FMU names otherwise, {"pB": "brakePressure"}.
+    names : names to use for variables that the FMU names otherwise, {"p": "pressure"}.
     parameters : values that differ from those of the model description, in the FMU's units.
 
     Attributes
@@ -401,7 +401,7 @@ class FMU:
         """Advance the states by h [s] with inputs as they are; returns the new states, (n,).
 
         Linearly implicit Euler, x + (I - h A)^-1 h f(x): L-stable, no iteration, and its result
-        lies on the linearised slow manifold, so that a stiff slip mode does not disturb the force.
+        lies on the linearised slow manifold, so that a stiff motion does not disturb the slow ones.
         Source: Hairer and Wanner (1996), Solving Ordinary Differential Equations II, IV.7.
         """
         x = self.get_states()

@@ -1,6 +1,6 @@
 """Modelica to FMU by OpenModelica, the second compiler, where it is installed.
 
-FMI 2.0 only. Its Co-Simulation is explicit Euler by default, which a stiff slip mode does not
+FMI 2.0 only. Its Co-Simulation is explicit Euler by default, which a stiff motion does not
 survive: CVODE is asked for. Directional derivatives have to be asked for, too. Source:
 OpenModelica User's Guide, chapter "FMI and TLM".
 """

@@ -83,7 +83,7 @@ class Estimator(ABC):
     adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
-    sticks : whether a follower rolls where a step would reverse its slip close to standstill.
+    sticks : whether a follower rolls where a step would take it past its leader near standstill.
 
     Raises
     ------
@@ -383,7 +383,7 @@ def clip(value, low, high):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slipping(layout, x):  # type: ignore[no-untyped-def]
+def lag(layout, x):  # type: ignore[no-untyped-def]
     """Follower that rolls along minus the follower; 0 where nothing rolls."""
     if layout.follower < 0:
         return 0.0
@@ -392,17 +392,17 @@ def slipping(layout, x):  # type: ignore[no-untyped-def]
 
 @inlined
 def stick(layout, x, before):  # type: ignore[no-untyped-def]
-    """Let the follower roll where a step would reverse its slip close to standstill.
+    """Let the follower roll where a step would take it past its leader close to standstill.
 
-    What drives it is saturated there at the least slip, and a tangent to the saturation leads to
+    What drives it is saturated there at the least lag, and a tangent to the saturation leads to
     the other side, and back in the next step.
 
     Parameters
     ----------
-    before : `slipping` before the step.
+    before : `lag` before the step.
     """
     rolls = layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
-    if rolls and before * slipping(layout, x) < 0.0:
+    if rolls and before * lag(layout, x) < 0.0:
         x[layout.follower] = layout.ratio * x[layout.leader]
 
 

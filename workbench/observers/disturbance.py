@@ -28,10 +28,10 @@ from workbench.observers.contract import (
     correct,
     explained,
     fading,
+    lag,
     measure,
     output,
     report,
-    slipping,
     stick,
     width,
 )
@@ -139,7 +139,7 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         for j in range(outputs):
             left = innovation[j] - explained(model, layout, j, settings.places, change)
             memory.integral[j] += h * left
-        before = slipping(layout, model.x)
+        before = lag(layout, model.x)
         for i in range(n):
             if settings.places[i] < 0:
                 model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
@@ -168,7 +168,7 @@ class DisturbanceObserver(Estimator):
     no effect, and has the sign of that effect.
 
     The step is linearly implicit in states and quantities, feedback included, so that any gain
-    keeps a stable step. States that an extension adds, such as the temperature of a disc, are not
+    keeps a stable step. States that an extension adds, such as a temperature, are not
     corrected and step each by themselves, implicit in their own value. Quantities are kept within
     their physical range.
 

@@ -17,9 +17,9 @@ from workbench.observers.contract import (
     clip,
     correct,
     fading,
+    lag,
     measure,
     report,
-    slipping,
     stick,
     width,
 )
@@ -95,7 +95,7 @@ def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
         memory.system[i, i] += 1.0
     copy(memory.system, memory.work)
     status = status or solve(memory.work, memory.change)
-    before = slipping(settings.layout, z)
+    before = lag(settings.layout, z)
     for i in range(size):
         z[i] += memory.change[i, 0]
     stick(settings.layout, z, before)

@@ -46,7 +46,7 @@ def settle(
     Parameters
     ----------
     extensions : whether states rest that no observer corrects. If not, they stay as they start,
-        such as the temperature of a disc, but for those that follow inputs alone.
+        such as a temperature, but for those that follow inputs alone.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def linearised(fmu: FMU, system: System) -> Linearised:
 def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
     """States that observers correct: those of the system's own observer model.
 
-    States that an extension adds, such as the temperature of a disc, follow from the model alone.
+    States that an extension adds, such as a temperature, follow from the model alone.
     """
     return tuple(name for name in fmu.states if name in system.states) or fmu.states
 

@@ -34,7 +34,7 @@ from workbench.observers.gains import (
     matrix_names,
 )
 from workbench.observers.operating import linearised, loops
-from workbench.system import System
+from workbench.system import FULL, System
 
 _SLOWEST = 2.0**-40  # of the fastest integral action, at which a design is given up
 
@@ -132,7 +132,7 @@ class ParameterEstimator(Estimator):
 
     name = "parameter_estimator"
     label = "parameter estimator"
-    role = "full"
+    role = FULL
     rank = 30
     meaning = "L: rows corrections of quantities; columns dy, integral of dy"
     _law = staticmethod(_law)
