@@ -8,10 +8,10 @@ from typing import Any
 from workbench.description import Description, read_description
 from workbench.errors import InputError, closest
 from workbench.system import OBSERVER, System
-from workbench.system_parts import Comparison, Model, Objective, OperatingPoint
+from workbench.system_parts import Comparison, Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     read_comparison,
-    read_conditions,
+    read_condition_kinds,
     read_derived,
     read_estimated,
     read_export,
@@ -24,6 +24,7 @@ from workbench.system_tables import (
     read_point,
     read_rolling,
     read_view,
+    within,
 )
 from workbench.tables import Table, read_table
 from workbench.units import si_factor
@@ -43,10 +44,7 @@ def read_system(path: Path) -> System:
         "estimated states feedback points conditions objective tuning diagnosis figures "
         "export shortest sample_time cases"
     )
-    system = _signals(file, path)
-    system = _placed(file, with_model(system, OBSERVER, system.models[OBSERVER].path))
-    _check_names(system)
-    return system
+    return _read(file, path, _models(file, path))
 
 
 def with_built(system: System, paths: Mapping[str, Path]) -> System:
@@ -62,10 +60,14 @@ def with_built(system: System, paths: Mapping[str, Path]) -> System:
         role: replace(model, path=paths.get(role, model.path))
         for role, model in system.models.items()
     }
-    again = _signals(file, system.source, built)
-    again = _placed(file, with_model(again, OBSERVER, again.models[OBSERVER].path))
-    _check_names(again)
-    return again
+    return _read(file, system.source, built)
+
+
+def _read(file: Table, path: Path, models: Mapping[str, Model]) -> System:
+    system = _signals(file, path, models)
+    system = _placed(file, with_model(system, OBSERVER, models[OBSERVER].path))
+    _check_names(system)
+    return system
 
 
 def with_model(system: System, role: str, path: Path | None) -> System:
@@ -138,19 +140,10 @@ def check_model(system: System, model: Description) -> None:
             )
 
 
-def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) -> System:
-    """The system without what its model must be known for.
-
-    Parameters
-    ----------
-    built : models in place of those that the file names.
-    """
-    models = dict(built or {}) or {
-        role: read_model(
-            Table(file.table("models").take(role, dict), f"{path}, [models] {role}"), path
-        )
-        for role in file.table("models").content
-    }
+def _models(file: Table, path: Path) -> dict[str, Model]:
+    """Models by role."""
+    roles = file.table("models").content
+    models = {role: read_model(within(file, "models", role), path) for role in roles}
     if OBSERVER not in models:
         raise InputError(
             where=f"{path}, [models]",
@@ -158,19 +151,29 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
             expected=f"a model in the role '{OBSERVER}', which estimators run on",
             remedy=f'add {OBSERVER} = {{ class = "NAME" }}',
         )
-    description = None
-    if (fmu := models[OBSERVER].path) is not None:
-        description = read_description(fmu)
-    units = {v.name: v.unit or "1" for v in description.variables} if description else {}
+    return models
+
+
+def _measured(file: Table) -> dict[str, tuple[Signal, ...]]:
+    """Measured signals by group."""
     groups = {group: read_measured(file, group) for group in ("inputs", "outputs", "judged")}
     for group in ("inputs", "outputs"):
         if not groups[group]:
             raise InputError(
-                where=str(path),
+                where=file.where,
                 found=f"no [{group}]",
                 expected="measured inputs, which drive the model, and outputs, which correct it",
                 remedy=f"add a table [{group}.NAME] for each",
             )
+    return groups
+
+
+def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
+    """The system without what its model must be known for."""
+    fmu = models[OBSERVER].path
+    description = read_description(fmu) if fmu is not None else None
+    units = {v.name: v.unit or "1" for v in description.variables} if description else {}
+    groups = _measured(file)
     # Units are known when the model is.
     parameters = file.table("parameters") if description else Table({}, "")
     states = file if description else Table({}, "")
@@ -191,7 +194,7 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
         reported={name: units.get(name, "1") for name in file.texts("reported")},
-        conditions=read_conditions(file.table("conditions")),
+        conditions=read_condition_kinds(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
         objective=Objective("", {}, 0.0, None, None, ""),

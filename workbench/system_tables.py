@@ -156,7 +156,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
     return tuple(found)
 
 
-def read_conditions(table: Table) -> tuple[Condition, ...]:
+def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     """Conditions, and the parameters that they mean."""
     found = []
     for name in table.content:

@@ -27,7 +27,7 @@ from workbench.report import (
     case_figure,
     draw_case,
     format_table,
-    summarise,
+    summarise_runs,
     write_estimates,
     write_page,
 )
@@ -112,7 +112,7 @@ def _simulate(options: argparse.Namespace) -> int:
         print("interrupted", flush=True)
     if done:
         done.sort(key=lambda result: result.case.name)
-        summary = summarise(system, done, provenance)
+        summary = summarise_runs(system, done, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(system, summary, [case_figure(result) for result in done], len(cases), page)

@@ -19,8 +19,15 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, solve
-from workbench.observers.contract import (
-    Estimator,
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
+from workbench.observers.layout import (
     Layout,
     add_slope,
     authority,
@@ -35,15 +42,8 @@ from workbench.observers.contract import (
     stick,
     width,
 )
-from workbench.observers.gains import (
-    Gains,
-    SearchSpace,
-    feedback_meanings,
-    feedback_space,
-    matrix_names,
-)
 from workbench.observers.operating import (
-    Linearised,
+    LinearModel,
     corrected_states,
     linearised,
     loops,
@@ -338,7 +338,7 @@ class DisturbanceObserver(Estimator):
         return dynamics, error
 
 
-def effects(fmu: FMU, system: System, model: Linearised) -> Vector:
+def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
     """Effect of each quantity on the rate that shows it, at the design point, (q,)."""
     return np.array(
         [

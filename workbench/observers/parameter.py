@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, linearise, solve
-from workbench.observers.contract import (
-    Estimator,
+from workbench.observers.contract import Estimator
+from workbench.observers.disturbance import effects
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
+from workbench.observers.layout import (
     Layout,
     add_slope,
     authority,
@@ -24,14 +32,6 @@ from workbench.observers.contract import (
     output,
     report,
     width,
-)
-from workbench.observers.disturbance import effects
-from workbench.observers.gains import (
-    Gains,
-    SearchSpace,
-    feedback_meanings,
-    feedback_space,
-    matrix_names,
 )
 from workbench.observers.operating import linearised, loops
 from workbench.system import FULL, System
