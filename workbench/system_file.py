@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from workbench.description import Description, read_description
-from workbench.errors import InputError, closest
+from workbench.errors import InputError
 from workbench.system import OBSERVER, System
+from workbench.system_check import check_model, check_references
 from workbench.system_parts import Comparison, Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     read_comparison,
@@ -27,7 +27,6 @@ from workbench.system_tables import (
     within,
 )
 from workbench.tables import Table, read_table
-from workbench.units import si_factor
 
 
 def read_system(path: Path) -> System:
@@ -65,8 +64,10 @@ def with_built(system: System, paths: Mapping[str, Path]) -> System:
 
 def _read(file: Table, path: Path, models: Mapping[str, Model]) -> System:
     system = _signals(file, path, models)
-    system = _placed(file, with_model(system, OBSERVER, models[OBSERVER].path))
-    _check_names(system)
+    model = models[OBSERVER].path
+    system = _placed(file, with_model(system, OBSERVER, model))
+    if model is not None:
+        check_references(system, read_description(model))
     return system
 
 
@@ -93,51 +94,6 @@ def with_model(system: System, role: str, path: Path | None) -> System:
 
 def _values(description: Description) -> dict[str, float]:
     return {v.name: float(v.start) for v in description.variables if v.real and v.start is not None}
-
-
-def check_model(system: System, model: Description) -> None:
-    """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
-
-    Raises
-    ------
-    InputError
-        If it lacks a variable of the system, has a parameter without a value, or another unit.
-    """
-    variables = {v.name: v for v in model.variables}
-    for ours, unit in system.variables.items():
-        theirs = system.names.get(ours, ours)
-        where = f"{model.path}, variable '{theirs}'"
-        if ours not in variables:
-            raise InputError(
-                where=str(model.path),
-                found=f"no variable '{ours}'{closest(ours, variables)}",
-                expected=f"one for '{ours}' of {system.source}",
-                remedy=f"use an FMU that has it, or map its name: --map {ours}=NAME",
-            )
-        needs_value = ours in system.constants or any(q.name == ours for q in system.estimated)
-        if needs_value and variables[ours].start is None:
-            raise InputError(
-                where=where,
-                found="no start value",
-                expected=f"a parameter with a value for {ours}",
-                remedy=f"make it a parameter of the model, or map another: --map {ours}=NAME",
-            )
-        declared = variables[ours].unit
-        if declared and unit not in ("1", "") and si_factor(declared, unit, where) != 1.0:
-            raise InputError(
-                where=where,
-                found=f"unit [{declared}]",
-                expected=f"[{unit}] for {ours}; nothing is converted silently",
-                remedy=f"export the model with this variable in {unit}",
-            )
-    for name in system.given:
-        if name not in model.names("parameter"):
-            raise InputError(
-                where=f"{system.source}, [parameters] {name}",
-                found="no such parameter of the model",
-                expected=f"a parameter of {model.name}{closest(name, model.names('parameter'))}",
-                remedy="correct the name",
-            )
 
 
 def _models(file: Table, path: Path) -> dict[str, Model]:
@@ -227,40 +183,3 @@ def _placed(file: Table, system: System) -> System:
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),
     )
-
-
-def _check_names(system: System) -> None:
-    """Refuse formulas and tables that name what neither model nor recordings have."""
-    known = {*system.signals, *(one.name for one in system.derived), *system.values}
-    formulas = [
-        *(one.formula for one in system.derived),
-        *(one.formula for one in system.comparison.channels),
-        *(one.formula for one in system.comparison.exclusions),
-        *(one.formula for one in system.comparison.influences),
-    ]
-    for formula in formulas if system.values else ():
-        for name in formula.names - known:
-            raise InputError(
-                where=formula.where,
-                found=f"'{name}'{closest(name, known)}",
-                expected="a measured or derived signal, or a parameter of the model",
-                remedy="correct the name",
-            )
-    tables: Mapping[str, Mapping[str, Any]] = {
-        "diagnosis.tolerances": system.comparison.tolerances,
-        "diagnosis.levels": system.comparison.levels,
-        **{
-            f"conditions.{one.name}.parameters": choice
-            for one in system.conditions
-            for choice in one.parameters.values()
-        },
-    }
-    for table, entries in tables.items() if system.values else ():
-        for name in entries:
-            if name not in system.values:
-                raise InputError(
-                    where=f"{system.source}, [{table}] {name}",
-                    found=f"no such parameter of the model{closest(name, system.values)}",
-                    expected=f"a parameter of {system.models[OBSERVER].name}",
-                    remedy="correct the name",
-                )

@@ -97,8 +97,8 @@ def errors_in(output: str) -> list[Message]:
 
     Examples
     --------
-    >>> errors_in("[/lib/Rig/package.mo:3:5-3:20:writable] Error: Class Foo not found in scope Rig.")
-    [Message(place='/lib/Rig/package.mo:3', text='Class Foo not found in scope Rig.')]
+    >>> errors_in("[/lib/A/package.mo:3:5-3:20:writable] Error: Class Foo not found in scope A.")
+    [Message(place='/lib/A/package.mo:3', text='Class Foo not found in scope A.')]
     """
     placed = [
         Message(f"{found['file']}:{found['line']}", found["text"].rstrip('"'))

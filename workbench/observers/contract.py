@@ -11,7 +11,7 @@ from workbench.kernel import checked, instance
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout
 from workbench.system import OBSERVER, System
-from workbench.system_file import check_model
+from workbench.system_check import check_model
 
 
 @dataclass(frozen=True)
