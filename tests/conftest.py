@@ -18,8 +18,7 @@ from workbench.fmu import FMU
 from workbench.pool import Pool
 from workbench.system import System
 from workbench.systems import load_system, open_model
-from workbench.tuning import Evaluator, Job, Problem, tunable
-from workbench.tuning import prepare as prepare_tuning
+from workbench.tuning import Evaluator, Job, Problem, pose, tunable
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
@@ -79,7 +78,7 @@ def prepare(system: System) -> Callable[[str, Sequence[Case]], Problem]:
     """Prepares the tuning of an estimator over cases as they were recorded."""
 
     def prepared(name: str, cases: Sequence[Case]) -> Problem:
-        problem = prepare_tuning(system, name, cases, {})
+        problem = pose(system, name, cases, {})
         kind = tunable(system, name)
         with open_model(system, kind.role) as model:
             space = kind.space(model, system, problem.job.gains, slowest=1 / 40, fastest=200.0)

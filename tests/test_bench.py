@@ -4,15 +4,30 @@ import shutil
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-from workbench.compiler.benchmark import time_calls
+from workbench.benchmark.calls import points
+from workbench.compiler.benchmark import CallTimes, time_sources
 from workbench.description import read_description
 from workbench.errors import InputError
+from workbench.fmu import FMU, Matrix
+from workbench.system import System
+
+STEP = 0.005  # [s]
+
+
+@pytest.fixture
+def at(minimal: FMU, system: System) -> Matrix:
+    return points(minimal, system, np.random.default_rng(1))
+
+
+def timed(path: Path, at: Matrix) -> CallTimes:
+    return time_sources(read_description(path), at, STEP)
 
 
 def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -> Path:
@@ -27,8 +42,8 @@ def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -
     return changed
 
 
-def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path) -> None:
-    times = time_calls(read_description(minimal_path), seed=1)
+def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path, at: Matrix) -> None:
+    times = timed(minimal_path, at)
     assert (times.states, times.inputs) == (2, 6)
     # 50 operations and five elementary functions: no computer needs less than 5 ns or, through
     # FMI, more than 5 us. A step is several evaluations.
@@ -41,7 +56,9 @@ def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path) -> None
     assert times.ratios()["jacobian"] < 2.0
 
 
-def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_path: Path) -> None:
+def test_a_delay_in_the_interface_shows_in_the_ratio(
+    minimal_path: Path, tmp_path: Path, at: Matrix
+) -> None:
     slow = change_source(
         minimal_path,
         tmp_path / "slow.fmu",
@@ -51,7 +68,7 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_pat
         "    return (fmi2Status)instance_get_derivatives",
     )
     # 1000 volatile increments take 200 ns or more, the plain call 30 to 100.
-    assert time_calls(read_description(slow), seed=1).ratios()["derivatives"] > 3.0
+    assert timed(slow, at).ratios()["derivatives"] > 3.0
 
 
 @pytest.mark.parametrize(
@@ -62,15 +79,15 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path: Path, tmp_pat
     ],
 )
 def test_an_interface_that_gives_other_numbers_is_refused(
-    minimal_path: Path, tmp_path: Path, right: str, wrong: str, found: str
+    minimal_path: Path, tmp_path: Path, at: Matrix, right: str, wrong: str, found: str
 ) -> None:
     changed = change_source(minimal_path, tmp_path / "wrong.fmu", "instance.c", right, wrong)
     with pytest.raises(InputError, match=rf"wrong\.fmu: found {found}"):
-        time_calls(read_description(changed), seed=1)
+        timed(changed, at)
 
 
-def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path) -> None:
+def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path, at: Matrix) -> None:
     path = tmp_path / "three.fmu"
     shutil.copyfile(root / "fmus" / "fmi3" / "MinimalObserver.fmu", path)
     with pytest.raises(InputError, match=r"C sources of FMI 2\.0 that compile"):
-        time_calls(read_description(path), seed=1)
+        timed(path, at)

@@ -19,7 +19,7 @@ from workbench.observers.parameter import ParameterEstimator
 from workbench.pool import Pool
 from workbench.system import System
 from workbench.systems import open_model
-from workbench.tuning import Evaluator, Job, evaluate_gains, prepare
+from workbench.tuning import Evaluator, Job, evaluate_gains, pose
 from workbench.tuning.settling import Settling
 
 NAMES = ("disturbance_observer", "parameter_estimator")
@@ -39,7 +39,7 @@ def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
     path = root / "workbench" / "wheelset" / "gains" / f"{name}.toml"
     claimed = tomllib.loads(path.read_text())["provenance"]
     cases = read_cases([root / "cases"], system)
-    job = prepare(system, name, cases, claimed["scale_errors"]).job
+    job = pose(system, name, cases, claimed["scale_errors"]).job
     assert dict(system.objective.weights) == claimed["weights"]
     tuned = read_gains(path, {name: job.gains})
     after, before = evaluate_gains(inline(job), job, [tuned.values, job.gains.values])

@@ -18,7 +18,7 @@ from workbench.observers.disturbance import DisturbanceObserver
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.observers.open_loop import OpenLoop
 from workbench.system import System
-from workbench.system_file import check_model
+from workbench.system_check import check_model
 
 NAMES = {
     "omegaW": "speedWheelset",

@@ -23,7 +23,7 @@ from workbench.system import System
 from workbench.systems import load_system
 from workbench.wheelset.estimators import inversion
 from workbench.wheelset.estimators.inversion import DirectInversion
-from workbench.wheelset.estimators.parameter import ParameterEstimator as RigParameterEstimator
+from workbench.wheelset.estimators.parameter import WheelsetParameterEstimator
 
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 SECONDS, STEP = 24.0, 0.005
@@ -246,7 +246,7 @@ def test_any_fmu_runs_in_the_same_loop(
 
 def test_parameter_estimator_has_the_poles_it_was_given(fmu: FMU) -> None:
     """Reference: eigenvalues of model and PI controller at the design point."""
-    gains = RigParameterEstimator.reasoned(fmu, WHEELSET)
+    gains = WheelsetParameterEstimator.reasoned(fmu, WHEELSET)
     L = gains.values.reshape(2, 4)
     A = fmu.state_jacobian()
     B = fmu.input_jacobian(fmu.variables(["dmuWR", "dmuDC"]))
@@ -270,7 +270,7 @@ def test_forward_and_reverse_are_mirror_images(
     # On the minimal model: the full one has its pads on one side, which is not symmetric.
     estimator = made[name]
     if name == "parameter_estimator":
-        reasoned = RigParameterEstimator.reasoned(fmu, WHEELSET)
+        reasoned = WheelsetParameterEstimator.reasoned(fmu, WHEELSET)
         estimator = ParameterEstimator(fmu, WHEELSET, reasoned)
     forward, reverse = replay(case, estimator), replay(mirrored, estimator)
     signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])

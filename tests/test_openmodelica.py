@@ -12,7 +12,7 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
 from workbench.__main__ import main
-from workbench.compiler.openmodelica import Message, build_with_omc, errors
+from workbench.compiler.openmodelica import Message, build_with_omc, errors_in
 from workbench.errors import InputError
 
 CHECKED = (
@@ -87,7 +87,7 @@ def test_warnings_and_notifications_are_no_errors() -> None:
         "[/lib/B.mo:5:6-7:8:writable] Notification: From here:\n"
         r"[C:\lib\C.mo:9:1-9:2:writable] Error: No viable alternative near token: end"
     )
-    assert errors(output) == [Message(r"C:\lib\C.mo:9", "No viable alternative near token: end")]
+    assert errors_in(output) == [Message(r"C:\lib\C.mo:9", "No viable alternative near token: end")]
 
 
 def test_without_omc_the_command_says_what_is_missing(

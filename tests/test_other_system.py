@@ -13,7 +13,7 @@ from workbench.case import Case, read_case
 from workbench.fmu import FMU
 from workbench.observability import case_observability, linear_test
 from workbench.observers import choose
-from workbench.report import case_figure, format_table, summarise, write_estimates, write_page
+from workbench.report import case_figure, format_table, summarise_runs, write_estimates, write_page
 from workbench.report.observability import (
     draw_observability,
     format_observability,
@@ -183,7 +183,7 @@ def test_table_and_page_speak_of_the_judged_signal(result: CaseResult, tmp_path:
         "packages": {},
         "fmu": {"file": "Vessel.fmu", "model": "Vessel", "sha256": "0" * 64},
     }
-    summary = summarise(system, [result], provenance)
+    summary = summarise_runs(system, [result], provenance)
     assert {"T_rms_K", "T_nrmse"} <= set(summary["cases"]["01_heating"]["estimators"]["ekf"])
     # Nothing says otherwise: each deviation counts by the size of its signal.
     assert summary["weights"] == {"TSkin": 0.02, "T": 0.02}

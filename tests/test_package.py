@@ -153,7 +153,7 @@ def test_a_folder_of_the_same_name_does_not_shadow_the_cases_of_the_wheel(
 ) -> None:
     (tmp_path / "cases").mkdir()
     own = installed / "workbench" / "data" / "cases"
-    assert f"simulate {own / '09_wet_160_4.2_wsp'} " in anywhere("simulate", "--help").stdout
+    assert f"simulate {min(own.iterdir())} " in anywhere("simulate", "--help").stdout
 
 
 def test_messages_of_the_wheel_name_only_what_it_has(anywhere) -> None:

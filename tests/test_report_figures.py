@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 
 from workbench.case import Case
 from workbench.observers import choose
-from workbench.report import case_figure, summarise, write_estimates, write_page
+from workbench.report import case_figure, summarise_runs, write_estimates, write_page
 from workbench.report.drawing import extremes
 from workbench.report.figures import DARK, LIGHT
 from workbench.report.page import standings
@@ -84,7 +84,7 @@ def uncertain(dry_case: Case, system: System) -> CaseResult:
 
 def write(result: CaseResult, path: Path, planned: int) -> Any:
     """A page of one case."""
-    summary = summarise(result.system, [result], PROVENANCE)
+    summary = summarise_runs(result.system, [result], PROVENANCE)
     write_page(result.system, summary, [case_figure(result)], planned, path)
     return lxml.html.fromstring(path.read_bytes())
 

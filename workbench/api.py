@@ -31,7 +31,7 @@ from workbench.recording import header
 from workbench.system import OBSERVER, System
 from workbench.systems import load_system, open_model
 from workbench.tables import Table
-from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, prepare
+from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, pose
 from workbench.tuning import tune as tune_problem
 from workbench.units import si_factor
 
@@ -145,7 +145,7 @@ def tune(
     -------
     Tuned, or None if it was interrupted before there was anything to return.
     """
-    problem = prepare(system, estimator, cases)
+    problem = pose(system, estimator, cases)
     plan = Plan(generations, population, seed)
     with (
         tempfile.TemporaryDirectory(prefix="tune-") as scratch,

@@ -95,7 +95,7 @@ class Description:
 
         Parameters
         ----------
-        names : new names and the FMU's own, such as {"pB": "brakePressure"}.
+        names : new names and the FMU's own, such as {"p": "pressure"}.
 
         Raises
         ------

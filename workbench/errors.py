@@ -38,9 +38,9 @@ def closest(name: str, names: Iterable[str]) -> str:
 
     Examples
     --------
-    >>> closest("omega_w", ["time", "omegaW"])
-    " (closest: 'omegaW')"
-    >>> closest("torque", ["time", "omegaW"])
+    >>> closest("presure", ["time", "pressure"])
+    " (closest: 'pressure')"
+    >>> closest("torque", ["time", "pressure"])
     ''
     """
     folded = {other.casefold(): other for other in names}

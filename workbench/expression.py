@@ -45,11 +45,11 @@ class Expression:
 
     Examples
     --------
-    >>> slip = Expression("rR*omegaR - rW*omegaW", "system.toml")
-    >>> slip({"rR": 0.7, "omegaR": 10.0, "rW": 0.5, "omegaW": 13.0})
-    0.5
-    >>> sorted(slip.names)
-    ['omegaR', 'omegaW', 'rR', 'rW']
+    >>> stored = Expression("inflow - c*sqrt(2*level)", "system.toml")
+    >>> stored({"inflow": 0.5, "c": 0.125, "level": 2.0})
+    0.25
+    >>> sorted(stored.names)
+    ['c', 'inflow', 'level']
     """
 
     text: str

@@ -1,14 +1,12 @@
-"""An FMU under an observer's control, stage 2: with `description` the only files that know FMPy.
+"""An FMU under an observer's control, stage 2.
 
 The extended-FMI pattern of Brembeck et al. (2014): set and read continuous states, evaluate
 derivatives, linearise, step, save and roll back. Standard Model Exchange offers all of it except
-the step, which is done here: linearly implicit, because the slip mode of a wheelset has time
-constants from milliseconds at speed to microseconds at standstill.
+the step, which is done here: linearly implicit, because machines have
+motions of microseconds beside those of seconds.
 """
 
 import ctypes
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,41 +14,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import fmpy
 import numpy as np
-from fmpy import fmi2, fmi3
-from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
 from workbench.errors import FMUError, InputError, closest
+from workbench.loaded import Loaded
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-_FUNCTIONS = {
-    "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
-    "set_states": {"2.0": "fmi2SetContinuousStates", "3.0": "fmi3SetContinuousStates"},
-    "get_states": {"2.0": "fmi2GetContinuousStates", "3.0": "fmi3GetContinuousStates"},
-    "derivatives": {"2.0": "fmi2GetDerivatives", "3.0": "fmi3GetContinuousStateDerivatives"},
-    "set": {"2.0": "fmi2SetReal", "3.0": "fmi3SetFloat64"},
-    "get": {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"},
-    "directional": {"2.0": "fmi2GetDirectionalDerivative", "3.0": "fmi3GetDirectionalDerivative"},
-    "do_step": {"2.0": "fmi2DoStep", "3.0": "fmi3DoStep"},
-    "save": {"2.0": "fmi2GetFMUstate", "3.0": "fmi3GetFMUState"},
-    "restore": {"2.0": "fmi2SetFMUstate", "3.0": "fmi3SetFMUState"},
-    "release": {"2.0": "fmi2FreeFMUstate", "3.0": "fmi3FreeFMUState"},
-    "size": {"2.0": "fmi2SerializedFMUstateSize", "3.0": "fmi3SerializedFMUStateSize"},
-    "serialise": {"2.0": "fmi2SerializeFMUstate", "3.0": "fmi3SerializeFMUState"},
-    "deserialise": {"2.0": "fmi2DeSerializeFMUstate", "3.0": "fmi3DeserializeFMUState"},
-}
-
-_CLASSES = {
-    (MODEL_EXCHANGE, "2.0"): fmi2.FMU2Model,
-    (MODEL_EXCHANGE, "3.0"): fmi3.FMU3Model,
-    (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
-    (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
-}
 
 
 @dataclass(frozen=True)
@@ -90,7 +62,7 @@ class FMU:
     Parameters
     ----------
     path : the FMU file.
-    names : names to use for variables that the FMU names otherwise, {"pB": "brakePressure"}.
+    names : names to use for variables that the FMU names otherwise, {"p": "pressure"}.
     parameters : values that differ from those of the model description, in the FMU's units.
 
     Attributes
@@ -141,46 +113,7 @@ class FMU:
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._state_variables = self.variables(self.states)
-        self._log: list[str] = []
-        self._folder = tempfile.mkdtemp(prefix="fmu-")
-        fmpy.extract(str(path), self._folder)
-        self._load(offered.identifier)
-
-    def _load(self, identifier: str) -> None:
-        """Load the library and make an instance."""
-        self._instance = _CLASSES[self.interface, self.version](
-            guid=self.description.token,
-            unzipDirectory=self._folder,
-            modelIdentifier=identifier,
-            instanceName=identifier,
-        )
-        dll = self._instance.dll
-        # A fresh pointer per function: FMPy's own carry argument types that cost conversions.
-        names = {use: function[self.version] for use, function in _FUNCTIONS.items()}
-        self._call = {use: dll[name] for use, name in names.items() if hasattr(dll, name)}
-        if "time" in self._call:
-            self._call["time"].argtypes = [ctypes.c_void_p, ctypes.c_double]
-        self._instantiate()
-
-    def _instantiate(self) -> None:
-        log = self._log
-
-        def note(*arguments: bytes | None) -> None:
-            log.append((arguments[-1] or b"").decode(errors="replace"))
-
-        try:
-            if self.version == "3.0":
-                self._instance.instantiate(logMessage=note)
-            else:
-                callbacks = fmi2.fmi2CallbackFunctions()
-                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
-                callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-                callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
-                self._instance.instantiate(callbacks=callbacks)
-        except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
-            raise FMUError(f"{self.path.name}: {error}: {self._logged()}") from None
-        self._component = ctypes.c_void_p(self._instance.component)
-        self._used = False
+        self._loaded = Loaded(self.description, self.interface)
 
     def __enter__(self) -> Self:
         return self
@@ -195,18 +128,11 @@ class FMU:
 
     def close(self) -> None:
         """Free the instance and the unpacked files."""
-        self._instance.freeInstance()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._loaded.close()
 
     def renew(self, *, reload: bool) -> None:
         """Free the instance and make a new one; with `reload` of a library loaded anew."""
-        if reload:
-            self._instance.freeInstance()
-            self._load(self._instance.modelIdentifier)
-            return
-        free = "fmi3FreeInstance" if self.version == "3.0" else "fmi2FreeInstance"
-        getattr(self._instance, free)(self._instance.component)
-        self._instantiate()
+        self._loaded.renew(reload=reload)
 
     # --- variables ---
 
@@ -244,12 +170,7 @@ class FMU:
         if not count.value:
             return
         tail = (count,) if self.version == "3.0" else ()
-        self._checked(use, references, count, values, *tail)
-
-    def _checked(self, use: str, *arguments: object) -> None:
-        status = self._call[use](self._component, *arguments)
-        if status > 1:
-            raise self.refusal(_FUNCTIONS[use][self.version], status)
+        self._loaded.call(use, references, count, values, *tail)
 
     @property
     def rate_references(self) -> NDArray[np.uint32]:
@@ -259,22 +180,15 @@ class FMU:
     @property
     def instance_address(self) -> int:
         """Address of the instance, for compiled loops that call the FMU's functions."""
-        return int(self._component.value or 0)
+        return self._loaded.address
 
     def function_address(self, use: str) -> int:
         """Address of the FMU's function for a use such as "get"; 0 if it has none."""
-        call = self._call.get(use)
-        return int(ctypes.cast(call, ctypes.c_void_p).value or 0) if call else 0
+        return self._loaded.function_address(use)
 
     def refusal(self, function: str, status: int) -> FMUError:
         """The error for a call that returned `status`, with what the FMU logged."""
-        name = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}.get(status, status)
-        return FMUError(f"{self.path.name}: {function} returned {name}: {self._logged()}")
-
-    def _logged(self) -> str:
-        text = "; ".join(self._log[-3:]) or "the FMU logged nothing"
-        self._log.clear()
-        return text
+        return self._loaded.refusal(function, status)
 
     # --- the extended-FMI pattern ---
 
@@ -290,30 +204,11 @@ class FMU:
         """
         given = {**self._given, **(parameters or {}), **states}
         variables = self.variables(list(given))
-        try:
-            if self._used:
-                self._instance.reset()
-            self._used = True
-            if self.version == "2.0":
-                self._instance.setupExperiment()
-            self.set(variables, np.array(list(given.values())))
-            self._instance.enterInitializationMode()
-            self._instance.exitInitializationMode()
-            self._begin()
-        except FMICallException as error:
-            raise self.refusal(error.function, error.status) from None
-
-    def _begin(self) -> None:
-        """Go from initialisation to the mode in which states are set and read."""
-        if self.version == "2.0":
-            self._instance.newDiscreteStates()
-        else:
-            self._instance.updateDiscreteStates()
-        self._instance.enterContinuousTimeMode()
+        self._loaded.start(lambda: self.set(variables, np.array(list(given.values()))))
 
     def set_time(self, t: float) -> None:
         """Set the time [s]."""
-        self._checked("time", t)
+        self._loaded.call("time", t)
 
     def set_states(self, x: Vector) -> None:
         """Set the continuous states, (n,)."""
@@ -332,7 +227,9 @@ class FMU:
 
     def _states(self, use: str, buffer: Vector) -> None:
         if buffer.size:
-            self._checked(use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size))
+            self._loaded.call(
+                use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size)
+            )
 
     def jacobian(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
         """Derivatives d(unknowns)/d(knowns), (rows, columns).
@@ -351,7 +248,7 @@ class FMU:
             size, one = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
             seeds, out = ctypes.c_void_p(seed.ctypes.data), ctypes.c_void_p(result[j].ctypes.data)
             tail = (seeds, one, out, size) if self.version == "3.0" else (seeds, out)
-            self._checked("directional", unknown, size, known, one, *tail)
+            self._loaded.call("directional", unknown, size, known, one, *tail)
         return result.T
 
     def _difference(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
@@ -401,7 +298,7 @@ class FMU:
         """Advance the states by h [s] with inputs as they are; returns the new states, (n,).
 
         Linearly implicit Euler, x + (I - h A)^-1 h f(x): L-stable, no iteration, and its result
-        lies on the linearised slow manifold, so that a stiff slip mode does not disturb the force.
+        lies on the linearised slow manifold, so that a stiff motion does not disturb the slow ones.
         Source: Hairer and Wanner (1996), Solving Ordinary Differential Equations II, IV.7.
         """
         x = self.get_states()
@@ -413,29 +310,29 @@ class FMU:
     def save(self) -> ctypes.c_void_p:
         """Save the complete state of the instance; hand it to `restore`, then to `release`."""
         saved = ctypes.c_void_p()
-        self._checked("save", ctypes.byref(saved))
+        self._loaded.call("save", ctypes.byref(saved))
         return saved
 
     def restore(self, saved: ctypes.c_void_p) -> None:
         """Roll the instance back to a saved state."""
-        self._checked("restore", saved)
+        self._loaded.call("restore", saved)
 
     def release(self, saved: ctypes.c_void_p) -> None:
         """Free a saved state."""
-        self._checked("release", ctypes.byref(saved))
+        self._loaded.call("release", ctypes.byref(saved))
 
     def serialise(self, saved: ctypes.c_void_p) -> bytes:
         """Turn a saved state into bytes, which outlive the instance."""
         size = ctypes.c_size_t()
-        self._checked("size", saved, ctypes.byref(size))
+        self._loaded.call("size", saved, ctypes.byref(size))
         buffer = ctypes.create_string_buffer(size.value)
-        self._checked("serialise", saved, buffer, size)
+        self._loaded.call("serialise", saved, buffer, size)
         return buffer.raw
 
     def deserialise(self, data: bytes) -> ctypes.c_void_p:
         """Turn bytes from any instance of this FMU back into a saved state."""
         saved = ctypes.c_void_p()
-        self._checked("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
+        self._loaded.call("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
         return saved
 
 
@@ -448,7 +345,11 @@ class CoSimulation(FMU):
 
     interface = CO_SIMULATION
 
-    def _begin(self) -> None:
+    def start(
+        self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
+    ) -> None:
+        """Reset and initialise at time 0; see `FMU.start`."""
+        super().start(states, parameters)
         self._t = 0.0
 
     def set_time(self, t: float) -> None:
@@ -464,7 +365,7 @@ class CoSimulation(FMU):
                 ctypes.byref(ctypes.c_double()),
             )
         # The zero: the state may be rolled back to before this point.
-        self._checked(
+        self._loaded.call(
             "do_step", ctypes.c_double(self._t), ctypes.c_double(h), ctypes.c_int(0), *tail
         )
         self._t += h

@@ -15,10 +15,25 @@ def system_files() -> dict[str, Path]:
     return {content.get("name", path.parent.name): path for path, content in _contents().items()}
 
 
+def built_models() -> dict[Path, list[str]]:
+    """Models whose FMUs come with the workbench: dotted names by library, its `package.mo`."""
+    found = {}
+    for path, content in _contents().items():
+        models = content["models"].values()
+        built = [one["class"] for one in models if _is_kept(path.parent / one.get("fmu", ""))]
+        if built:
+            found[path.with_name("package.mo")] = [f"{path.parent.name}.{one}" for one in built]
+    return found
+
+
 def companions() -> list[str]:
     """Python packages that these systems bring along."""
     found = (content.get("companion") for content in _contents().values())
     return [name for name in found if name]
+
+
+def _is_kept(fmu: Path) -> bool:
+    return fmu.resolve().is_relative_to(resources.fmus())
 
 
 @cache

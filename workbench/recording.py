@@ -78,8 +78,8 @@ def read_text(path: Path, remedy: str) -> str:
 def header(cell: str) -> tuple[str, str | None]:
     """Name and unit of a column, None without one.
 
-    >>> header("pB [kPa]")
-    ('pB', 'kPa')
+    >>> header("pressure [kPa]")
+    ('pressure', 'kPa')
     """
     match = _HEADER_CELL.fullmatch(cell.strip())
     return (match["name"], match["unit"] or None) if match else (cell, None)

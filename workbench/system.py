@@ -38,7 +38,9 @@ from workbench.system_parts import (
 )
 
 __all__ = [
+    "FULL",
     "OBSERVER",
+    "REFERENCE",
     "Channel",
     "Comparison",
     "Condition",
@@ -64,6 +66,8 @@ __all__ = [
 ]
 
 OBSERVER = "observer"  # the role of the model that every system has
+FULL = "full"  # of one with more states, where there is one
+REFERENCE = "reference"  # of the most detailed one, which a package connects an observer to
 
 
 @dataclass(frozen=True)

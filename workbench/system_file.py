@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from workbench.description import Description, read_description
-from workbench.errors import InputError, closest
+from workbench.errors import InputError
 from workbench.system import OBSERVER, System
-from workbench.system_parts import Comparison, Model, Objective, OperatingPoint
+from workbench.system_check import check_model, check_references
+from workbench.system_parts import Comparison, Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     read_comparison,
-    read_conditions,
+    read_condition_kinds,
     read_derived,
     read_estimated,
     read_export,
@@ -24,9 +24,9 @@ from workbench.system_tables import (
     read_point,
     read_rolling,
     read_view,
+    within,
 )
 from workbench.tables import Table, read_table
-from workbench.units import si_factor
 
 
 def read_system(path: Path) -> System:
@@ -43,10 +43,7 @@ def read_system(path: Path) -> System:
         "estimated states feedback points conditions objective tuning diagnosis figures "
         "export shortest sample_time cases"
     )
-    system = _signals(file, path)
-    system = _placed(file, with_model(system, OBSERVER, system.models[OBSERVER].path))
-    _check_names(system)
-    return system
+    return _read(file, path, _models(file, path))
 
 
 def with_built(system: System, paths: Mapping[str, Path]) -> System:
@@ -62,10 +59,16 @@ def with_built(system: System, paths: Mapping[str, Path]) -> System:
         role: replace(model, path=paths.get(role, model.path))
         for role, model in system.models.items()
     }
-    again = _signals(file, system.source, built)
-    again = _placed(file, with_model(again, OBSERVER, again.models[OBSERVER].path))
-    _check_names(again)
-    return again
+    return _read(file, system.source, built)
+
+
+def _read(file: Table, path: Path, models: Mapping[str, Model]) -> System:
+    system = _signals(file, path, models)
+    model = models[OBSERVER].path
+    system = _placed(file, with_model(system, OBSERVER, model))
+    if model is not None:
+        check_references(system, read_description(model))
+    return system
 
 
 def with_model(system: System, role: str, path: Path | None) -> System:
@@ -93,64 +96,10 @@ def _values(description: Description) -> dict[str, float]:
     return {v.name: float(v.start) for v in description.variables if v.real and v.start is not None}
 
 
-def check_model(system: System, model: Description) -> None:
-    """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
-
-    Raises
-    ------
-    InputError
-        If it lacks a variable of the system, has a parameter without a value, or another unit.
-    """
-    variables = {v.name: v for v in model.variables}
-    for ours, unit in system.variables.items():
-        theirs = system.names.get(ours, ours)
-        where = f"{model.path}, variable '{theirs}'"
-        if ours not in variables:
-            raise InputError(
-                where=str(model.path),
-                found=f"no variable '{ours}'{closest(ours, variables)}",
-                expected=f"one for '{ours}' of {system.source}",
-                remedy=f"use an FMU that has it, or map its name: --map {ours}=NAME",
-            )
-        needs_value = ours in system.constants or any(q.name == ours for q in system.estimated)
-        if needs_value and variables[ours].start is None:
-            raise InputError(
-                where=where,
-                found="no start value",
-                expected=f"a parameter with a value for {ours}",
-                remedy=f"make it a parameter of the model, or map another: --map {ours}=NAME",
-            )
-        declared = variables[ours].unit
-        if declared and unit not in ("1", "") and si_factor(declared, unit, where) != 1.0:
-            raise InputError(
-                where=where,
-                found=f"unit [{declared}]",
-                expected=f"[{unit}] for {ours}; nothing is converted silently",
-                remedy=f"export the model with this variable in {unit}",
-            )
-    for name in system.given:
-        if name not in model.names("parameter"):
-            raise InputError(
-                where=f"{system.source}, [parameters] {name}",
-                found="no such parameter of the model",
-                expected=f"a parameter of {model.name}{closest(name, model.names('parameter'))}",
-                remedy="correct the name",
-            )
-
-
-def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) -> System:
-    """The system without what its model must be known for.
-
-    Parameters
-    ----------
-    built : models in place of those that the file names.
-    """
-    models = dict(built or {}) or {
-        role: read_model(
-            Table(file.table("models").take(role, dict), f"{path}, [models] {role}"), path
-        )
-        for role in file.table("models").content
-    }
+def _models(file: Table, path: Path) -> dict[str, Model]:
+    """Models by role."""
+    roles = file.table("models").content
+    models = {role: read_model(within(file, "models", role), path) for role in roles}
     if OBSERVER not in models:
         raise InputError(
             where=f"{path}, [models]",
@@ -158,19 +107,29 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
             expected=f"a model in the role '{OBSERVER}', which estimators run on",
             remedy=f'add {OBSERVER} = {{ class = "NAME" }}',
         )
-    description = None
-    if (fmu := models[OBSERVER].path) is not None:
-        description = read_description(fmu)
-    units = {v.name: v.unit or "1" for v in description.variables} if description else {}
+    return models
+
+
+def _measured(file: Table) -> dict[str, tuple[Signal, ...]]:
+    """Measured signals by group."""
     groups = {group: read_measured(file, group) for group in ("inputs", "outputs", "judged")}
     for group in ("inputs", "outputs"):
         if not groups[group]:
             raise InputError(
-                where=str(path),
+                where=file.where,
                 found=f"no [{group}]",
                 expected="measured inputs, which drive the model, and outputs, which correct it",
                 remedy=f"add a table [{group}.NAME] for each",
             )
+    return groups
+
+
+def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
+    """The system without what its model must be known for."""
+    fmu = models[OBSERVER].path
+    description = read_description(fmu) if fmu is not None else None
+    units = {v.name: v.unit or "1" for v in description.variables} if description else {}
+    groups = _measured(file)
     # Units are known when the model is.
     parameters = file.table("parameters") if description else Table({}, "")
     states = file if description else Table({}, "")
@@ -191,7 +150,7 @@ def _signals(file: Table, path: Path, built: Mapping[str, Model] | None = None) 
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
         reported={name: units.get(name, "1") for name in file.texts("reported")},
-        conditions=read_conditions(file.table("conditions")),
+        conditions=read_condition_kinds(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
         objective=Objective("", {}, 0.0, None, None, ""),
@@ -224,40 +183,3 @@ def _placed(file: Table, system: System) -> System:
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),
     )
-
-
-def _check_names(system: System) -> None:
-    """Refuse formulas and tables that name what neither model nor recordings have."""
-    known = {*system.signals, *(one.name for one in system.derived), *system.values}
-    formulas = [
-        *(one.formula for one in system.derived),
-        *(one.formula for one in system.comparison.channels),
-        *(one.formula for one in system.comparison.exclusions),
-        *(one.formula for one in system.comparison.influences),
-    ]
-    for formula in formulas if system.values else ():
-        for name in formula.names - known:
-            raise InputError(
-                where=formula.where,
-                found=f"'{name}'{closest(name, known)}",
-                expected="a measured or derived signal, or a parameter of the model",
-                remedy="correct the name",
-            )
-    tables: Mapping[str, Mapping[str, Any]] = {
-        "diagnosis.tolerances": system.comparison.tolerances,
-        "diagnosis.levels": system.comparison.levels,
-        **{
-            f"conditions.{one.name}.parameters": choice
-            for one in system.conditions
-            for choice in one.parameters.values()
-        },
-    }
-    for table, entries in tables.items() if system.values else ():
-        for name in entries:
-            if name not in system.values:
-                raise InputError(
-                    where=f"{system.source}, [{table}] {name}",
-                    found=f"no such parameter of the model{closest(name, system.values)}",
-                    expected=f"a parameter of {system.models[OBSERVER].name}",
-                    remedy="correct the name",
-                )

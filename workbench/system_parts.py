@@ -323,7 +323,7 @@ class Exclusion:
     reason : for people.
     formula : in measured signals and parameters.
     above, below : a level of its absolute value, infinite for none.
-    from_rest : whether it counts from its median before the brake is applied.
+    from_rest : whether it counts from its median before the input is applied.
     within : [s] around such samples that do not count either.
     smoothed : [s] over which the formula is averaged.
     only_while : and only while a signal is above a level, or None.

@@ -76,9 +76,8 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
             "unit shown label noise relative_noise relative_error scale scale_error reading "
             "mode smoothed held"
         )
-        unit = table.take("unit", str)
+        unit = table.unit("unit")
         shown = table.text("shown", unit)
-        si_factor(unit, unit, f"{table.where} unit")
         si_factor(shown, unit, f"{table.where} shown")
         relative = table.number("relative_noise", "1", 0.0)
         found.append(
@@ -116,7 +115,7 @@ def read_derived(table: Table) -> tuple[Derived, ...]:
         own = Table(table.take(name, dict), f"{table.where} {name}")
         own.refuse_unknown("is unit label")
         formula = Expression(own.take("is", str), f"{own.where} is")
-        found.append(Derived(name, own.take("unit", str), own.text("label", name), formula))
+        found.append(Derived(name, own.unit("unit"), own.text("label", name), formula))
     return tuple(found)
 
 
@@ -128,7 +127,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
         own.refuse_unknown(
             "correction label unit range prior walk spread memory useful acts_on claimed"
         )
-        unit = own.text("unit", "1")
+        unit = own.unit("unit", "1")
         low, high = own.numbers("range", unit, 2)
         if not low < high:
             raise own.wrong("range", "[low, high]")
@@ -156,7 +155,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
     return tuple(found)
 
 
-def read_conditions(table: Table) -> tuple[Condition, ...]:
+def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     """Conditions, and the parameters that they mean."""
     found = []
     for name in table.content:
@@ -178,7 +177,7 @@ def read_conditions(table: Table) -> tuple[Condition, ...]:
             Condition(
                 name=name,
                 label=own.text("label", name),
-                unit=own.text("unit", ""),
+                unit="" if choices else own.unit("unit"),
                 least=own.number("above", "1", own.number("least", "1", -math.inf)),
                 exclusive="above" in own,
                 choices=tuple(choices),
@@ -345,7 +344,7 @@ def read_influences(table: Table) -> tuple[Influence, ...]:
         if way not in _WAYS:
             raise own.wrong("way", f"one of {', '.join(_WAYS)}")
         formula = Expression(own.take("is", str), f"{own.where} is")
-        found.append(Influence(name, own.take("unit", str), formula, way))
+        found.append(Influence(name, own.unit("unit"), formula, way))
     return tuple(found)
 
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from workbench.errors import InputError, closest
 from workbench.recording import read_text
-from workbench.units import quantity
+from workbench.units import check_unit, quantity
 
 _T = TypeVar("_T")
 _KINDS = {
@@ -59,6 +59,12 @@ class Table:
     def text(self, key: str, default: str) -> str:
         """A text, or the default where there is none."""
         return self.take(key, str) if key in self.content else default
+
+    def unit(self, key: str, default: str | None = None) -> str:
+        """A unit; it must be there unless there is a default."""
+        unit = self.take(key, str) if default is None else self.text(key, default)
+        check_unit(unit, f"{self.where} {key}")
+        return unit
 
     def table(self, key: str) -> "Table":
         """A table within; empty where there is none."""

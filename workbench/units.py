@@ -88,17 +88,12 @@ def si_factor(unit: str, si: str, where: str) -> float:
     """
     if unit == si:
         return 1.0
-    registry = _units()
     remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
-    try:
-        parsed = registry.parse_units(_spelled(unit)) if _UNIT.fullmatch(unit) else None
-        expected = registry.parse_units(_spelled(si))
-    except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
-        parsed = None
-    if parsed is None:
+    parsed, expected = _parsed(unit), _parsed(si)
+    if parsed is None or expected is None:
         found = f"unknown unit [{unit}]"
     elif parsed.is_compatible_with(expected):
-        return float(registry.Quantity(1.0, parsed).to(expected).magnitude)
+        return float(_units().Quantity(1.0, parsed).to(expected).magnitude)
     elif si == "rad/s" and parsed.is_compatible_with("Hz"):
         found = f"[{unit}], which leaves open whether it counts revolutions or radians"
     else:
@@ -106,6 +101,23 @@ def si_factor(unit: str, si: str, where: str) -> float:
     raise InputError(
         where=where, found=found, expected=f"a unit such as {_EXAMPLES.get(si, si)}", remedy=remedy
     )
+
+
+def check_unit(unit: str, where: str) -> None:
+    """Refuse a text that is no unit; 1 is that of a number.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown.
+    """
+    if unit != "1" and _parsed(unit) is None:
+        raise InputError(
+            where=where,
+            found=f"unknown unit [{unit}]",
+            expected="a unit as Modelica writes it, such as Pa, N.m, rad/s, kg.m2, or 1 for none",
+            remedy="correct the unit (case matters)",
+        )
 
 
 def quotient(unit: str, divisor: str) -> str:
@@ -127,6 +139,16 @@ def quotient(unit: str, divisor: str) -> str:
     if not below:
         return whole
     return f"{whole}/({'.'.join(sorted(below))})" if len(below) > 1 else f"{whole}/{below[0]}"
+
+
+def _parsed(unit: str) -> "pint.Unit | None":
+    """A unit, or None if it is none."""
+    if unit == "1":
+        return _units().Unit("")
+    try:
+        return _units().parse_units(_spelled(unit)) if _UNIT.fullmatch(unit) else None
+    except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
+        return None
 
 
 def _spelled(unit: str) -> str:

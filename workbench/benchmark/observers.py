@@ -20,7 +20,7 @@ from workbench.case import Case
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimator, choose
 from workbench.pool import Pool
-from workbench.system import OBSERVER, System
+from workbench.system import FULL, OBSERVER, System
 from workbench.systems import open_model
 
 RATES = (200.0, 1000.0, 5000.0)  # Hz
@@ -31,7 +31,6 @@ _FEW = 3  # where one run is long
 _FMPY_STEPS = 1500
 _PROCESSES = 2
 _PROCESS_REPEATS = 5
-_FULL = "full"  # role of a larger model
 
 Samples = tuple[Vector, Matrix, Matrix]
 
@@ -129,8 +128,8 @@ def time_observers(case: Case, system: System) -> list[ObserverTimes]:
                 plain = by_c(one.name, one.fmu, system, one.gains)
                 times.append(_time(case, one, loop, plain))
     larger = [name for name, kind in kinds.items() if kind.role == OBSERVER]
-    if _FULL in system.models and larger:
-        with opened(system, larger, _FULL) as estimators:
+    if FULL in system.models and larger:
+        with opened(system, larger, FULL) as estimators:
             times += [_time(case, one, None, None) for one in estimators]
     return times
 

@@ -7,23 +7,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeAlias
 
+from workbench import resources
 from workbench.case import Case, check_names, read_cases
 from workbench.errors import InputError
 from workbench.installed import system_files
-from workbench.resources import CHECKOUT, fmus, modelica
-from workbench.system import OBSERVER, System
+from workbench.system import FULL, OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-
-SYSTEM = "wheelset"  # unless another is asked for
-FULL = "full"  # role of a model that has more states than an observer corrects
-
-MINIMAL_OBSERVER = fmus() / "fmi2" / "MinimalObserver.fmu"
-FULL_OBSERVER = fmus() / "fmi2" / "FullObserver.fmu"
-REFERENCE = fmus() / "fmi2" / "Reference.fmu"
-LIBRARY = modelica() / "WheelsetRig" / "package.mo"
 
 
 def nearby(path: Path) -> Path:
@@ -67,6 +59,11 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         metavar="DIR",
         help="where to write (default: %(default)s)",
     )
+
+
+def example_case() -> Path:
+    """The first of the cases that come with the package, for the examples of a command's help."""
+    return nearby(min(resources.cases().iterdir()))
 
 
 def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
@@ -169,7 +166,7 @@ def model_names(
 
 def installing(extra: str) -> str:
     """Say how an extra is installed: in a checkout with the versions that it pins."""
-    if CHECKOUT is None:
+    if resources.CHECKOUT is None:
         return f"pip install 'wheelset-workbench[{extra}]'"
     return f"pip install -e '.[{extra}]' -c constraints.txt"
 

@@ -6,14 +6,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.case import read_cases
-from workbench.commands.arguments import Commands, add_system, require_compiler
+import numpy as np
+
+from workbench.benchmark.calls import points
+from workbench.commands.arguments import Commands, add_system, given_cases, require_compiler
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
-from workbench.description import read_description
 from workbench.files import write_json
-from workbench.resources import cases as own_cases
-from workbench.systems import load_system
+from workbench.system import System
+from workbench.systems import load_system, open_model
 
 if TYPE_CHECKING:
     from workbench.compiler.benchmark import CallTimes
@@ -39,26 +40,20 @@ def add(commands: Commands) -> None:
         "--cases",
         nargs="+",
         type=Path,
-        default=[own_cases()],
+        default=[],
         metavar="CASE",
-        help="recordings that observers and tuning are timed on (default: the package's own)",
+        help="recordings that observers and tuning are timed on (default: those of the system)",
     )
     bench.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     require_compiler()
-    from workbench.compiler.benchmark import time_calls
-
     system = load_system(options.system)
-    cases = read_cases(options.cases, system)
+    cases = given_cases(options.cases, system)
     case = cases[min(_CASE, len(cases) - 1)]
-    calls = {
-        model.name: time_calls(read_description(model.path), _SEED)
-        for model in system.models.values()
-        if model.path is not None
-    }
-    print(_format_calls(calls))
+    calls = _time_models(system)
+    print(_format_calls(calls, system.sample_time))
     observers = bench_observers(system, cases, case)
     tuning = bench_tuning(system, cases, case)
     if options.json:
@@ -81,7 +76,19 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _format_calls(calls: "dict[str, CallTimes]") -> str:
+def _time_models(system: System) -> "dict[str, CallTimes]":
+    """Time calls into the models of all roles."""
+    from workbench.compiler.benchmark import time_sources
+
+    calls = {}
+    for role, model in system.models.items():
+        with open_model(system, role) as fmu:
+            at = points(fmu, system, np.random.default_rng(_SEED))
+            calls[model.name] = time_sources(fmu.description, at, system.sample_time)
+    return calls
+
+
+def _format_calls(calls: "dict[str, CallTimes]", step: float) -> str:
     lines = [
         "derivatives: one C call (plain); setting states and inputs, getting derivatives (FMI)",
         "jacobian: full matrix d[der(x), w]/d[x, u] from one C call for its nonzeros (plain);",
@@ -97,5 +104,6 @@ def _format_calls(calls: "dict[str, CallTimes]") -> str:
             spent = f"{1e9 * plain:>6.0f} ns {1e9 * through:>6.0f} ns"
             lines.append(f"{name:<16} {kind:<12} {spent}  {ratios[kind]:5.2f}")
     for name, times in calls.items():
-        lines.append(f"{name:<16} {1.0 / times.step:>9.0f} Co-Simulation steps of 5 ms per second")
+        rate = f"Co-Simulation steps of {1e3 * step:g} ms per second"
+        lines.append(f"{name:<16} {1.0 / times.step:>9.0f} {rate}")
     return "\n".join(lines)

@@ -12,7 +12,7 @@ from workbench.errors import InputError, closest
 from workbench.files import write_json, write_whole
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.gains_file import read_gains, tuned_file
-from workbench.system import System
+from workbench.system import REFERENCE, System
 from workbench.systems import load_system, model_path, open_model
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def _export(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     kind, gains, source = _gains(system, options.estimator, options.gains)
     observer = ObserverModel(system, kind, gains, source.read_text(encoding="utf-8"))
-    reference: Path = options.reference or model_path(system, "reference")
+    reference: Path = options.reference or model_path(system, REFERENCE)
     name = observer.model.rpartition(".")[2]
     with tempfile.TemporaryDirectory() as scratch:
 

@@ -4,18 +4,12 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from workbench.commands.arguments import (
-    LIBRARY,
-    MINIMAL_OBSERVER,
-    Commands,
-    nearby,
-    positive,
-    require_compiler,
-)
+from workbench.commands.arguments import Commands, nearby, positive, require_compiler
 from workbench.description import Description, read_description
 from workbench.errors import InputError
 from workbench.files import write_json
 from workbench.fitness import Finding, check, is_fit
+from workbench.installed import built_models
 from workbench.resources import CHECKOUT, fmus
 
 _OMC = Path("build/omc")
@@ -43,13 +37,7 @@ def _add_build(jobs: Commands) -> None:
         "  python -m workbench fmu build --all --compiler omc",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    build.add_argument(
-        "package",
-        nargs="?",
-        type=Path,
-        default=nearby(LIBRARY),
-        help="package.mo (default: %(default)s)",
-    )
+    build.add_argument("package", nargs="?", type=Path, help="package.mo of the library")
     build.add_argument("model", nargs="?", help="dotted name of the model")
     build.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
     build.add_argument(
@@ -64,7 +52,11 @@ def _add_build(jobs: Commands) -> None:
         metavar="FILE",
         help="FMU to write (default: MODEL.fmu); with omc a folder (default: build/omc)",
     )
-    build.add_argument("--all", action="store_true", help="every model of the package, into fmus/")
+    build.add_argument(
+        "--all",
+        action="store_true",
+        help="every model whose FMU comes with the package, into fmus/",
+    )
     build.add_argument("--check", action="store_true", help="with --all: compare, write nothing")
     build.set_defaults(run=_build)
 
@@ -74,7 +66,7 @@ def _add_info(jobs: Commands) -> None:
         "info",
         help="say what an FMU is and offers",
         description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
-        epilog=f"example:\n  python -m workbench fmu info {nearby(MINIMAL_OBSERVER)}",
+        epilog="example:\n  python -m workbench fmu info model.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
@@ -109,15 +101,22 @@ def _build(options: argparse.Namespace) -> int:
     require_compiler()
     from workbench import compiler  # an extra: everything else runs without it
 
+    if options.all and options.package:
+        raise InputError(
+            where="command line, --all",
+            found=f"a package, {options.package}",
+            expected="none: all are those whose FMUs come with the package",
+            remedy="leave one of the two out",
+        )
     if options.compiler == "omc":
         return _build_with_omc(options)
     if options.all and options.check:
-        found = compiler.differences(options.package, fmus())
+        found = compiler.differences(built_models(), fmus())
         print("\n".join(found) or f"{nearby(fmus())} matches its sources")
         return 1 if found else 0
     if options.all:
         _require_checkout()
-        for built in compiler.build_all(options.package, nearby(fmus())):
+        for built in compiler.build_all(built_models(), nearby(fmus())):
             print(f"{built.path}  {built.sha256}")
         return 0
     _require_model(options)
@@ -128,7 +127,6 @@ def _build(options: argparse.Namespace) -> int:
 
 
 def _build_with_omc(options: argparse.Namespace) -> int:
-    from workbench.compiler import MODELS
     from workbench.compiler.openmodelica import build_with_omc
 
     if options.fmi != 2 or options.check:
@@ -138,13 +136,12 @@ def _build_with_omc(options: argparse.Namespace) -> int:
             expected="FMI 2.0, built, not compared: OpenModelica has no more",
             remedy="leave the option out",
         )
-    models = [options.model]
-    if options.all:
-        models = [f"{options.package.parent.name}.{model}" for model in MODELS]
-    else:
+    if not options.all:
         _require_model(options)
-    for path in build_with_omc(options.package, models, options.out or _OMC):
-        print(path)
+    jobs = built_models() if options.all else {options.package: [options.model]}
+    for package, models in jobs.items():
+        for path in build_with_omc(package, models, options.out or _OMC):
+            print(path)
     return 0
 
 

@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 
-from workbench import resources
 from workbench.case import Case
 from workbench.commands.arguments import (
-    FULL,
     Commands,
     add_models,
     add_recordings,
     add_system,
     chosen_system,
-    nearby,
+    example_case,
     positive,
     show_progress,
 )
@@ -30,13 +28,13 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
-from workbench.system import OBSERVER, System
+from workbench.system import FULL, OBSERVER, System
 from workbench.systems import open_model
 
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
-    own = nearby(resources.cases())
+    own = example_case()
     observability = commands.add_parser(
         "observability",
         description="Show what the measured outputs can tell: a linear test of the observer "
@@ -44,7 +42,7 @@ def add(commands: Commands) -> None:
         "quantities (Cramer-Rao bound). Writes windows (CSV), observability.json and figures.",
         epilog="examples:\n"
         "  python -m workbench observability\n"
-        f"  python -m workbench observability {own}/01_dry_80_1.5 --out /tmp/one\n"
+        f"  python -m workbench observability {own} --out /tmp/one\n"
         "  python -m workbench observability my_cases --system my/system.toml",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -32,7 +32,7 @@ from workbench.report.power_checks import (
     write_sheet,
     write_thresholds,
 )
-from workbench.system import System
+from workbench.system import REFERENCE, System
 from workbench.systems import load_system, model_path
 
 
@@ -129,7 +129,7 @@ def _power(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     if options.library:
         system = replace(system, library=options.library)
-    reference = options.fmu or model_path(system, "reference")
+    reference = options.fmu or model_path(system, REFERENCE)
     rig = open_virtual_rig(system, options.case, reference)
     effects = library_effects(system)
     run = {"thresholds": _thresholds, "sheet_error": _sheet_error}.get(options.check, _usual)

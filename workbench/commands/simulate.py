@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from workbench import resources
 from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
@@ -16,7 +15,7 @@ from workbench.commands.arguments import (
     add_recordings,
     add_system,
     chosen_system,
-    nearby,
+    example_case,
     positive,
     show_progress,
 )
@@ -28,7 +27,7 @@ from workbench.report import (
     case_figure,
     draw_case,
     format_table,
-    summarise,
+    summarise_runs,
     write_estimates,
     write_page,
 )
@@ -38,17 +37,17 @@ from workbench.system import OBSERVER
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
-    own = nearby(resources.cases())
+    own = example_case()
     parser = commands.add_parser(
         "simulate",
         description="Run all estimators on recordings; write a page to read (index.html), and "
         "beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"
         "  python -m workbench simulate\n"
-        f"  python -m workbench simulate {own}/01_dry_80_1.5 --out /tmp/one\n"
+        f"  python -m workbench simulate {own} --out /tmp/one\n"
         "  python -m workbench simulate my_cases --system my/system.toml\n"
         "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        f"  python -m workbench simulate {own}/01_dry_80_1.5 --live\n"
+        f"  python -m workbench simulate {own} --live\n"
         "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -113,7 +112,7 @@ def _simulate(options: argparse.Namespace) -> int:
         print("interrupted", flush=True)
     if done:
         done.sort(key=lambda result: result.case.name)
-        summary = summarise(system, done, provenance)
+        summary = summarise_runs(system, done, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(system, summary, [case_figure(result) for result in done], len(cases), page)

@@ -41,8 +41,8 @@ from workbench.tuning import (
     draw_cases,
     draw_convergence,
     evaluators,
-    prepare,
-    summarise,
+    pose,
+    summarise_tuning,
     tunable,
     tune,
     tuned_gains,
@@ -181,7 +181,7 @@ def _tune(options: argparse.Namespace) -> int:
     if options.scale_error is not None:
         share = options.scale_error / 100.0
         errors = {one.name: share for one in system.outputs if one.scale_error and share}
-    problem = prepare(system, options.estimator, cases, errors)
+    problem = pose(system, options.estimator, cases, errors)
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     print(
@@ -200,7 +200,7 @@ def _tune(options: argparse.Namespace) -> int:
     if tuned is None:
         print("interrupted before the first generation was evaluated; nothing is written")
         return 130
-    summary = summarise(tuned, options.folds)
+    summary = summarise_tuning(tuned, options.folds)
     if not (progress.kept and _written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
         return 1
     draw_convergence(tuned.search.history, out / "convergence.png")

@@ -4,7 +4,7 @@ This package needs the extra `[compiler]`; running FMUs does not.
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -28,17 +28,19 @@ __all__ = [
     "source_hash",
 ]
 
-# What `fmus/` holds: every model in both versions of FMI.
-MODELS = ("Reference", "FullObserver", "MinimalObserver")
 FMI_VERSIONS = (2, 3)
 
 
-def source_hash(package: Path) -> str:
-    """SHA-256 over all Modelica files of the library and all files of the compiler."""
-    modelica = sorted(p for p in package.parent.rglob("*") if p.suffix in (".mo", ".order"))
-    compiler = sorted([*Path(__file__).parent.glob("*.py"), *RUNTIME.glob("*.[ch]")])
+def source_hash(*packages: Path) -> str:
+    """SHA-256 over all Modelica files of libraries and all files of the compiler."""
+    here = Path(__file__).parent
+    found = [
+        (root, sorted(p for p in root.rglob("*") if p.suffix in (".mo", ".order")))
+        for root in (package.parent for package in packages)
+    ]
+    found.append((here, sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")])))
     parts: list[str | bytes] = []
-    for root, files in ((package.parent, modelica), (Path(__file__).parent, compiler)):
+    for root, files in found:
         for file in files:
             parts += [file.relative_to(root).as_posix(), file.read_bytes()]
     return digest(parts)
@@ -81,22 +83,29 @@ def build(
     return assemble(make_explicit(flatten(package, model)), model, fmu, fmi, platforms)
 
 
-def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
-    """Build every model of `MODELS` for FMI 2.0 and 3.0 into `folder`, and its manifest.
+def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltFMU]:
+    """Build models for FMI 2.0 and 3.0 into `folder`, and their manifest.
 
     Files in `folder` change only when all of them have been built.
+
+    Parameters
+    ----------
+    models : dotted names by library, its `package.mo`.
     """
-    library = package.parent.name
     with tempfile.TemporaryDirectory() as scratch:
         built = [
             build(
-                package, f"{library}.{model}", Path(scratch) / f"fmi{fmi}" / f"{model}.fmu", fmi=fmi
+                package,
+                model,
+                Path(scratch) / f"fmi{fmi}" / f"{model.rpartition('.')[2]}.fmu",
+                fmi=fmi,
             )
             for fmi in FMI_VERSIONS
-            for model in MODELS
+            for package, names in models.items()
+            for model in names
         ]
         manifest = {
-            "source_sha256": source_hash(package),
+            "source_sha256": source_hash(*models),
             "compiler": {name: version(name) for name in ("rumoca", "casadi", "ziglang", "fmpy")},
             "fmus": {
                 b.path.relative_to(scratch).as_posix(): {
@@ -114,10 +123,15 @@ def build_all(package: Path, folder: Path) -> list[BuiltFMU]:
     return [replace(b, path=folder / b.path.relative_to(scratch)) for b in built]
 
 
-def differences(package: Path, folder: Path) -> list[str]:
-    """Build everything anew and compare with what `folder` holds; returns the differences."""
+def differences(models: Mapping[Path, Sequence[str]], folder: Path) -> list[str]:
+    """Build everything anew and compare with what `folder` holds; returns the differences.
+
+    Parameters
+    ----------
+    models : see `build_all`.
+    """
     with tempfile.TemporaryDirectory() as scratch:
-        build_all(package, Path(scratch))
+        build_all(models, Path(scratch))
         fresh = {p.relative_to(scratch): digest_file(p) for p in _files(Path(scratch))}
         held = {p.relative_to(folder): digest_file(p) for p in _files(folder)}
     return [

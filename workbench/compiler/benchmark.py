@@ -17,16 +17,10 @@ from workbench.description import Description
 from workbench.errors import InputError
 
 _PROGRAM = Path(__file__).parent / "bench.c"
-_POINTS = 64
 # Many short repeats: their median does not see that the machine does something else in between.
 _REPEATS = 201
 _REPEAT = 5e-4  # s, rough duration of one repeat of the derivatives
-_STEP = 0.005  # s, the sampling time of the recordings
 _STEPS = 100
-# Rolling at 28 m/s with a slip of a dry stop; noise per sample of the sensors that feed u.
-_SPEED, _SLIP = 28.0, 0.01  # m/s
-_WHEEL, _ROLLER = 0.46, 0.70  # m
-_INPUTS = {"pB": (2e5, 500.0), "tauR": (5e3, 40.0)}  # mean and noise: Pa, N.m
 
 
 @dataclass(frozen=True)
@@ -42,7 +36,7 @@ class CallTimes:
         put to places that are known beforehand.
     jacobian_fmi : the same matrix: states and inputs set, one fmi2GetDirectionalDerivative a
         column.
-    step : one Co-Simulation step of 5 ms, inputs with the noise of their sensors.
+    step : one Co-Simulation step, with other inputs than before.
     """
 
     states: int
@@ -62,22 +56,22 @@ class CallTimes:
         }
 
 
-def time_calls(description: Description, seed: int) -> CallTimes:
+def time_sources(description: Description, points: NDArray[np.float64], step: float) -> CallTimes:
     """Compile the sources of an FMI 2.0 FMU with the FMUs' own flags, and time them.
 
     Parameters
     ----------
     description : of an FMU with C sources.
-    seed : of the points at which the model is evaluated.
+    points : (p, n + m) states and inputs at which the model is evaluated, in its own order.
+    step : of Co-Simulation [s].
 
     Raises
     ------
     InputError
         If the FMU has no sources, or they do not compile or run.
     """
-    points = _points(description, np.random.default_rng(seed))
     evaluations = max(100, int(_REPEAT / (50e-9 * len(description.states))))
-    sizes = f"{len(points)} {evaluations} {_REPEATS} {_STEPS} {_STEP}"
+    sizes = f"{len(points)} {evaluations} {_REPEATS} {_STEPS} {step}"
     lines = [sizes, *(" ".join(map(repr, point)) for point in points.tolist())]
     with tempfile.TemporaryDirectory() as scratch:
         program = _compile(description.path, Path(scratch))
@@ -94,22 +88,6 @@ def time_calls(description: Description, seed: int) -> CallTimes:
     rows = np.array([line.split() for line in run.stdout.splitlines()], float)
     inputs = len(description.names("input"))
     return CallTimes(len(description.states), inputs, *(1e-9 * np.median(rows, axis=0)).tolist())
-
-
-def _points(description: Description, rng: np.random.Generator) -> NDArray[np.float64]:
-    """States and inputs in braking, (points, n + m); what is not speed is near rest."""
-    columns = []
-    for name in description.states:
-        if name == "omegaR":
-            columns.append(np.full(_POINTS, _SPEED / _ROLLER))
-        elif name == "omegaW":
-            columns.append((_SPEED - 2 * _SLIP * rng.random(_POINTS)) / _WHEEL)
-        else:
-            columns.append(1e-6 * rng.standard_normal(_POINTS))
-    for name in description.names("input"):
-        mean, noise = _INPUTS.get(name, (0.0, 0.0))
-        columns.append(mean + noise * rng.standard_normal(_POINTS))
-    return np.column_stack(columns)
 
 
 def _compile(fmu: Path, folder: Path) -> Path:

@@ -11,7 +11,7 @@ import pint
 
 from workbench.compiler.ccode import GeneratedCode, identifier
 from workbench.compiler.explicit import StateSpace
-from workbench.compiler.flat import Variable
+from workbench.compiler.flat import FlatVariable
 from workbench.errors import InputError
 
 _REGISTRY: "pint.UnitRegistry[float]" = pint.UnitRegistry()
@@ -35,7 +35,7 @@ class _Entry:
     """A variable of the FMU; `row` and `column` are its places in the Jacobian, None if none."""
 
     name: str
-    variable: Variable
+    variable: FlatVariable
     unit: str | None
     causality: str
     variability: str
@@ -99,7 +99,7 @@ def _entries(model: StateSpace) -> list[_Entry]:
     n, m = len(model.states), len(model.inputs)
 
     def add(
-        variable: Variable,
+        variable: FlatVariable,
         causality: str,
         variability: str,
         initial: str | None,

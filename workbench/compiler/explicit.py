@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compiler.flat import FlatModel, Variable
+from workbench.compiler.flat import FlatModel, FlatVariable
 from workbench.errors import InputError
 
 # Share of the largest coefficient of its column below which an expression is no pivot.
@@ -49,11 +49,11 @@ class StateSpace:
     w: ca.SX
     assertions: ca.SX
     assertion_texts: list[str]
-    states: list[Variable]
-    inputs: list[Variable]
-    parameters: list[Variable]
+    states: list[FlatVariable]
+    inputs: list[FlatVariable]
+    parameters: list[FlatVariable]
     tunable: list[bool]
-    outputs: list[Variable]
+    outputs: list[FlatVariable]
     state_outputs: list[str]
 
 

@@ -24,7 +24,7 @@ SCHEMA = 43
 
 
 @dataclass(frozen=True)
-class Variable:
+class FlatVariable:
     """One scalar variable of the flat model.
 
     `symbol` stands for it in the equations; `unit`, `description`, `minimum`, `maximum` and
@@ -62,12 +62,12 @@ class FlatModel:
     description: str
     experiment: dict[str, float]
     time: ca.SX
-    states: list[Variable]
-    dependent: list[Variable]
+    states: list[FlatVariable]
+    dependent: list[FlatVariable]
     derivatives: list[ca.SX]
-    algebraic: list[Variable]
-    inputs: list[Variable]
-    parameters: list[Variable]
+    algebraic: list[FlatVariable]
+    inputs: list[FlatVariable]
+    parameters: list[FlatVariable]
     tunable: list[bool]
     outputs: list[str]
     equations: list[tuple[ca.SX, str]]
@@ -149,7 +149,7 @@ class _Reader:
                 self.arena.rates[number] = each(lambda s: ca.SX.sym(f"der({s.name()})"), symbol)
         free, bound = self._bind_parameters(entries)
         numeric = self._numbers(free, bound)
-        groups: dict[str, list[Variable]] = {"state": [], "dependent": [], "algebraic": []}
+        groups: dict[str, list[FlatVariable]] = {"state": [], "dependent": [], "algebraic": []}
         rates: dict[str, list[ca.SX]] = {"state": [], "dependent": []}
         inputs, outputs = [], []
         for number, entry in enumerate(entries):
@@ -257,7 +257,7 @@ class _Reader:
 
     def _scalars(
         self, number: int, entry: Mapping[str, Any], numeric: Callable[[ca.SX], float]
-    ) -> list[Variable]:
+    ) -> list[FlatVariable]:
         attributes = entry["attributes"]
         symbol = self.arena.symbols[number]
         key = "binding" if entry["role"] == "parameter" else "start"
@@ -279,7 +279,7 @@ class _Reader:
             strict=True,
         )
         return [
-            Variable(
+            FlatVariable(
                 name=s.name(),
                 symbol=s,
                 start=0.0 if start is None else start,

@@ -1,6 +1,6 @@
 """Modelica to FMU by OpenModelica, the second compiler, where it is installed.
 
-FMI 2.0 only. Its Co-Simulation is explicit Euler by default, which a stiff slip mode does not
+FMI 2.0 only. Its Co-Simulation is explicit Euler by default, which a stiff motion does not
 survive: CVODE is asked for. Directional derivatives have to be asked for, too. Source:
 OpenModelica User's Guide, chapter "FMI and TLM".
 """
@@ -92,13 +92,13 @@ def script(package: Path, model: str) -> str:
     )
 
 
-def errors(output: str) -> list[Message]:
+def errors_in(output: str) -> list[Message]:
     """Errors in what omc printed, in its order; warnings are left out.
 
     Examples
     --------
-    >>> errors("[/lib/Rig/package.mo:3:5-3:20:writable] Error: Class Foo not found in scope Rig.")
-    [Message(place='/lib/Rig/package.mo:3', text='Class Foo not found in scope Rig.')]
+    >>> errors_in("[/lib/A/package.mo:3:5-3:20:writable] Error: Class Foo not found in scope A.")
+    [Message(place='/lib/A/package.mo:3', text='Class Foo not found in scope A.')]
     """
     placed = [
         Message(f"{found['file']}:{found['line']}", found["text"].rstrip('"'))
@@ -122,7 +122,7 @@ def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
             [omc, *_OPTIONS, "build.mos"], cwd=scratch, capture_output=True, text=True, check=False
         )
         built = Path(scratch) / name
-        found = errors(run.stdout + run.stderr)
+        found = errors_in(run.stdout + run.stderr)
         if found or not built.is_file():
             said = (run.stdout + run.stderr).strip()[-500:]
             first = found[0] if found else Message("", said or "nothing printed")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, expm, solve_discrete_are
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers.contract import rolling_ratio
+from workbench.observers.layout import rolling_ratio
 from workbench.observers.operating import corrected_states, linearised
 from workbench.system import System
 

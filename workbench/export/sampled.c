@@ -92,9 +92,9 @@ static double reading(const Rosenbrock *r, double t, double follower, double lea
     return model_algebraics(t, x, u, p, w) != 0 ? NAN : w[sampled_zero];
 }
 
-/* Lets the follower roll where a step has reversed its slip close to standstill: what drives it is
- * saturated there at the least slip, and a tangent to that leads to the other side, and back in the
- * next step. `follower` and `leader` are their speeds before the step. */
+/* Lets the follower roll where a step has taken it past its leader close to standstill: what drives
+ * it is saturated there at the least lag, and a tangent to that leads to the other side, and back in
+ * the next step. `follower` and `leader` are their speeds before the step. */
 static void stick(Rosenbrock *r, double t, double follower, double leader, const double *u,
                   const double *p) {
     double *x = r->x;

@@ -2,17 +2,16 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, inlined, instance, read, set_inputs, set_states
+from workbench.kernel import checked, instance
 from workbench.observers.gains import Gains, SearchSpace
+from workbench.observers.layout import layout
 from workbench.system import OBSERVER, System
-from workbench.system_file import check_model
+from workbench.system_check import check_model
 
 
 @dataclass(frozen=True)
@@ -29,35 +28,6 @@ class Estimate:
     values: Vector | Matrix
     sigma: Vector | Matrix
     nis: Vector | float
-
-
-class Layout(NamedTuple):
-    """Where a law finds things in the model; the same for all laws.
-
-    Attributes
-    ----------
-    seen : (l,) index of the state that is an output, or -1 - index among the model's outputs.
-    nominal, low, high : (q,) nominal estimated quantities, and limits of their corrections.
-    acts_on : (q,) state whose rate shows a correction's effect, -1 for none.
-    pace : (l,) coefficients of the outputs in the signal with which feedback fades; half of it is
-        left at `half`, 0: it never fades.
-    follower, leader : states of which one rolls along with the other, -1 for none.
-    ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
-    reported : number of the model's outputs that estimates hold.
-    """
-
-    seen: NDArray[np.intp]
-    nominal: Vector
-    low: Vector
-    high: Vector
-    acts_on: NDArray[np.intp]
-    pace: Vector
-    half: float
-    follower: int
-    leader: int
-    ratio: float
-    lead: float
-    reported: int
 
 
 class Estimator(ABC):
@@ -83,7 +53,7 @@ class Estimator(ABC):
     adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
-    sticks : whether a follower rolls where a step would reverse its slip close to standstill.
+    sticks : whether a follower rolls where a step would take it past its leader near standstill.
 
     Raises
     ------
@@ -238,202 +208,3 @@ class Estimator(ABC):
     def _split(self, rows: Any) -> Estimate:
         width = self._row.size // 2
         return Estimate(rows[..., :width], rows[..., width:-1], rows[..., -1])
-
-
-def layout(fmu: FMU, system: System) -> Layout:
-    """Find the signals of a system in its model; the FMU is started anew."""
-    states, unseen = fmu.states, 0
-    seen = []
-    for one in system.outputs:
-        if one.name in states:
-            seen.append(states.index(one.name))
-        else:
-            seen.append(-1 - len(system.reported) - unseen)
-            unseen += 1
-    nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
-    fading, rolling = system.fading, system.rolling
-    pace = np.array(system.slopes(fading.signal)) if fading else np.zeros(len(seen))
-    follower = leader = -1
-    if rolling:
-        follower, leader = (_state(fmu, name) for name in (rolling.follower, rolling.leader))
-    return Layout(
-        seen=np.array(seen, np.intp),
-        nominal=nominal,
-        low=np.array([one.low for one in system.estimated]) - nominal,
-        high=np.array([one.high for one in system.estimated]) - nominal,
-        acts_on=np.array(
-            [_state(fmu, one.acts_on) if one.acts_on else -1 for one in system.estimated], np.intp
-        ),
-        pace=pace,
-        half=fading.half if fading else 0.0,
-        follower=follower,
-        leader=leader,
-        ratio=rolling_ratio(fmu, system) if rolling else 0.0,
-        lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
-        reported=len(system.reported),
-    )
-
-
-def _state(fmu: FMU, name: str) -> int:
-    if name not in fmu.states:
-        raise InputError(
-            where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
-            found="a variable that is no state",
-            expected=f"a continuous state for {name}, because estimators set it",
-            remedy=f"choose it as state in the model, or map another: --map {name}=NAME",
-        )
-    return fmu.states.index(name)
-
-
-def rolling_ratio(fmu: FMU, system: System) -> float:
-    """Follower over leader while the follower rolls along, by the model's own output [1].
-
-    The FMU is started anew.
-    """
-    rolling = system.rolling
-    assert rolling is not None
-    zero = fmu.variables([rolling.zero])
-    fmu.start({rolling.follower: 0.0, rolling.leader: 0.0})
-    rest = fmu.get_states()
-    readings = []
-    for name in (rolling.leader, rolling.follower):
-        moving = rest.copy()
-        moving[_state(fmu, name)] = 1.0
-        fmu.set_states(moving)
-        readings.append(float(fmu.get(zero)[0]))
-    fmu.set_states(rest)
-    return -readings[0] / readings[1]
-
-
-@inlined
-def output(model, layout, j):  # type: ignore[no-untyped-def]
-    """Predicted output j at model.x; an output that is no state must have been read."""
-    at = layout.seen[j]
-    return model.x[at] if at >= 0 else model.y[-1 - at]
-
-
-@inlined
-def add_slope(model, layout, j, factor, places, row):  # type: ignore[no-untyped-def]
-    """Add a multiple of output j's derivatives to a row, after `linearise` of all columns.
-
-    Parameters
-    ----------
-    places : (n + q,) where in the row a state or correction stands, -1: nowhere.
-    """
-    at = layout.seen[j]
-    if at >= 0:
-        row[places[at]] += factor
-    else:
-        for k in range(places.size):
-            if places[k] >= 0:
-                row[places[k]] += factor * model.jacobian[k, model.x.size - 1 - at]
-
-
-@inlined
-def explained(model, layout, j, places, change):  # type: ignore[no-untyped-def]
-    """Change of output j, to first order, by changes of unknowns, (p, 1); see `add_slope`."""
-    at = layout.seen[j]
-    if at >= 0:
-        return change[places[at], 0]
-    total = 0.0
-    for k in range(places.size):
-        if places[k] >= 0:
-            total += model.jacobian[k, model.x.size - 1 - at] * change[places[k], 0]
-    return total
-
-
-@inlined
-def all_states(layout):  # type: ignore[no-untyped-def]
-    """Whether every output is a state, so that none need be read from the model."""
-    for at in layout.seen:  # noqa: SIM110  a compiled loop has no generators
-        if at < 0:
-            return False
-    return True
-
-
-@inlined
-def width(model, layout):  # type: ignore[no-untyped-def]
-    """Columns of the Jacobian that a law needs: rates, and outputs that are no states."""
-    return model.x.size if all_states(layout) else model.x.size + model.y.size
-
-
-@inlined
-def fading(layout, y):  # type: ignore[no-untyped-def]
-    """Share of the feedback at measured outputs: none where they are still, all where they move."""
-    if layout.half == 0.0:
-        return 1.0
-    pace = 0.0
-    for j in range(y.size):
-        pace += layout.pace[j] * y[j]
-    return pace * pace / (pace * pace + layout.half**2)
-
-
-@inlined
-def authority(model, layout, effect, i):  # type: ignore[no-untyped-def]
-    """Share of a correction's feedback: its effect over that at the design point, -1 to 1."""
-    if layout.acts_on[i] < 0:
-        return 1.0
-    return clip(model.jacobian[model.x.size + i, layout.acts_on[i]] / effect[i], -1.0, 1.0)
-
-
-@inlined
-def clip(value, low, high):  # type: ignore[no-untyped-def]
-    """Limit to low..high; a NaN stays."""
-    return min(max(value, low), high)
-
-
-@inlined
-def slipping(layout, x):  # type: ignore[no-untyped-def]
-    """Follower that rolls along minus the follower; 0 where nothing rolls."""
-    if layout.follower < 0:
-        return 0.0
-    return layout.ratio * x[layout.leader] - x[layout.follower]
-
-
-@inlined
-def stick(layout, x, before):  # type: ignore[no-untyped-def]
-    """Let the follower roll where a step would reverse its slip close to standstill.
-
-    What drives it is saturated there at the least slip, and a tangent to the saturation leads to
-    the other side, and back in the next step.
-
-    Parameters
-    ----------
-    before : `slipping` before the step.
-    """
-    rolls = layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
-    if rolls and before * slipping(layout, x) < 0.0:
-        x[layout.follower] = layout.ratio * x[layout.leader]
-
-
-@inlined
-def measure(model, u):  # type: ignore[no-untyped-def]
-    """Set the measured inputs; returns a status."""
-    for j in range(u.size):
-        model.u[j] = u[j]
-    return set_inputs(model, 0, u.size)
-
-
-@inlined
-def correct(model, corrections):  # type: ignore[no-untyped-def]
-    """Set the states model.x and the corrections, (q,); returns a status."""
-    first = model.u.size - corrections.size
-    for i in range(corrections.size):
-        model.u[first + i] = corrections[i]
-    return set_inputs(model, first, corrections.size) or set_states(model)
-
-
-@inlined
-def report(model, layout, row):  # type: ignore[no-untyped-def]
-    """Write the estimate that the FMU is at into a row; returns a status."""
-    status = read(model)
-    outputs, q = layout.seen.size, layout.nominal.size
-    first = model.u.size - q
-    for j in range(outputs):
-        row[j] = output(model, layout, j)
-    for i in range(q):
-        row[outputs + i] = model.u[first + i]
-        row[outputs + q + i] = layout.nominal[i] + model.u[first + i]
-    for i in range(layout.reported):
-        row[outputs + 2 * q + i] = model.y[i]
-    return status

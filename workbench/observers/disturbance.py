@@ -19,22 +19,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, solve
-from workbench.observers.contract import (
-    Estimator,
-    Layout,
-    add_slope,
-    authority,
-    clip,
-    correct,
-    explained,
-    fading,
-    measure,
-    output,
-    report,
-    slipping,
-    stick,
-    width,
-)
+from workbench.observers.contract import Estimator
 from workbench.observers.gains import (
     Gains,
     SearchSpace,
@@ -42,8 +27,23 @@ from workbench.observers.gains import (
     feedback_space,
     matrix_names,
 )
+from workbench.observers.layout import (
+    Layout,
+    add_slope,
+    authority,
+    clip,
+    correct,
+    explained,
+    fading,
+    lag,
+    measure,
+    output,
+    report,
+    stick,
+    width,
+)
 from workbench.observers.operating import (
-    Linearised,
+    LinearModel,
     corrected_states,
     linearised,
     loops,
@@ -139,7 +139,7 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         for j in range(outputs):
             left = innovation[j] - explained(model, layout, j, settings.places, change)
             memory.integral[j] += h * left
-        before = slipping(layout, model.x)
+        before = lag(layout, model.x)
         for i in range(n):
             if settings.places[i] < 0:
                 model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
@@ -168,7 +168,7 @@ class DisturbanceObserver(Estimator):
     no effect, and has the sign of that effect.
 
     The step is linearly implicit in states and quantities, feedback included, so that any gain
-    keeps a stable step. States that an extension adds, such as the temperature of a disc, are not
+    keeps a stable step. States that an extension adds, such as a temperature, are not
     corrected and step each by themselves, implicit in their own value. Quantities are kept within
     their physical range.
 
@@ -338,7 +338,7 @@ class DisturbanceObserver(Estimator):
         return dynamics, error
 
 
-def effects(fmu: FMU, system: System, model: Linearised) -> Vector:
+def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
     """Effect of each quantity on the rate that shows it, at the design point, (q,)."""
     return np.array(
         [

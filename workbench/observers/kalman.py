@@ -11,19 +11,19 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, read, solve
-from workbench.observers.contract import (
-    Estimator,
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import Gains, SearchSpace, noise_space
+from workbench.observers.layout import (
     Layout,
     clip,
     correct,
     fading,
+    lag,
     measure,
     report,
-    slipping,
     stick,
     width,
 )
-from workbench.observers.gains import Gains, SearchSpace, noise_space
 from workbench.observers.operating import walks
 from workbench.system import System
 
@@ -31,7 +31,7 @@ _FAINTEST = 1e-3  # share of feedback that the noise of measurements is raised f
 _REACH = 100.0  # a level this far from the sensors' noise means: trust it wholly, or not at all
 
 
-class Settings(NamedTuple):
+class FilterSettings(NamedTuple):
     """What the laws of the filters are given.
 
     Attributes
@@ -49,7 +49,7 @@ class Settings(NamedTuple):
     spread: Vector
 
 
-class Memory(NamedTuple):
+class FilterMemory(NamedTuple):
     """What the laws remember: z (n + q,) states and deviations, P their covariance; work space."""
 
     z: Vector
@@ -95,7 +95,7 @@ def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
         memory.system[i, i] += 1.0
     copy(memory.system, memory.work)
     status = status or solve(memory.work, memory.change)
-    before = slipping(settings.layout, z)
+    before = lag(settings.layout, z)
     for i in range(size):
         z[i] += memory.change[i, 0]
     stick(settings.layout, z, before)
@@ -110,7 +110,7 @@ def variance(settings, fade, y, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def conclude(model, settings, memory, row):  # type: ignore[no-untyped-def]
+def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
     """Limit the quantities, report the estimate and its standard deviations; returns a status."""
     z, P, layout, n = memory.z, memory.P, settings.layout, model.x.size
     q, outputs = layout.nominal.size, layout.seen.size
@@ -202,7 +202,7 @@ def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-d
     layout = settings.layout
     if h == 0.0:
         status = begin(model, settings, memory, u, y)
-        return status or conclude(model, settings, memory, row)
+        return status or finish(model, settings, memory, row)
     P, size = memory.P, memory.z.size
     status = measure(model, u) or predict(model, settings, memory, memory.z, h)
     # P <- (I - hA)^-1 (P + hQ) (I - hA)^-T: two solutions with the matrix of the step.
@@ -221,7 +221,7 @@ def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-d
     if status:
         return status
     update(model, settings, memory, y, row)
-    return conclude(model, settings, memory, row)
+    return finish(model, settings, memory, row)
 
 
 @compiled
@@ -261,14 +261,14 @@ class ExtendedKalmanFilter(Estimator):
         n, q = len(fmu.states), len(system.estimated)
         of_states = gains["model"] * walks(fmu, system)
         initial = [gains["initial"] * one.spread for one in system.estimated]
-        self._settings = Settings(
+        self._settings = FilterSettings(
             layout=self._layout,
             relative=np.array([_share(gains, one.name) for one in system.outputs]),
             floor=np.array([gains[one.name] for one in system.outputs]),
             walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
         )
-        self._memory: Any = Memory(*buffers(n + q), np.zeros(q), np.zeros(n + q))
+        self._memory: Any = FilterMemory(*buffers(n + q), np.zeros(q), np.zeros(n + q))
 
     def _spreads(self) -> Vector:
         """What is not known of the states at the start, (n,)."""

@@ -6,8 +6,9 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, inlined, linearise, set_states, solve
-from workbench.observers.contract import Estimator, Layout, measure, report
+from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
+from workbench.observers.layout import Layout, measure, report
 from workbench.system import System
 
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers.contract import layout
+from workbench.observers.layout import layout
 from workbench.system import OperatingPoint, System
 
 _STEPS = 400  # of implicit Euler, which takes any model to rest
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
+class LinearModel:
     """A model about an operating point.
 
     Attributes
@@ -29,11 +29,11 @@ class Linearised:
     D: Matrix
     nominal: Vector
 
-    def of(self, states: tuple[str, ...]) -> "Linearised":
+    def of(self, states: tuple[str, ...]) -> "LinearModel":
         """The same for some of the states, the others held."""
         at = [self.states.index(name) for name in states]
         A, B, C = self.A[np.ix_(at, at)], self.B[at], self.C[:, at]
-        return Linearised(states, A, B, C, self.D, self.nominal[at])
+        return LinearModel(states, A, B, C, self.D, self.nominal[at])
 
 
 def settle(
@@ -46,7 +46,7 @@ def settle(
     Parameters
     ----------
     extensions : whether states rest that no observer corrects. If not, they stay as they start,
-        such as the temperature of a disc, but for those that follow inputs alone.
+        such as a temperature, but for those that follow inputs alone.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def settle(
     return x, u
 
 
-def linearised(fmu: FMU, system: System) -> Linearised:
+def linearised(fmu: FMU, system: System) -> LinearModel:
     """A model linearised at the design point; the FMU is left there."""
     settle(fmu, system, system.design, extensions=False)
     names = [one.name for one in system.outputs]
@@ -94,7 +94,7 @@ def linearised(fmu: FMU, system: System) -> Linearised:
         else:
             C[j], D[j] = found.C[unseen.index(name)], found.D[unseen.index(name)]
     nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
-    return Linearised(
+    return LinearModel(
         fmu.states,
         found.A,
         found.B,
@@ -107,7 +107,7 @@ def linearised(fmu: FMU, system: System) -> Linearised:
 def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
     """States that observers correct: those of the system's own observer model.
 
-    States that an extension adds, such as the temperature of a disc, follow from the model alone.
+    States that an extension adds, such as a temperature, follow from the model alone.
     """
     return tuple(name for name in fmu.states if name in system.states) or fmu.states
 
@@ -121,7 +121,7 @@ def walks(fmu: FMU, system: System) -> Vector:
     return np.array([system.walks.get(name, 2e-4 * nominal[name]) for name in fmu.states])
 
 
-def loops(model: Linearised) -> tuple[Matrix, Matrix]:
+def loops(model: LinearModel) -> tuple[Matrix, Matrix]:
     """Order of the loop that each gain closes from an output to a quantity's rate, and its effect.
 
     Directly, or through the slowest mode of the model, whichever is larger.

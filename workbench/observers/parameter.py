@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, linearise, solve
-from workbench.observers.contract import (
-    Estimator,
+from workbench.observers.contract import Estimator
+from workbench.observers.disturbance import effects
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
+from workbench.observers.layout import (
     Layout,
     add_slope,
     authority,
@@ -25,16 +33,8 @@ from workbench.observers.contract import (
     report,
     width,
 )
-from workbench.observers.disturbance import effects
-from workbench.observers.gains import (
-    Gains,
-    SearchSpace,
-    feedback_meanings,
-    feedback_space,
-    matrix_names,
-)
 from workbench.observers.operating import linearised, loops
-from workbench.system import System
+from workbench.system import FULL, System
 
 _SLOWEST = 2.0**-40  # of the fastest integral action, at which a design is given up
 
@@ -132,7 +132,7 @@ class ParameterEstimator(Estimator):
 
     name = "parameter_estimator"
     label = "parameter estimator"
-    role = "full"
+    role = FULL
     rank = 30
     meaning = "L: rows corrections of quantities; columns dy, integral of dy"
     _law = staticmethod(_law)

@@ -6,18 +6,18 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, read
-from workbench.observers.contract import all_states, clip, fading, measure
 from workbench.observers.gains import Gains
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
     begin,
     buffers,
-    conclude,
     ekf_law,
+    finish,
     predict,
     put,
     variance,
 )
+from workbench.observers.layout import all_states, clip, fading, measure
 from workbench.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -29,7 +29,7 @@ POINT_DISTANCE = 0.2
 TANGENT_SHARE = 0.8
 
 
-class Memory(NamedTuple):
+class PointsMemory(NamedTuple):
     """As that of the extended filter, and root (upper triangle, P = root' root), points, stack."""
 
     z: Vector
@@ -180,7 +180,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     if h == 0.0:
         status = begin(model, settings, memory, u, y)
         _covariance_to_root(memory)
-        return status or conclude(model, settings, memory, row)
+        return status or finish(model, settings, memory, row)
     fade = fading(layout, y)
     if fade < TANGENT_SHARE:
         status = ekf_law(model, settings, memory, h, u, y, row)
@@ -199,7 +199,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         return status
     _absorb(settings, memory, spread, fade, y, row)
     _root_to_covariance(memory)
-    return conclude(model, settings, memory, row)
+    return finish(model, settings, memory, row)
 
 
 @compiled
@@ -235,7 +235,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(system.outputs)
-        self._memory = Memory(
+        self._memory = PointsMemory(
             *buffers(size),
             np.zeros(len(system.estimated)),
             np.zeros(max(size, 2 * outputs)),

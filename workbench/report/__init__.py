@@ -5,7 +5,7 @@ from workbench.report.live import LiveWindow
 from workbench.report.page import write_page
 from workbench.report.results import (
     format_table,
-    summarise,
+    summarise_runs,
     write_estimates,
 )
 
@@ -15,7 +15,7 @@ __all__ = [
     "case_figure",
     "draw_case",
     "format_table",
-    "summarise",
+    "summarise_runs",
     "write_estimates",
     "write_page",
 ]

@@ -336,7 +336,7 @@ def _reach(errors: Sequence[Vector]) -> float:
 
     Parameters
     ----------
-    errors : magnitudes while braking, one array for each estimator, NaN where it failed.
+    errors : magnitudes where they count, one array for each estimator, NaN where it failed.
     """
     peaks = sorted(float(e.max()) for e in errors if e.size and np.isfinite(e).all())
     return 1.1 * peaks[min(1, len(peaks) - 1)] if peaks else 1.0

@@ -16,7 +16,7 @@ def write_estimates(result: CaseResult, path: Path) -> None:
     write_whole(path, result.to_frame().to_csv(index=False, float_format="%.7g"))
 
 
-def summarise(
+def summarise_runs(
     system: System, results: Sequence[CaseResult], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Scores by case and estimator, weights of z, and what made them: the one source of numbers."""

@@ -20,7 +20,7 @@ _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of th
 _CURVE = {"left": 58, "width": 850, "height": 220, "top": 16}  # of the convergence [px]
 
 
-def sentence(summary: Mapping[str, Any]) -> str:
+def headline(summary: Mapping[str, Any]) -> str:
     """The result in one sentence."""
     z, before = summary["z"], summary["z_reasoned"]
     moved = "falls" if z < before else "rises"
@@ -97,7 +97,7 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
         .get_template("tuning.html")
         .render(
             summary=summary,
-            sentence=sentence(summary),
+            headline=headline(summary),
             news=bad_news(summary),
             cases=_worst_first(summary),
             gains=_gains(summary),

@@ -6,9 +6,9 @@ Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential e
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
-from workbench.tuning.recipe import Problem, Progress, Tuned, prepare, tunable, tune
+from workbench.tuning.recipe import Problem, Progress, Tuned, pose, tunable, tune
 from workbench.tuning.search import Plan, Search, search
-from workbench.tuning.summary import summarise, tuned_gains
+from workbench.tuning.summary import summarise_tuning, tuned_gains
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
@@ -40,12 +40,12 @@ __all__ = [
     "evaluate_all",
     "evaluate_gains",
     "evaluators",
-    "prepare",
+    "pose",
     "recording",
     "recordings",
     "search",
     "sensitivities",
-    "summarise",
+    "summarise_tuning",
     "tunable",
     "tune",
     "tuned_gains",

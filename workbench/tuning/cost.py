@@ -122,7 +122,7 @@ def load_model(job: Job) -> FMU:
         return open_file(path, job.system)
 
 
-def build(job: Job, fmu: FMU, gains: Gains) -> Estimator:
+def job_estimator(job: Job, fmu: FMU, gains: Gains) -> Estimator:
     """The estimator of a job with some gains."""
     return estimators(job.system)[job.estimator](fmu, job.system, gains)
 
@@ -172,7 +172,7 @@ class Evaluator:
         self._judged = [names.index(name) for name in job.system.objective.weights]
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))
-        self._evaluate_case(build(job, self._fmu, job.gains), start, np.inf)
+        self._evaluate_case(job_estimator(job, self._fmu, job.gains), start, np.inf)
 
     def __enter__(self) -> Self:
         return self
@@ -195,7 +195,7 @@ class Evaluator:
         job = self._job
         gains = job.gains.with_values(candidate.values)
         z_k = np.full(len(job.recordings), np.inf)
-        estimator = build(job, self._fmu, gains)
+        estimator = job_estimator(job, self._fmu, gains)
         samples = 0
         limit = min(candidate.limit, DIVERGED)
         for k in candidate.order:

@@ -132,7 +132,7 @@ class Progress:
         """Something went wrong that the search survives."""
 
 
-def prepare(
+def pose(
     system: System,
     estimator: str,
     cases: Sequence[Case],

@@ -27,7 +27,7 @@ def tuned_gains(tuned: Tuned) -> str:
     return format_gains(job.gains.with_values(found.best), meaning, came_from)
 
 
-def summarise(tuned: Tuned, folds: int) -> dict[str, Any]:
+def summarise_tuning(tuned: Tuned, folds: int) -> dict[str, Any]:
     """All that is known of a tuning, as it is written to summary.json.
 
     Parameters

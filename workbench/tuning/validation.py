@@ -10,7 +10,7 @@ from workbench.cosim import replay
 from workbench.fmu import Matrix, Vector
 from workbench.objective import score
 from workbench.observers import SearchSpace, estimators
-from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, build, load_model
+from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, job_estimator, load_model
 from workbench.tuning.search import Search
 from workbench.tuning.workers import Workers, evaluate_all
 
@@ -99,7 +99,7 @@ def errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
     with load_model(job) as fmu:
         found = [
             [score(case, replay(case, one), job.system).nrmse for case in cases]
-            for one in (build(job, fmu, job.gains.with_values(g)) for g in gains)
+            for one in (job_estimator(job, fmu, job.gains.with_values(g)) for g in gains)
         ]
     return np.array(found, dtype=float)
 

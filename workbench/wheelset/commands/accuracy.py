@@ -5,11 +5,15 @@ import time
 from contextlib import ExitStack
 from importlib.metadata import version
 
-from workbench.case import read_cases
-from workbench.commands.arguments import Commands, add_recordings, add_system, nearby
+from workbench.commands.arguments import (
+    Commands,
+    add_recordings,
+    add_system,
+    example_case,
+    given_cases,
+)
 from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
-from workbench.resources import cases as own_cases
 from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
 from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
@@ -18,7 +22,7 @@ from workbench.wheelset.truth import read_truth
 
 def add(commands: Commands) -> None:
     """Add the command to the parser."""
-    own = nearby(own_cases())
+    own = example_case()
     accuracy = commands.add_parser(
         "accuracy",
         description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
@@ -29,8 +33,7 @@ def add(commands: Commands) -> None:
         "  python -m workbench accuracy\n"
         "  python -m workbench rig --seed 1 --out /tmp/rig\n"
         "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
-        f"  python -m workbench accuracy {own}/09_wet_160_4.2_wsp --estimator ekf "
-        "--estimator ukf",
+        f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(accuracy, out="results/accuracy")
@@ -48,7 +51,7 @@ def add(commands: Commands) -> None:
 def _accuracy(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     chosen = choose(system, options.estimator or list(estimators(system)))
-    cases = read_cases(options.cases, system)
+    cases = given_cases(options.cases, system)
     # All of them before the first run, so that one that is missing is told at once.
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []

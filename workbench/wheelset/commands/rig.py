@@ -12,6 +12,7 @@ from pathlib import Path
 from workbench.commands.arguments import Commands, add_system, positive
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
+from workbench.system import REFERENCE
 from workbench.systems import load_system, model_path
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
@@ -142,7 +143,7 @@ def _rig(options: argparse.Namespace) -> int:
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
-    fmu = options.fmu or model_path(load_system(options.system), "reference")
+    fmu = options.fmu or model_path(load_system(options.system), REFERENCE)
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()

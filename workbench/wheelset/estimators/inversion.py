@@ -7,8 +7,9 @@ import numpy as np
 from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
 from workbench.kernel import compiled, evaluate, inlined, read, set_states
-from workbench.observers.contract import Estimator, measure
+from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
+from workbench.observers.layout import measure
 from workbench.system import System
 
 TIME_CONSTANT = 0.2  # [s] of the low-pass that makes the differentiation causal

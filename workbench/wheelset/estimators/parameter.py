@@ -13,7 +13,7 @@ BANDWIDTH, DAMPING = 15.0, 0.7  # of the pair of poles of dmuDC [rad/s], [1]
 SLIP_BANDWIDTH = 2.0  # of the pole of dmuWR [rad/s]
 
 
-class ParameterEstimator(parameter.ParameterEstimator):
+class WheelsetParameterEstimator(parameter.ParameterEstimator):
     """See `workbench.observers.parameter`; only its gains before tuning are others."""
 
     name = parameter.ParameterEstimator.name
