@@ -94,9 +94,9 @@ class Tuned:
 
     def to_dict(self) -> dict[str, Any]:
         """All that is known of the tuning, as in summary.json."""
-        from workbench.tuning.summary import summarise
+        from workbench.tuning.summary import summarise_tuning
 
-        return summarise(self, len(self.folds))
+        return summarise_tuning(self, len(self.folds))
 
     def summary(self) -> str:
         """Table of cases, and what is to be said of gains and folds."""
