@@ -15,12 +15,14 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import Diagnosis, read_effects
+from workbench.diagnosis import Diagnosis, Outcome, diagnose, read_effects
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
+from workbench.system import OBSERVER, System
+from workbench.system_file import with_model
 from workbench.systems import load_system
 from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
 
@@ -122,6 +124,20 @@ def test_a_planted_effect_is_named_with_its_size(
         # Bounds of 95 %, and a tenth of the size for what the multibody model has besides.
         one = first.parameters[parameter]
         assert one.low - 0.1 * abs(size) <= size <= one.high + 0.1 * abs(size)
+
+
+def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Path) -> None:
+    """As by `--model Extended.fmu`: what was found of the pads acts in every simulation."""
+    cases = recorded(tmp_path / "stops", Effects(cylinder_lag=0.06), 511)
+
+    def said(system: System, out: Path) -> Outcome:
+        return diagnose(system, cases, LIBRARY, EFFECTS, out, 1, lambda _: None)
+
+    first = said(SYSTEM, tmp_path / "first")
+    assert [cause.effect.name for cause in first.diagnosis.causes] == ["CylinderLag"]
+    assert first.extension is not None
+    again = said(with_model(SYSTEM, OBSERVER, first.extension.fmu), tmp_path / "again")
+    assert (again.diagnosis.verdict, again.extension) == ("nothing", None)
 
 
 @pytest.mark.parametrize("planted", sorted(HIDDEN))

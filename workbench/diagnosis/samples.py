@@ -192,10 +192,12 @@ def prepare(
         moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))
         # Noise of an input's sample acts until half way to its neighbours.
         acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
-        column = signals.index(leading.output)
-        ahead[:, column, column], gain = random_walk(
-            moved * acting, deviation[leading.output], wrong[leading.output]
-        )
+        led = clean[leading.output]
+        walked, gain = random_walk(moved * acting, deviation[leading.output], wrong[leading.output])
+        # What moves together is wrong together: its ratio is as sure as before.
+        moves = [n in leading.together for n in signals]
+        along = np.array([clean[n] @ led for n in signals]) / (led @ led) * moves
+        ahead = walked[:, None, None] * np.outer(along, along)
     else:
         inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
         lead = led_by(motion, inputs, outputs, h)
