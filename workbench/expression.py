@@ -20,7 +20,7 @@ _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
+_FUNCTIONS: dict[str, np.ufunc] = {
     "abs": np.abs,
     "max": np.maximum,
     "min": np.minimum,
@@ -46,7 +46,7 @@ class Expression:
     Examples
     --------
     >>> stored = Expression("inflow - c*sqrt(2*level)", "system.toml")
-    >>> stored({"inflow": 0.5, "c": 0.125, "level": 2.0})
+    >>> float(stored({"inflow": 0.5, "c": 0.125, "level": 2.0}))
     0.25
     >>> sorted(stored.names)
     ['c', 'inflow', 'level']
@@ -62,7 +62,7 @@ class Expression:
     def _tree(self) -> ast.expr:
         try:
             return ast.parse(self.text, mode="eval").body
-        except (SyntaxError, ValueError):
+        except (SyntaxError, ValueError, RecursionError):
             raise self._wrong(self.text) from None
 
     @cached_property
@@ -74,7 +74,8 @@ class Expression:
             found.append(name)
             return 1.0
 
-        self._walk(self._tree, note)
+        with np.errstate(all="ignore"):
+            self._walk(self._tree, note)
         return frozenset(found)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
@@ -94,13 +95,14 @@ class Expression:
             If it is not.
         """
         count = len(names)
-        points = np.vstack([np.eye(count), np.arange(2.0, 2.0 + count), np.zeros(count)])
+        points = np.vstack([np.eye(count), -np.arange(2.0, 2.0 + count), np.zeros(count)])
         others = {name: values[name] for name in self.names if name not in names}
-        found = np.array(
-            [float(self({**others, **dict(zip(names, p, strict=True))})) for p in points]
-        )
+        with np.errstate(all="ignore"):
+            found = np.array(
+                [float(self({**others, **dict(zip(names, p, strict=True))})) for p in points]
+            )
         slopes = found[:count]
-        if not np.allclose(found, points @ slopes):
+        if not (np.isfinite(found).all() and np.allclose(found, points @ slopes)):
             raise InputError(
                 where=self.where,
                 found=f"'{self.text}'",
@@ -112,7 +114,7 @@ class Expression:
     def _walk(self, node: ast.AST, value_of: Callable[[str], Any]) -> Any:
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return number
+                return np.float64(number)  # divided by zero it is infinite, as an array is
             case ast.Name() | ast.Attribute():
                 return value_of(self._name(node))
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
@@ -120,7 +122,9 @@ class Expression:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
                 sides = (self._walk(left, value_of), self._walk(right, value_of))
                 return _OPERATORS[type(op)](*sides)
-            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if (
+                name in _FUNCTIONS and len(args) == _FUNCTIONS[name].nin
+            ):
                 return _FUNCTIONS[name](*(self._walk(arg, value_of) for arg in args))
         raise self._wrong(ast.unparse(node))
 

@@ -13,24 +13,26 @@ import numpy as np
 from workbench.errors import InputError, closest
 from workbench.expression import Expression
 from workbench.recording import Vector
-from workbench.system_parts import (
+from workbench.system_comparison import (
     Channel,
     Comparison,
-    Condition,
-    Derived,
-    Estimated,
     Exclusion,
-    Export,
-    Fading,
-    Following,
     Influence,
     Leading,
     Level,
+    Rest,
+)
+from workbench.system_parts import (
+    Condition,
+    Derived,
+    Estimated,
+    Export,
+    Fading,
+    Following,
     Mode,
     Model,
     Objective,
     OperatingPoint,
-    Rest,
     Rolling,
     Signal,
     Threshold,

@@ -59,7 +59,8 @@ def check_references(system: System, model: Description) -> None:
     Raises
     ------
     InputError
-        At the first: where it stands, and what is like it.
+        At the first: where it stands, and what is like it. Also if feedback fades with a signal
+        that is no sum of outputs.
     """
     variables = {variable.name for variable in model.variables}
     references = (*_formulas(system), *_parameters(system), *_of_model(system, variables))
@@ -71,6 +72,8 @@ def check_references(system: System, model: Description) -> None:
                 expected=expected,
                 remedy="correct the name",
             )
+    if system.fading:
+        system.slopes(system.fading.signal)  # a sum of outputs, or refused
 
 
 # Where a name stands, the name, what it may be, and that in words.
@@ -78,16 +81,19 @@ _Reference = tuple[str, str, Collection[str], str]
 
 
 def _formulas(system: System) -> Iterator[_Reference]:
-    measured = {*system.signals, *(one.name for one in system.derived), *system.values}
+    measured = {*system.signals, *system.values}
+    expected = "a measured or derived signal, or a parameter of the model"
+    for one in system.derived:  # made of those before it
+        for name in sorted(one.formula.names):
+            yield one.formula.where, name, frozenset(measured), expected
+        measured.add(one.name)
     compared = system.comparison
     for formula in (
-        *(one.formula for one in system.derived),
         *(one.formula for one in compared.channels),
         *(one.formula for one in compared.exclusions),
         *(one.formula for one in compared.influences),
     ):
         for name in sorted(formula.names):
-            expected = "a measured or derived signal, or a parameter of the model"
             yield formula.where, name, measured, expected
     for point in (system.design, system.tested, system.export.start):
         for formula in point.held.values():
@@ -149,6 +155,10 @@ def _of_system(system: System) -> Iterator[_Reference]:
         if level.by:
             where = f"{system.source}, [diagnosis] levels {parameter} by"
             yield where, level.by, conditions, "a condition of this system"
+    if fading := system.fading:
+        where = f"{system.source}, [feedback] fades signal"
+        known = [one.name for one in (*system.outputs, *system.derived)]
+        yield where, fading.signal, known, "a measured output, or a derived signal"
     if following := system.following:
         where = f"{system.source}, [tuning] follows quantity"
         known = [one.name for one in system.estimated]

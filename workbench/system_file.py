@@ -8,7 +8,8 @@ from workbench.description import Description, read_description
 from workbench.errors import InputError
 from workbench.system import OBSERVER, System
 from workbench.system_check import check_model, check_references
-from workbench.system_parts import Comparison, Model, Objective, OperatingPoint, Signal
+from workbench.system_comparison import Comparison
+from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     read_comparison,
     read_condition_kinds,

@@ -8,24 +8,26 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.expression import Expression
 from workbench.system import System
-from workbench.system_parts import (
+from workbench.system_comparison import (
     Channel,
     Comparison,
-    Condition,
-    Derived,
-    Estimated,
     Exclusion,
-    Export,
-    Fading,
-    Following,
     Influence,
     Leading,
     Level,
+    Rest,
+)
+from workbench.system_parts import (
+    Condition,
+    Derived,
+    Estimated,
+    Export,
+    Fading,
+    Following,
     Mode,
     Model,
     Objective,
     OperatingPoint,
-    Rest,
     Rolling,
     Signal,
     Threshold,
@@ -255,7 +257,6 @@ def read_fading(table: Table, system: System) -> Fading:
     table.refuse_unknown("signal half")
     signal = table.take("signal", str)
     system.refuse_missing(signal, f"{table.where} signal")
-    system.slopes(signal)
     return Fading(signal, table.number("half", system.unit(signal)))
 
 

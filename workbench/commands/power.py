@@ -53,6 +53,21 @@ def add(commands: Commands) -> None:
         "  python -m workbench power --sheet-error --repeats 2",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    _add_sets(parser)
+    _add_checks(parser)
+    parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
+    add_system(parser)
+    for option, default_path, text in (
+        ("--fmu", None, "model that makes the recordings (default: the system's 'reference')"),
+        ("--library", None, "package.mo of the Modelica library (default: the system's)"),
+        ("--out", Path("results/power"), "where to write (default: %(default)s)"),
+    ):
+        parser.add_argument(option, type=Path, default=default_path, metavar="PATH", help=text)
+    parser.set_defaults(run=_power)
+
+
+def _add_sets(parser: argparse.ArgumentParser) -> None:
+    """Add which sets of recordings are made."""
     for option, default, text in (
         ("--clean", 50, "sets without an effect"),
         ("--repeats", 3, "sets of each effect at each size"),
@@ -85,6 +100,10 @@ def add(commands: Commands) -> None:
         metavar="NAME",
         help="recording of a set, may be repeated (default: those that are usual for the system)",
     )
+
+
+def _add_checks(parser: argparse.ArgumentParser) -> None:
+    """Add what is asked instead of how often the diagnosis is right."""
     checks = parser.add_mutually_exclusive_group()
     for option, text in (
         (
@@ -105,15 +124,6 @@ def add(commands: Commands) -> None:
             dest="check",
             help=text,
         )
-    parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
-    add_system(parser)
-    for option, default_path, text in (
-        ("--fmu", None, "model that makes the recordings (default: the system's 'reference')"),
-        ("--library", None, "package.mo of the Modelica library (default: the system's)"),
-        ("--out", Path("results/power"), "where to write (default: %(default)s)"),
-    ):
-        parser.add_argument(option, type=Path, default=default_path, metavar="PATH", help=text)
-    parser.set_defaults(run=_power)
 
 
 def _size(text: str) -> float:

@@ -1,0 +1,230 @@
+"""Mistakes in a system file are refused at the door: where, found, expected, what to do."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from workbench.case import Case
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers import choose
+from workbench.system import System
+from workbench.system_file import read_system
+from workbench.systems import load_system, model_path, open_model
+
+ROOT = Path(__file__).parent.parent
+OWN = ROOT / "modelica" / "WheelsetRig" / "system.toml"
+
+
+def changed(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The wheelset's file with other lines, in a folder without a library."""
+    text = OWN.read_text()
+    for old, new in (("../../fmus", f"{ROOT}/fmus"), *changes):
+        assert old in text
+        text = text.replace(old, new, -1 if old == "../../fmus" else 1)
+    path = folder / "system.toml"
+    path.write_text(text)
+    return path
+
+
+MISTAKES = {
+    # --- what the file itself says ---
+    "unknown key": (
+        ('noise = "5 mbar"', 'nois = "5 mbar"'),
+        r"\[inputs\.pB\]: found unknown key 'nois' \(closest: 'noise'\).* To do: correct or remove",
+    ),
+    "unknown table": (
+        ("[objective]", "[objektive]"),
+        r"system\.toml: found unknown key 'objektive' \(closest: 'objective'\)",
+    ),
+    "key that is missing": (
+        ('correction = "dmuWR"\n', ""),
+        r"\[estimated\] muWR: found no 'correction'; expected a text 'correction'",
+    ),
+    "type": (
+        ("relative_noise = 3e-4", 'relative_noise = "small"'),
+        r"\[outputs\.omegaW\] relative_noise: found 'small'; expected a number",
+    ),
+    "type of a flag": (
+        ("to_the_end = true", 'to_the_end = "yes"'),
+        r"\[\[excluded\]\] 2 to_the_end: found 'yes'; expected true or false",
+    ),
+    "number without its unit": (
+        ('noise = "80 N"', "noise = 80"),
+        r"\[judged\.Fx\] noise: found 80; expected a text with a unit, such as '80 N'",
+    ),
+    "unit of another dimension": (
+        ('bandwidth = "5 Hz"', 'bandwidth = "5 s"'),
+        r"\[objective\] bandwidth: found \[s\], a unit of another dimension; expected .* Hz",
+    ),
+    "unit that there is none of": (
+        ('unit = "N"', 'unit = "Nn"'),
+        r"\[judged\.Fx\] unit: found unknown unit \[Nn\]; expected a unit as Modelica writes it",
+    ),
+    "shown unit of another dimension": (
+        ('shown = "kN"', 'shown = "bar"'),
+        r"\[judged\.Fx\] shown: found \[bar\], a unit of another dimension",
+    ),
+    "range upside down": (
+        ("range = [0.10, 0.45]", "range = [0.45, 0.10]"),
+        r"\[estimated\] muDC range: found \[0\.45, 0\.1\]; expected \[low, high\]",
+    ),
+    "formula that is none": (
+        ('is = "rR*omegaR", unit', 'is = "rR*", unit'),
+        r"\[derived\] speed is: found 'rR\*'; expected numbers, names",
+    ),
+    "parameters of a choice that there is none of": (
+        ("\nwet = { muWR = 0.28", "\nicy = { muWR = 0.28"),
+        r"parameters icy: .* expected one of dry, wet",
+    ),
+    "role without a class": (
+        ('{ class = "FullObserver", fmu', "{ fmu"),
+        r"\[models\.full\]: found no 'class'; expected a text 'class'",
+    ),
+    "no observer": (
+        ("\nobserver = {", "\nobservers = {"),
+        r"\[models\]: found roles observers, full, reference; expected a model in the role 'obs",
+    ),
+    "no outputs": (
+        ("[outputs.omegaW]", "[unused.omegaW]"),
+        r"found unknown key 'unused'",
+    ),
+    # --- what it says of the model ---
+    "variable that the FMU lacks": (
+        ('correction = "dmuWR"', 'correction = "dmuWR2"'),
+        r"MinimalObserver\.fmu: found no variable 'dmuWR2' \(closest: 'dmuWR'\)",
+    ),
+    "another unit than the FMU's": (
+        ('unit = "Pa"\nshown = "bar"', 'unit = "bar"\nshown = "bar"'),
+        r"variable 'pB': found unit \[Pa\]; expected \[bar\] for pB; nothing is converted silently",
+    ),
+    "parameter that the model lacks": (
+        ("[parameters]", "[parameters]\nrw = 0.42"),
+        r"\[parameters\] rw: found no such parameter.* \(closest: 'rW'\)",
+    ),
+    "unit of a parameter": (
+        ("[parameters]", '[parameters]\nrW = "0.42 s"'),
+        r"\[parameters\] rW: found \[s\], a unit of another dimension; expected .* m or mm",
+    ),
+    "tolerance of a parameter that the model lacks": (
+        ("JW = 0.01", "Jw = 0.01"),
+        r"\[diagnosis\.tolerances\] Jw: found 'Jw' \(closest: 'JW'\); expected a parameter",
+    ),
+    "name in a formula": (
+        ("rR*omegaR - rW*omegaW", "rR*omegaR - rW*omega_W"),
+        r"slip is: found 'omega_W' \(closest: 'omegaW'\); expected a measured or derived signal",
+    ),
+    "derived signal of itself": (
+        ('is = "rR*omegaR", unit', 'is = "rR*speed", unit'),
+        r"\[derived\] speed is: found 'speed'",
+    ),
+    "state that the model lacks": (
+        ('acts_on = "omegaW"', 'acts_on = "omega"'),
+        r"\[estimated\] muWR acts_on: found 'omega'.*; expected a continuous state of the model",
+    ),
+    "walk of a state that the model lacks": (
+        ("[feedback]", '[states.omega]\nwalk = "1 rad/s"\n[feedback]'),
+        r"\[states\.omega\]",
+    ),
+    "reading that the model lacks": (
+        ('reading = "FxReading"', 'reading = "FxRead"'),
+        r"Fx reading: found 'FxRead' \(closest: 'FxReading'\)",
+    ),
+    "operating point of an unknown input": (
+        ('inputs = { pB = "1.5 bar" }', 'inputs = { pb = "1.5 bar" }'),
+        r"found unknown key 'pb' \(closest: 'pB'\)",
+    ),
+    # --- what it says of itself ---
+    "condition": (
+        ('muDC = { by = "discs" }', 'muDC = { by = "disc" }'),
+        r"\[diagnosis\] levels muDC by: found 'disc' \(closest: 'discs'\); expected a condition",
+    ),
+    "quantity that is not estimated": (
+        ('follows = { quantity = "muDC"', 'follows = { quantity = "mu"'),
+        r"\[tuning\] follows quantity: found 'mu'.*; expected an estimated quantity",
+    ),
+    "signal of a figure": (
+        ('signals = ["Fx"]', 'signals = ["FX"]'),
+        r"signals: found 'FX' \(closest: 'Fx'\); expected a signal of this system",
+    ),
+    "feedback that fades with no sum of outputs": (
+        ('is = "rR*omegaR", unit', 'is = "abs(rR*omegaR)", unit'),
+        r"\[derived\] speed is: found .*; expected a sum of omegaW, omegaR, each times a constant",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_refused_where_it_stands(tmp_path: Path, mistake: str) -> None:
+    change, message = MISTAKES[mistake]
+    with pytest.raises(InputError, match=message) as refusal:
+        read_system(changed(tmp_path, change))
+    assert "To do: " in str(refusal.value)
+
+
+def test_the_file_without_a_mistake_is_read(tmp_path: Path, system: System) -> None:
+    read = read_system(changed(tmp_path))
+    assert read.signals == system.signals
+    assert read.values == system.values
+
+
+def test_an_fmu_that_is_missing_is_refused(tmp_path: Path) -> None:
+    path = changed(tmp_path, (f"{ROOT}/fmus/fmi2/MinimalObserver.fmu", "Other.fmu"))
+    with pytest.raises(InputError, match=r"Other\.fmu: found"):
+        read_system(path)
+
+
+def test_a_model_with_neither_fmu_nor_library_is_refused(tmp_path: Path) -> None:
+    path = changed(tmp_path, (f', fmu = "{ROOT}/fmus/fmi2/MinimalObserver.fmu"', ""))
+    with pytest.raises(InputError, match=r"found no FMU of MinimalObserver, and no library"):
+        load_system(path)
+
+
+def test_a_system_of_no_such_name_is_refused() -> None:
+    with pytest.raises(InputError, match=r"'wheelst'.* \(closest: 'wheelset'\)"):
+        load_system("wheelst")
+
+
+def test_a_role_without_a_model_is_refused_when_it_is_needed(tmp_path: Path) -> None:
+    line = f'reference = {{ class = "Reference", fmu = "{ROOT}/fmus/fmi2/Reference.fmu" }}\n'
+    system = read_system(changed(tmp_path, (line, "")))
+    with pytest.raises(InputError, match=r"\[models\] reference: found no such model"):
+        model_path(system, "reference")
+
+
+def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
+    tmp_path: Path, minimal_path: Path, dry_case: Case
+) -> None:
+    """Reference: an FMU whose radius is set by hand before each start."""
+    mine = read_system(changed(tmp_path, ("[parameters]", '[parameters]\nrW = "0.42 m"')))
+    usual = read_system(changed(tmp_path))
+    assert mine.values == usual.values | {"rW": 0.42}
+    (kind,) = choose(mine, ["open_loop"]).values()
+    part = slice(0, 2000)
+    samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
+    with FMU(minimal_path, {}, {"rW": 0.42}) as theirs, open_model(mine) as ours:
+        expected = kind(theirs, usual, kind.reasoned(theirs, usual)).run(*samples)
+        found = kind(ours, mine, kind.reasoned(ours, mine)).run(*samples)
+    assert_array_equal(found.values, expected.values)
+    with open_model(usual) as nominal:
+        other = kind(nominal, usual, kind.reasoned(nominal, usual)).run(*samples)
+    assert np.abs(found.values - other.values).max() > 1.0
+
+
+# --- the documentation ---
+
+
+def test_every_key_that_is_read_stands_in_the_documentation() -> None:
+    """Keys as the readers name them: refuse_unknown("..."), and the top level."""
+    sources = [ROOT / "workbench" / f"{name}.py" for name in ("system_file", "system_tables")]
+    read = set()
+    for source in sources:
+        for call in re.findall(r"refuse_unknown\(\s*((?:\"[^\"]*\"\s*)+)\)", source.read_text()):
+            read |= set(" ".join(re.findall(r'"([^"]*)"', call)).split())
+    assert len(read) > 60
+    spans = re.findall(r"`([^`]+)`", (ROOT / "docs" / "system-file.md").read_text())
+    documented = {word for span in spans for word in re.findall(r"[a-z_]+", span)}
+    assert read <= documented, read - documented
