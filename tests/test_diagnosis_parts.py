@@ -24,7 +24,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import StopSystem, add, covariance, minimum
+from workbench.diagnosis.quadratic import RecordingSystem, add, covariance, minimum
 from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
 from workbench.errors import InputError
@@ -238,7 +238,7 @@ def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
 def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     rng = np.random.default_rng(4)
     systems = [
-        StopSystem(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d)
+        RecordingSystem(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d)
         for d in rng.normal(size=(4, 5))
     ]
     total = add([system.eliminated() for system in systems])
@@ -329,10 +329,10 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
             fit = Fit(simulations, EFFECTS)
             point = replace(fit.start(), sizes={("WaterFilm", "film"): 0.3})
             values = fit.values(point)
-            both = [[fit.present(one, k) for k in range(len(of))] for one in (film, lag)]
+            both = [[fit.presence.at(one, k) for k in range(len(of))] for one in (film, lag)]
             assert [one["padFriction.waterFilm.film"] > 0.0 for one in values] == both[0]
             wet = [one.get("padFriction.waterFilm.wet") for one in values]
-            return both[0], both[1], wet, fit.unseen(single)
+            return both[0], both[1], wet, fit.presence.unseen(single)
 
     reason = "the conditions of the stops say which discs are wet"
     assert asked(cases) == ([False, True, True], [True] * 3, [0.0, 1 / 3, 1.0], reason)

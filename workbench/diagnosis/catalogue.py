@@ -363,3 +363,8 @@ def _within_sentence(description: str) -> str:
     if description[1:2].isupper():
         return description
     return description[:1].lower() + description[1:]
+
+
+def variant(effect: Effect, shape: Mapping[str, float]) -> str:
+    """Name of a candidate with a shape, such as 'BeddingIn tau=1.4'."""
+    return " ".join([effect.name, *(f"{name}={value:g}" for name, value in shape.items())])

@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from workbench.case import Case
-from workbench.diagnosis.catalogue import Effect, Unless, Where
+from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.evidence import Item, Result, Simulations, Variation, delay
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
-from workbench.diagnosis.quadratic import Joint, Key, Quadratic, StopSystem
+from workbench.diagnosis.presence import Presence
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
 from workbench.diagnosis.thresholds import Thresholds, thresholds
-from workbench.errors import InputError
 from workbench.fmu import Vector
 
 _HALVED = 4  # times: after that a step is given up
@@ -55,6 +55,7 @@ class Fit:
             for one in simulations.system.judged + simulations.system.outputs
             if one.mode is not None and one.name in simulations.recordings[0].signals
         }
+        self.presence = Presence(simulations.cases, simulations.recordings)
         self.count = len(simulations.cases)
 
     @cached_property
@@ -124,39 +125,6 @@ class Fit:
             found |= condition.parameters.get(str(case.conditions[condition.name]), {})
         return found
 
-    def present(self, effect: Effect, k: int) -> bool:
-        """Whether stop k can have an effect: where the conditions say, if those of any stop do."""
-        where = effect.where
-        return where is None or not self._told(where) or self._share(where, k) > 0.0
-
-    def _share(self, said: Where | Unless, k: int) -> float:
-        """Share of what a condition of stop k says that is one state."""
-        states = self._simulations.cases[k].conditions.get(said.condition)
-        if states is None:
-            raise InputError(
-                where=f"conditions of {self._simulations.cases[k].name}",
-                found=f"no '{said.condition}', which an effect of the library asks for",
-                expected="a condition that recordings have",
-                remedy="correct the annotation of the effect",
-            )
-        entries = states if isinstance(states, tuple) else (states,)
-        return entries.count(said.state) / len(entries)
-
-    def _told(self, said: Where | Unless) -> bool:
-        """Whether the conditions of any stop say so."""
-        return any(self._share(said, k) > 0.0 for k in range(self.count))
-
-    def unseen(self, effect: Effect) -> str:
-        """Why these stops cannot show an effect; empty if they can."""
-        unless, falling = effect.unless, effect.falling
-        if unless is not None and self._told(unless):
-            return unless.because
-        if falling is not None and not any(
-            one.falls(falling.signal) for one in self._simulations.recordings
-        ):
-            return falling.because
-        return effect.hidden
-
     def values(self, point: Point) -> list[dict[str, float]]:
         """Values of the FMU's variables, and of delays, in each recording."""
         return [self._values(point, k) for k in range(self.count)]
@@ -174,15 +142,17 @@ class Fit:
             )
         for effect in self._effects.values():
             where = effect.where
-            if where is not None and where.share and self._told(where):
-                values |= dict.fromkeys(variables(effect, where.share), self._share(where, k))
+            if where is not None and where.share and self.presence.told(where):
+                values |= dict.fromkeys(
+                    variables(effect, where.share), self.presence.share(where, k)
+                )
         for (name, parameter), size in point.sizes.items():
             effect = self._effects[name]
             if parameter == "amplitude":
                 phase = point.phases[name][k]
                 parts = {"cosine": size * np.cos(phase), "sine": size * np.sin(phase)}
             elif parameter == effect.size:
-                parts = {parameter: size if self.present(effect, k) else 0.0}
+                parts = {parameter: size if self.presence.at(effect, k) else 0.0}
             else:
                 parts = {parameter: size}
             for part, value in parts.items():
@@ -279,7 +249,7 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
-    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> StopSystem:
+    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
         b, m = evidence.errors.shape
@@ -302,14 +272,14 @@ class Fit:
                 P.append(point.sizes[key] * (np.cos(phase) * sine - np.sin(phase) * cosine))
             else:
                 effect = self._effects[key[0].partition(" ")[0]]
-                J[:, j] = at[key] * float(self.present(effect, k))
+                J[:, j] = at[key] * float(self.presence.at(effect, k))
         tolerances = [
             at[_LOCAL, name] * self._spread(point, name, k, spread)
             for name, spread in self.local.items()
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return StopSystem(evidence.residual * weight, J, local, point.deviations[k])
+        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k])
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
@@ -412,8 +382,3 @@ class Fit:
         if parameter not in effect.sizes:
             low, high = max(low, 0.5 * old), min(high, 2.0 * old)
         return float(np.clip(new, low, high))
-
-
-def variant(effect: Effect, shape: Mapping[str, float]) -> str:
-    """Name of a candidate with a shape, such as 'BeddingIn tau=1.4'."""
-    return " ".join([effect.name, *(f"{name}={value:g}" for name, value in shape.items())])

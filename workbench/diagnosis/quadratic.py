@@ -69,7 +69,7 @@ def minimum(total: Quadratic) -> Vector:
 
 
 @dataclass(frozen=True, eq=False)
-class StopSystem:
+class RecordingSystem:
     """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
 
     Attributes
@@ -124,7 +124,7 @@ class Joint:
     shared: tuple[Key, ...]
     known: tuple[Key, ...]
     levels: tuple[Key, ...]
-    systems: tuple[StopSystem, ...]
+    systems: tuple[RecordingSystem, ...]
     prior: Quadratic
 
     def stops(self) -> list[Quadratic]:

@@ -10,11 +10,20 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
+from scipy.ndimage import median_filter
 from scipy.optimize import nnls
-from scipy.signal import lfilter, lfiltic, savgol_filter
+from scipy.signal import lfilter, lfiltic
 
 from workbench.case import Case
+from workbench.diagnosis.cleaning import (
+    Mask,
+    bridge,
+    deviation_of,
+    first_value,
+    outliers,
+    runs,
+    smooth,
+)
 from workbench.diagnosis.motion import (
     Lead,
     Motion,
@@ -29,12 +38,8 @@ from workbench.recording import Matrix, Vector
 from workbench.system import Channel, Exclusion, Mode, System
 
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
-_ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
-_ABREAST = 11  # samples of the running median
 _RELEASED = 0.1  # share of the greatest value
 FAULTY, MISSING = "spike, dropout or saturation", "missing"  # reasons of every system
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +177,8 @@ def prepare(
     compare, time = system.comparison, case.time
     h, steps = float(np.median(np.diff(time))), np.diff(time)
     names = (*case.inputs, *signals)
-    wrong = {name: _outliers(case[name], sound) for name in names}
-    clean = {name: _bridge(time, case[name], wrong[name]) for name in names}
+    wrong = {name: outliers(case[name], sound) for name in names}
+    clean = {name: bridge(time, case[name], wrong[name]) for name in names}
     applied = _applied(clean, system, time)
     excluded = {FAULTY: np.logical_or.reduce(list(wrong.values()))}
     for one in compare.exclusions:
@@ -184,7 +189,7 @@ def prepare(
     _refuse_too_few(case, system, blocks, excluded)
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    deviation = {name: _deviation(clean[name]) for name in names}
+    deviation = {name: deviation_of(clean[name]) for name in names}
     gain, lead = np.zeros(time.size), None
     ahead = np.zeros((time.size, len(signals), len(signals)))
     if (leading := compare.leading) is not None:
@@ -203,7 +208,7 @@ def prepare(
         lead = led_by(motion, inputs, outputs, h)
         count = len(case.outputs)
         ahead[:, :count, :count] = lead.ahead
-    driving = [_smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
+    driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
     zero = compare.rest.zero if compare.rest else 1.0
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
@@ -220,7 +225,7 @@ def prepare(
         held=np.array([one.held for one in system.inputs]),
         begin=_begin(
             system,
-            {n: _first(time[start], clean[n][start], deviation[n]) for n in case.outputs},
+            {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs},
             motion,
         ),
         rest=float(np.mean(rest)),
@@ -248,74 +253,6 @@ def _refuse_too_few(
             expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
             remedy="leave this recording out, or repair it",
         )
-
-
-def _outliers(values: Vector, sound: Soundness) -> Mask:
-    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
-    # Odd at the ends: there too, the median of what rises or falls is the middle sample.
-    beside = _ABREAST // 2
-    extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
-    away = np.abs(values - median_filter(extended, _ABREAST)[beside:-beside])
-    # The wide window knows the noise, the narrow one that a structure rings.
-    noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
-    scale = np.maximum(1.4826 * noise, _deviation(values))
-    wrong = away > sound.spike * scale
-    same = np.diff(values) == 0.0
-    if same.mean() < 0.2:
-        for first, end in _runs(same):
-            if end - first >= sound.stuck - 1:
-                wrong[first : end + 1] = True
-        for extreme in (values.min(), values.max()):
-            at = values == extreme
-            if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
-                wrong |= at
-    return wrong
-
-
-def _bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
-    return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
-
-
-def _smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
-    """An input without most of its sensor's noise, and without lag.
-
-    The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
-    by keeping it from the rest. Where the input holds, the mean is taken over longer.
-    """
-    best, noise = values, _deviation(values)
-    for seconds, order in zip(windows, (2, 1), strict=False):
-        window = 2 * (round(seconds / h) // 2) + 1
-        if order < window <= values.size:
-            smooth = savgol_filter(values, window, order)
-            moves = maximum_filter1d(np.abs(best - smooth) > held * noise, window)
-            weight = uniform_filter1d(moves.astype(np.float64), window)
-            best = weight * best + (1.0 - weight) * smooth
-            # Of a parabola over n samples, the variance is 9/4 of that of a mean.
-            noise *= 1.5 / np.sqrt(window)
-    return best
-
-
-def _deviation(values: Vector) -> float:
-    """Standard deviation of white noise on a slow signal, from its second differences.
-
-    It is no less than that of rounding to the least step that the signal makes.
-    """
-    moved = np.abs(np.diff(values))
-    quantum = moved[moved > 0.0].min(initial=np.inf)
-    rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
-    spread = float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
-    return max(spread, float(rounding))
-
-
-def _first(time: Vector, values: Vector, noise: float) -> float:
-    """Value at the start of a signal: by a line through as many samples as lie along one."""
-    count = time.size
-    while count > 2:
-        line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
-        if np.std(values[:count] - line(time[:count])) < _ALONG * noise:
-            return float(line(time[0]))
-        count //= 2
-    return float(values[0])
 
 
 def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
@@ -359,17 +296,11 @@ def _excluded(
     return mask
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """First and end of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
 def _blocks(usable: Mask, time: Vector, block: float, h: float) -> NDArray[np.int64]:
     size = max(1, round(block / h))
     found = [
         (k, k + size)
-        for first, end in _runs(usable)
+        for first, end in runs(usable)
         for k in range(first, end - size + 1, size)
         if time[k + size - 1] - time[k] < 2.0 * max(block, h)
     ]
@@ -402,7 +333,7 @@ def _whitening(
         shared = np.delete(np.abs(slopes), c, axis=0).sum(axis=0) > 0.0
         if len(own) == 1 and system.signals[own[0]].mode is not None:
             means = np.array([clean[own[0]][first:end].mean() for first, end in blocks])
-            covariance[:, c, c] = size * _deviation(means) ** 2
+            covariance[:, c, c] = size * deviation_of(means) ** 2
         elif growing:
             least = 1.01 * float(row[shared] ** 2 @ fixed[shared])
             covariance[:, c, c] = _growing(channel, clean[growing[0]], usable, blocks, least)

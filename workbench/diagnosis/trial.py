@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, variant
+from workbench.diagnosis.catalogue import Effect, variant
+from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Joint, Quadratic, add, covariance, minimum
 from workbench.fmu import Matrix, Vector

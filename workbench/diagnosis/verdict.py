@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from scipy.stats import bootstrap
 
-from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.fit import Fit, variant
+from workbench.diagnosis.catalogue import Effect, variant
+from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import lasting
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
@@ -156,7 +156,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         scores=steps[0].scores if steps else tuple(trial.scores()),
         names=names,
         cosines=cosines,
-        not_visible={one.name: reason for one in catalogue if (reason := fit.unseen(one))},
+        not_visible={one.name: reason for one in catalogue if (reason := fit.presence.unseen(one))},
     )
 
 

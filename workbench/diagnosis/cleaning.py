@@ -1,0 +1,91 @@
+"""One channel of a recording made clean: faulty samples, noise, and where a signal starts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
+from scipy.signal import savgol_filter
+
+from workbench.diagnosis.thresholds import Soundness
+from workbench.recording import Vector
+
+_ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
+_ABREAST = 11  # samples of the running median
+
+Mask = NDArray[np.bool_]
+
+
+def outliers(values: Vector, sound: Soundness) -> Mask:
+    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
+    # Odd at the ends: there too, the median of what rises or falls is the middle sample.
+    beside = _ABREAST // 2
+    extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
+    away = np.abs(values - median_filter(extended, _ABREAST)[beside:-beside])
+    # The wide window knows the noise, the narrow one that a structure rings.
+    noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
+    scale = np.maximum(1.4826 * noise, deviation_of(values))
+    wrong = away > sound.spike * scale
+    same = np.diff(values) == 0.0
+    if same.mean() < 0.2:
+        for first, end in runs(same):
+            if end - first >= sound.stuck - 1:
+                wrong[first : end + 1] = True
+        for extreme in (values.min(), values.max()):
+            at = values == extreme
+            if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
+                wrong |= at
+    return wrong
+
+
+def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
+    """Put a line across what is wrong."""
+    return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
+
+
+def smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
+    """An input without most of its sensor's noise, and without lag.
+
+    The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
+    by keeping it from the rest. Where the input holds, the mean is taken over longer.
+    """
+    best, noise = values, deviation_of(values)
+    for seconds, order in zip(windows, (2, 1), strict=False):
+        window = 2 * (round(seconds / h) // 2) + 1
+        if order < window <= values.size:
+            smooth = savgol_filter(values, window, order)
+            moves = maximum_filter1d(np.abs(best - smooth) > held * noise, window)
+            weight = uniform_filter1d(moves.astype(np.float64), window)
+            best = weight * best + (1.0 - weight) * smooth
+            # Of a parabola over n samples, the variance is 9/4 of that of a mean.
+            noise *= 1.5 / np.sqrt(window)
+    return best
+
+
+def deviation_of(values: Vector) -> float:
+    """Standard deviation of white noise on a slow signal, from its second differences.
+
+    It is no less than that of rounding to the least step that the signal makes.
+    """
+    moved = np.abs(np.diff(values))
+    quantum = moved[moved > 0.0].min(initial=np.inf)
+    rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
+    spread = float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+    return max(spread, float(rounding))
+
+
+def first_value(time: Vector, values: Vector, noise: float) -> float:
+    """Value at the start of a signal: by a line through as many samples as lie along one."""
+    count = time.size
+    while count > 2:
+        line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
+        if np.std(values[:count] - line(time[:count])) < _ALONG * noise:
+            return float(line(time[0]))
+        count //= 2
+    return float(values[0])
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First and end of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
