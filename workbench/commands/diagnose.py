@@ -35,7 +35,7 @@ def add(commands: Commands) -> None:
         "found. Exit status 0 for any verdict.",
         epilog="examples:\n"
         "  python -m workbench diagnose my_recordings --out results/mine\n"
-        "  python -m workbench diagnose my_recordings --effects BrakeFade CylinderLag\n"
+        "  python -m workbench diagnose --system my_machine --effects Seepage\n"
         "  python -m workbench diagnose new_recordings --model results/mine/model/Extended.fmu\n"
         "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
         "  python -m workbench diagnose --list",
