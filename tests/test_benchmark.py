@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from workbench.benchmark.fmpy_loop import open_loop
 from workbench.benchmark.observers import resample
 from workbench.case import Case
 from workbench.fmu import FMU
 from workbench.observers import choose
 from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.open_loop import OpenLoop
 from workbench.system import System
 from workbench.systems import open_model
 from workbench.wheelset.benchmark import LOOPS, by_fmpy
@@ -33,6 +35,21 @@ def test_compiled_laws_agree_with_loops_written_in_numpy(
         largest = theirs.sigma.max(axis=0)
         assert_allclose(ours.sigma / largest, theirs.sigma / largest, rtol=0, atol=1e-6)
         assert_allclose(ours.nis, theirs.nis, rtol=1e-6, atol=1e-8)
+
+
+def test_the_model_alone_goes_the_same_way_by_fmpy(
+    system: System, minimal: FMU, dry_case: Case
+) -> None:
+    """Coasting, braking and standstill, as above."""
+    samples = (dry_case.time, dry_case.u, dry_case.y)
+    ours = OpenLoop(minimal, system, OpenLoop.reasoned(minimal, system)).run(*samples).values
+    with open_loop(minimal, system) as loop:
+        theirs = loop(*samples)
+    columns = list(system.columns)
+    read = [one.name for one in system.outputs] + list(system.reported)
+    ours = ours[:, [columns.index(name) for name in read]]
+    scale = np.abs(theirs).max(axis=0)
+    assert_allclose(ours / scale, theirs / scale, rtol=0, atol=1e-9)
 
 
 def test_plain_c_gives_the_same_bits_as_the_compiled_law(

@@ -1,5 +1,7 @@
 """Formulas of a system file: arithmetic and nothing else."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -31,7 +33,7 @@ def test_anything_else_is_refused_where_it_stands(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["max(a)", "max(a, b, c)", "sqrt(a, b)"])
 def test_functions_take_as_many_arguments_as_they_have(text: str) -> None:
-    with pytest.raises(InputError, match="found 'max|found 'sqrt"):
+    with pytest.raises(InputError, match=re.escape(f"found '{text}'")):
         Expression(text, "file")
 
 

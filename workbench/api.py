@@ -65,7 +65,7 @@ def case_from_frame(
     Parameters
     ----------
     frame : "time [s]" and the measured signals; other columns are ignored.
-    conditions : as in case.toml, such as {"initial_speed": "80 km/h"}.
+    conditions : as in case.toml, such as {"load": "2 kN"}.
 
     Raises
     ------

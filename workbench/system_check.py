@@ -157,7 +157,7 @@ def _of_system(system: System) -> Iterator[_Reference]:
             yield where, level.by, conditions, "a condition of this system"
     if fading := system.fading:
         where = f"{system.source}, [feedback] fades signal"
-        known = [one.name for one in (*system.outputs, *system.derived)]
+        known = [*(one.name for one in system.outputs), *(one.name for one in system.derived)]
         yield where, fading.signal, known, "a measured output, or a derived signal"
     if following := system.following:
         where = f"{system.source}, [tuning] follows quantity"

@@ -169,7 +169,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                 where=own.where,
                 found="a unit and choices" if choices else "neither a unit nor choices",
                 expected="either the unit of a quantity, or the choices",
-                remedy='write unit = "m/s", or choices = ["dry", "wet"]',
+                remedy='write unit = "m/s", or choices = ["new", "worn"]',
             )
         parameters = own.table("parameters")
         for choice in parameters.content:

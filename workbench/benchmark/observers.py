@@ -19,6 +19,7 @@ from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
 from workbench.case import Case
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimator, choose
+from workbench.observers.open_loop import OpenLoop
 from workbench.pool import Pool
 from workbench.system import FULL, OBSERVER, System
 from workbench.systems import open_model
@@ -115,14 +116,14 @@ def tuned_names(system: System) -> list[str]:
 
 
 def time_observers(case: Case, system: System) -> list[ObserverTimes]:
-    """Time all observers on one recording; those on the observer's model on the full one too.
+    """Time the model alone and all observers on one recording, on the full model too.
 
     What they are measured against is written for FMUs of FMI 2.0 with C sources.
     """
     names = tuned_names(system)
     kinds = choose(system, names)
     times = []
-    with opened(system, names) as estimators:
+    with opened(system, [OpenLoop.name, *names]) as estimators:
         for one in estimators:
             with by_fmpy(one.name, one.fmu, system, one.gains) as loop:
                 plain = by_c(one.name, one.fmu, system, one.gains)
@@ -235,7 +236,7 @@ def format_observers(
     """The measurements as a table."""
     rates = "".join(f" {rate:>7.0f} Hz" for rate in RATES)
     lines = [
-        "us per step of the observers, recorded stop at 1 kHz",
+        "us per step of the observers, a recording at 1 kHz",
         f"{'observer':<21} {'states':>6} {'us':>6} {'real time':>10} {'FMPy':>6} {'C':>5}"
         f"{rates} {LENGTH:>3}x long",
     ]

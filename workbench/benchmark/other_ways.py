@@ -5,9 +5,12 @@ from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
+from typing import Any
 
+from workbench.benchmark.fmpy_loop import open_loop
 from workbench.fmu import FMU
-from workbench.observers import Estimate, Gains
+from workbench.observers import Gains
+from workbench.observers.open_loop import OpenLoop
 from workbench.system import System
 
 Loop = Callable[..., object]  # of time, u and y, as Estimator.run
@@ -16,8 +19,15 @@ Loop = Callable[..., object]  # of time, u and y, as Estimator.run
 @contextmanager
 def by_fmpy(
     estimator: str, fmu: FMU, system: System, gains: Gains
-) -> Iterator[Callable[..., Estimate] | None]:
-    """The loop of an estimator with FMPy's methods and numpy; None where there is none."""
+) -> Iterator[Callable[..., Any] | None]:
+    """The loop of an estimator with FMPy's methods and numpy; None where there is none.
+
+    That of the model alone is there for any system.
+    """
+    if estimator == OpenLoop.name:
+        with open_loop(fmu, system) as alone:
+            yield alone
+        return
     module = _companion(system)
     if module is None or estimator not in module.LOOPS:
         yield None

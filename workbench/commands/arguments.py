@@ -1,6 +1,7 @@
 """What the commands share."""
 
 import argparse
+import os
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -40,6 +41,17 @@ def add_system(parser: argparse.ArgumentParser) -> None:
         default=usual,
         metavar="NAME|FILE",
         help="an installed system, or a system file (default: %(default)s)",
+    )
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add how many processes work."""
+    parser.add_argument(
+        "--workers",
+        type=positive,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes (default: one per processor, %(default)s)",
     )
 
 

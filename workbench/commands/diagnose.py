@@ -1,7 +1,6 @@
 """`workbench diagnose`: what a simulation gets wrong, the cause, and a better model."""
 
 import argparse
-import os
 import time
 from dataclasses import replace
 from importlib.metadata import version
@@ -11,8 +10,8 @@ from workbench.commands.arguments import (
     Commands,
     add_recordings,
     add_system,
+    add_workers,
     given_cases,
-    positive,
     require_compiler,
 )
 from workbench.diagnosis import choose, diagnose, read_effects
@@ -35,7 +34,7 @@ def add(commands: Commands) -> None:
         "found. Exit status 0 for any verdict.",
         epilog="examples:\n"
         "  python -m workbench diagnose my_recordings --out results/mine\n"
-        "  python -m workbench diagnose my_recordings --effects BrakeFade CylinderLag\n"
+        "  python -m workbench diagnose --system my_machine --effects Seepage\n"
         "  python -m workbench diagnose new_recordings --model results/mine/model/Extended.fmu\n"
         "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
         "  python -m workbench diagnose --list",
@@ -71,13 +70,7 @@ def add(commands: Commands) -> None:
         default="native",
         help="of the extended FMU: this machine's, or all (default: %(default)s)",
     )
-    parser.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    add_workers(parser)
     parser.set_defaults(run=_diagnose)
 
 

@@ -1,7 +1,6 @@
 """`workbench observability`: what measured outputs can tell about states and quantities."""
 
 import argparse
-import os
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -13,9 +12,9 @@ from workbench.commands.arguments import (
     add_models,
     add_recordings,
     add_system,
+    add_workers,
     chosen_system,
     example_case,
-    positive,
     show_progress,
 )
 from workbench.fmu import Vector
@@ -49,13 +48,7 @@ def add(commands: Commands) -> None:
     add_recordings(observability, out="results/observability")
     add_system(observability)
     add_models(observability)
-    observability.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    add_workers(observability)
     observability.set_defaults(run=_observability)
 
 

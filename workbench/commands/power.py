@@ -1,7 +1,6 @@
 """`workbench power`: how much the diagnosis can be trusted."""
 
 import argparse
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,7 +8,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from workbench.commands.arguments import Commands, add_system, positive, require_compiler
+from workbench.commands.arguments import (
+    Commands,
+    add_system,
+    add_workers,
+    positive,
+    require_compiler,
+)
 from workbench.diagnosis import Effect
 from workbench.diagnosis.thresholds import thresholds
 from workbench.power import (
@@ -54,6 +59,7 @@ def add(commands: Commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_sets(parser)
+    add_workers(parser)
     _add_checks(parser)
     parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
     add_system(parser)
@@ -73,7 +79,6 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         ("--repeats", 3, "sets of each effect at each size"),
         ("--pairs", 30, "sets with two effects, at the largest size"),
         ("--sets", 8, "sets of --thresholds, of all kinds alike"),
-        ("--workers", os.cpu_count() or 1, "processes"),
     ):
         parser.add_argument(
             option,

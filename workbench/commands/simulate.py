@@ -1,7 +1,6 @@
 """`workbench simulate`: all estimators on recordings."""
 
 import argparse
-import os
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -14,9 +13,9 @@ from workbench.commands.arguments import (
     add_models,
     add_recordings,
     add_system,
+    add_workers,
     chosen_system,
     example_case,
-    positive,
     show_progress,
 )
 from workbench.files import write_json
@@ -73,13 +72,7 @@ def add(commands: Commands) -> None:
         metavar="NAME",
         help="run this one, may be repeated (default: the standard ones of the system)",
     )
-    parser.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    add_workers(parser)
     parser.add_argument(
         "--live",
         action="store_true",

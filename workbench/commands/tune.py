@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import signal
 import sys
 import time
@@ -19,6 +18,7 @@ from workbench.commands.arguments import (
     Commands,
     add_map,
     add_system,
+    add_workers,
     given_cases,
     installing,
     model_names,
@@ -137,13 +137,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
     """Add who does the work, and what is shown and kept of it."""
-    parser.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    add_workers(parser)
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",

@@ -366,5 +366,5 @@ def _within_sentence(description: str) -> str:
 
 
 def variant(effect: Effect, shape: Mapping[str, float]) -> str:
-    """Name of a candidate with a shape, such as 'BeddingIn tau=1.4'."""
+    """Name of a candidate with a shape, such as 'Hysteresis tau=1.4'."""
     return " ".join([effect.name, *(f"{name}={value:g}" for name, value in shape.items())])

@@ -18,8 +18,8 @@ from workbench.modelica import Library
 def component(name: str) -> str:
     """Name of a class's component within its slot.
 
-    >>> component("WheelsetRig.Effects.BrakeFade")
-    'brakeFade'
+    >>> component("Tank.Effects.DryFriction")
+    'dryFriction'
     """
     short = name.rpartition(".")[2]
     return short[0].lower() + short[1:]

@@ -141,7 +141,7 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
 def _begun(fit: Fit, best: Fitted, rival: Prospect) -> Fitted:
     """First rounds of a fit with one more effect, begun at half the size where it was too much."""
     for halvings in range(_HALVINGS + 1):
-        # A law bends: half the contact's stiffness is twice the slip.
+        # A law bends: half a stiffness is twice the deflection.
         one = extended(fit, best, replace(rival, size=0.5**halvings * rival.size), _BEGUN)
         if _gains(fit, best, one):
             break

@@ -44,8 +44,8 @@ def named(system: System, signal: str) -> str:
 def capital(text: str) -> str:
     """A text as it begins a title.
 
-    >>> capital("speed of the roller")
-    'Speed of the roller'
+    >>> capital("level of the tank")
+    'Level of the tank'
     """
     return text[:1].upper() + text[1:]
 

@@ -2,14 +2,13 @@
 
 import argparse
 import dataclasses
-import os
 import time
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, add_system, positive
+from workbench.commands.arguments import Commands, add_system, add_workers, positive
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
 from workbench.system import REFERENCE
@@ -97,13 +96,7 @@ def _add_making(rig: argparse.ArgumentParser) -> None:
         help="multibody model, with Co-Simulation (default: the reference model of the system)",
     )
     add_system(rig)
-    rig.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    add_workers(rig)
 
 
 def _epilog() -> str:

@@ -1,0 +1,51 @@
+"""The engine is of no machine: words of the wheelset stand in its own folder alone."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from workbench.diagnosis import read_effects
+from workbench.modelica import read_library
+from workbench.system import OBSERVER, System
+
+ROOT = Path(__file__).parent.parent
+KINDS = (".py", ".html", ".js", ".css", ".c", ".h")
+# What a rig is made of, in prose; a wheel of Python and that of a mouse are none.
+PROSE = "[Rr]ollers?|[Dd]iscs?|[Ss]lip(s|ping)?|[Bb]rak(e|es|ed|ing)|[Aa]dhesion|[Cc]reep(age)?"
+ALLOWED = {"direction", "speed"}  # words of every field
+
+
+def names(system: System) -> set[str]:
+    """Names that the system file and the library of the wheelset give to things."""
+    library = read_library(system.library)
+    effects = read_effects(library, system.models[OBSERVER].name)
+    return {
+        library.name,
+        *system.signals,
+        *system.reported,
+        *(one.reading for one in system.signals.values()),
+        *(one.name for one in (*system.derived, *system.estimated, *system.conditions)),
+        *system.corrections,
+        *system.comparison.tolerances,
+        *(name for one in system.conditions for name in one.parameters),
+        *(model.name for model in system.models.values()),
+        *(effect.name for effect in effects),
+        "Polach",
+    } - ALLOWED
+
+
+def sources() -> list[Path]:
+    package = ROOT / "workbench"
+    return sorted(
+        path
+        for path in package.rglob("*")
+        if path.suffix in KINDS and not path.is_relative_to(package / "wheelset")
+    )
+
+
+@pytest.mark.parametrize("source", sources(), ids=lambda p: str(p.relative_to(ROOT / "workbench")))
+def test_no_source_names_what_one_machine_has(source: Path, system: System) -> None:
+    words = re.compile(rf"\b({'|'.join(map(re.escape, names(system)))}|{PROSE})\b")
+    lines = enumerate(source.read_text().splitlines(), 1)
+    assert [(number, line.strip()) for number, line in lines if words.search(line)] == []

@@ -1,0 +1,70 @@
+"""The model alone as one drives it with FMPy's own methods and numpy, for any system."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from ctypes import POINTER, c_double
+
+import numpy as np
+from fmpy import extract, instantiate_fmu, read_model_description
+
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.system import System
+
+
+@contextmanager
+def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Matrix], Matrix]]:
+    """A loop like that of `OpenLoop`, over time, u and y; it returns outputs and reported, (n, k).
+
+    Parameters
+    ----------
+    fmu : of FMI 2.0, whose file is loaded a second time.
+    """
+    description = read_model_description(str(fmu.path))
+    known = {v.name: v.valueReference for v in description.modelVariables}
+    rates = [unknown.variable for unknown in description.derivatives]
+    states = [known[rate.derivative.name] for rate in rates]
+    rows, n = [rate.valueReference for rate in rates], len(rates)
+
+    def references(*names: str) -> list[int]:
+        return [known[fmu.names.get(name, name)] for name in names]
+
+    inputs = references(*(one.name for one in system.inputs))
+    read = references(*(one.name for one in system.outputs), *system.reported)
+    given = references(*system.given)
+    places = [j for j, one in enumerate(system.outputs) if one.name in fmu.states]
+    seen = references(*(system.outputs[j].name for j in places))
+    x, dx = np.zeros(n), np.zeros(n)
+    at_x, at_dx = (buffer.ctypes.data_as(POINTER(c_double)) for buffer in (x, dx))
+    folder = extract(str(fmu.path))
+    model = instantiate_fmu(folder, description, "ModelExchange")
+
+    def begin(y: Vector) -> None:
+        model.reset()
+        model.setupExperiment()
+        model.setReal([*given, *seen], [*system.given.values(), *y[places]])
+        model.enterInitializationMode()
+        model.exitInitializationMode()
+        model.newDiscreteStates()
+        model.enterContinuousTimeMode()
+        model.getContinuousStates(at_x, n)
+
+    def run(time: Vector, u: Matrix, y: Matrix) -> Matrix:
+        begin(y[0])
+        found = np.empty((time.size, len(read)))
+        for k, h in enumerate(np.diff(time, prepend=time[0])):
+            model.setReal(inputs, u[k])
+            if h > 0.0:
+                model.getDerivatives(at_dx, n)
+                columns = [model.getDirectionalDerivative(rows, [j], [1.0]) for j in states]
+                x[:] += np.linalg.solve(np.eye(n) - h * np.array(columns).T, h * dx)
+                model.setContinuousStates(at_x, n)
+            found[k] = model.getReal(read)
+        return found
+
+    try:
+        yield run
+    finally:
+        model.terminate()
+        model.freeInstance()
+        shutil.rmtree(folder, ignore_errors=True)
