@@ -20,10 +20,10 @@ class Soundness:
 
     Attributes
     ----------
-    spike : off the running median: no noise reaches it; by theory 6 in a million samples, but noise
-        may grow with a signal, and structures ring.
+    spike : off the running median: no noise reaches it. By theory 5.8 in the 240 000 samples of six
+        stops; but noise may grow with a signal, and structures ring.
     stuck : equal samples in a row: a channel that is noisy does not repeat itself.
-    held : a polynomial that takes away more is no smoothing: 4 in the samples of a stop, by chance.
+    held : a polynomial that takes away more is no smoothing: chance makes 3.8 in a stop's samples.
     """
 
     spike: float = 8.0
@@ -44,20 +44,20 @@ class Thresholds:
     fall : of chi-squared on held-out recordings; likewise, its square.
     immaterial : standard deviations from zero to a size that matters, of a companion too small to.
     tied : chi-squared by which fits are equals: odds that chance turns at the rate.
-    wrong : variance of errors that last, over noise, from which on much is wrong. Chance alone
-        makes 1.5 of a hundred means; forms of laws that nobody would call a cause make up to 5.
+    wrong : variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5
+        of a hundred means, and 4.3 of five; laws that differ a little in form may make as much.
     form : chi-squared that a rival may owe to its form, since laws are simplified.
     form_share : the same, as a share of what the effect explains: laws agree to some 3 %, squared.
     twin : one less cosine of signatures within which an effect is fitted in full, to be told apart.
         The scatter of a candidate is then 5 times that alone; it costs time only.
-    near : share of the best score from which on an effect is a rival: linearised scores of strong
-        effects are good to half.
+    near : share of the best score from which on an effect is a rival: scores are linearised, and
+        laws bend.
     behind : times the chi-squared of the best from which on a fit that has begun is not finished.
-    idle : share of the explainable below which an effect beside others is no cause: their forms
-        leave as much.
+    idle : share of the explainable below which an effect beside others is no cause, but bends to
+        what their forms leave.
     left : share of lasting errors that a right cause may leave, by its form; wrong ones leave more.
-    excess : of the mean square of white errors over 1, which an estimate of noise may leave: it is
-        good to a tenth of the deviation, and block means keep some ringing.
+    excess : of the mean square of white errors over 1, which an estimate of noise may leave: a
+        tenth of the deviation is a fifth of it, and block means keep some ringing.
     worse : of deviance, which no step of a fit is worth: a fifteenth of what is significant.
     furthest : standard deviations that no tolerance goes beyond; chance makes 4 of thirty.
     furthest_level : the same of levels, which differ by nature and by more; beyond 3 a friction may

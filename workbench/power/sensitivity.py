@@ -118,12 +118,12 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
     return tuple(frozenset(one.items()) for one in points)
 
 
-def vary(setup: Setup, planting: Planting) -> Varied:
-    """Make one set of recordings, and diagnose it by all thresholds."""
+def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
+    """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
     usual = thresholds(len(setup.effects))
     variants = {
-        (name, factor): changed(usual, name, factor) for name in values(usual) for factor in FACTORS
+        (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
     }
     said = _said(setup, cases, usual.samples, [usual, *variants.values()])
     for samples in {one.samples for one in variants.values()} - {usual.samples}:
@@ -194,7 +194,8 @@ def vary_sets(
         setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
         build_everything(system, effects, setup.everything)
         with Pool(workers, nullcontext, setup, isolated=True) as pool:
-            tasks = {pool.submit(vary, planting): planting for planting in plantings}
+            names = list(values(thresholds(len(effects))))
+            tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
             try:
                 for done, task in enumerate(as_completed(tasks), start=1):
                     left = (time.perf_counter() - begin) / done * (len(tasks) - done)

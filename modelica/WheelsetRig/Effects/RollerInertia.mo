@@ -6,7 +6,7 @@ equation
   actual = nominal*(1.0 + gain);
   annotation (
     __Workbench(effect(
-      size="gain", step=0.005, matters=0.01,
+      size="gain", step=0.005, matters=0.002, after="FxGain",
       separation="a spin-down of the roller alone, the drive off")),
     Documentation(info="<html>
 <p><code>actual = nominal*(1 + gain)</code>. A drive that imitates a train takes a torque that goes with
