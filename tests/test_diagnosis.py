@@ -51,7 +51,7 @@ PLANTED = {
     "out_of_round": ("OutOfRoundWheel", "amplitude", 2e-4),
     "wheel_load": ("WheelLoad", "gain", 0.12),
     "creep_stiffness": ("CreepStiffness", "gain", -0.12),
-    "roller_inertia": ("RollerInertia", "gain", 0.03),
+    "roller_inertia": ("RollerInertia", "gain", 0.024),
     "torque_gain": ("DriveTorqueGain", "gain", 0.015),
     "wheelset_losses": ("WheelsetLosses", "gain", 1.0),
     "roller_losses": ("RollerLosses", "gain", 1.0),

@@ -5,7 +5,7 @@ model BalancesHoldTheActualQuantities "Radii, inertia, torque and losses act whe
     muWR=0.40, redeclare Effects.WheelRadius wheelRadius(delta=-0.01),
     redeclare Effects.RollerRadius rollerRadius(delta=0.02),
     redeclare Effects.WheelInertia wheelInertia(gain=0.2),
-    redeclare Effects.RollerInertia rollerInertia(gain=0.1),
+    redeclare Effects.RollerInertia rollerInertia(gain=0.05),
     redeclare Effects.DriveTorqueGain driveTorque(gain=0.05),
     redeclare Effects.WheelsetLosses wheelsetLoss(gain=1.0),
     redeclare Effects.RollerLosses rollerLoss(gain=0.5), pB=p, tauR=2100.0, dmuWR=0.0,
@@ -17,7 +17,7 @@ model BalancesHoldTheActualQuantities "Radii, inertia, torque and losses act whe
     - 132.0*(der(rig.omegaW) - 2.0) "What the balance of the wheelset lacks";
   output Units.Torque roller =
     2000.0 - 0.72*rig.Fx - 1.5*(40.0 + rig.omegaR + 0.02*rig.omegaR^2)
-    - 1650.0*(der(rig.omegaR) - 3.0) "What the balance of the roller lacks";
+    - 1575.0*(der(rig.omegaR) - 3.0) "What the balance of the roller lacks";
 equation
   // 1e-6 of 10 kN.m: rounding.
   assert(abs(wheelset) < 1e-6, "Balance of the wheelset");
