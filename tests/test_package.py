@@ -12,6 +12,7 @@ import pytest
 import workbench
 from workbench.__main__ import main
 from workbench.commands import COMMANDS
+from workbench.installed import built_models
 
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 OWN = ("modelica", "fmus", "cases")  # at the top level of a checkout, in the wheel as data
@@ -87,6 +88,17 @@ def test_code_is_compiled_where_nothing_can_be_kept(root: Path) -> None:
     for _ in range(2):
         done = run("-c", SOLVE, cwd=root, env=os.environ | {"XDG_CACHE_HOME": os.devnull})
         assert done.stdout == "0 1\n", done.stderr
+
+
+# --- what comes along ---
+
+
+def test_the_fmus_that_come_along_are_those_that_system_files_name(root: Path) -> None:
+    listed = json.loads((root / "fmus" / "manifest.json").read_text())["fmus"]
+    named = [name for names in built_models().values() for name in names]
+    assert {path: one["model"] for path, one in listed.items()} == {
+        f"fmi{fmi}/{name.rpartition('.')[2]}.fmu": name for fmi in (2, 3) for name in named
+    }
 
 
 # --- the wheel ---
