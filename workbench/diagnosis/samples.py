@@ -35,7 +35,7 @@ from workbench.diagnosis.motion import (
 from workbench.diagnosis.thresholds import SOUND, Soundness
 from workbench.errors import InputError
 from workbench.recording import Matrix, Vector
-from workbench.system import Channel, Exclusion, Mode, System
+from workbench.system import Channel, Comparison, Exclusion, Mode, System
 
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
 _RELEASED = 0.1  # share of the greatest value
@@ -190,27 +190,9 @@ def prepare(
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
     deviation = {name: deviation_of(clean[name]) for name in names}
-    gain, lead = np.zeros(time.size), None
-    ahead = np.zeros((time.size, len(signals), len(signals)))
-    if (leading := compare.leading) is not None:
-        effects = effects_on_led(motion, leading.output)
-        moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))
-        # Noise of an input's sample acts until half way to its neighbours.
-        acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
-        led = clean[leading.output]
-        walked, gain = random_walk(moved * acting, deviation[leading.output], wrong[leading.output])
-        # What moves together is wrong together: its ratio is as sure as before.
-        moves = [n in leading.together for n in signals]
-        along = np.array([clean[n] @ led for n in signals]) / (led @ led) * moves
-        ahead = walked[:, None, None] * np.outer(along, along)
-    else:
-        inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
-        lead = led_by(motion, inputs, outputs, h)
-        count = len(case.outputs)
-        ahead[:, :count, :count] = lead.ahead
+    gain, lead, ahead = _led(case, system, signals, clean, deviation, wrong, motion)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
-    rest = clean[compare.rest.signal][:applied] if compare.rest else np.zeros(1)
-    zero = compare.rest.zero if compare.rest else 1.0
+    rest, rest_noise = _at_rest(compare, clean, applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
@@ -228,8 +210,8 @@ def prepare(
             {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs},
             motion,
         ),
-        rest=float(np.mean(rest)),
-        rest_noise=float(np.hypot(np.std(rest) / np.sqrt(rest.size), zero)),
+        rest=rest,
+        rest_noise=rest_noise,
         blocks=blocks,
         slopes=slopes,
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
@@ -239,6 +221,47 @@ def prepare(
             **{reason: int(mask.sum()) for reason, mask in excluded.items()},
         },
     )
+
+
+def _led(
+    case: Case,
+    system: System,
+    signals: tuple[str, ...],
+    clean: Mapping[str, Vector],
+    deviation: Mapping[str, float],
+    wrong: Mapping[str, Mask],
+    motion: Motion,
+) -> tuple[Vector, Lead | None, NDArray[np.float64]]:
+    """Gain of the led output (n,), or how all lead; covariance of what they led, (n, c, c)."""
+    time = case.time
+    h, steps = float(np.median(np.diff(time))), np.diff(time)
+    leading = system.comparison.leading
+    if leading is None:
+        ahead = np.zeros((time.size, len(signals), len(signals)))
+        inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
+        lead = led_by(motion, inputs, outputs, h)
+        count = len(case.outputs)
+        ahead[:, :count, :count] = lead.ahead
+        return np.zeros(time.size), lead, ahead
+    effects = effects_on_led(motion, leading.output)
+    moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))
+    # Noise of an input's sample acts until half way to its neighbours.
+    acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
+    led = clean[leading.output]
+    walked, gain = random_walk(moved * acting, deviation[leading.output], wrong[leading.output])
+    # What moves together is wrong together: its ratio is as sure as before.
+    moves = [n in leading.together for n in signals]
+    along = np.array([clean[n] @ led for n in signals]) / (led @ led) * moves
+    return gain, None, walked[:, None, None] * np.outer(along, along)
+
+
+def _at_rest(compare: Comparison, clean: Mapping[str, Vector], applied: int) -> tuple[float, float]:
+    """Mean of the input before it is applied, and its standard deviation."""
+    if compare.rest is None:
+        return 0.0, 1.0
+    rest = clean[compare.rest.signal][:applied]
+    spread = float(np.std(rest)) / np.sqrt(rest.size)
+    return float(np.mean(rest)), float(np.hypot(spread, compare.rest.zero))
 
 
 def _refuse_too_few(
