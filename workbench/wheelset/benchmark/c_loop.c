@@ -97,6 +97,7 @@ int c_loop(int n, const double *steps, const double (*u_measured)[2], const doub
         if (h > 0.0) {
             const double speed = s->radius * y[k][1];
             const double fade = speed * speed / (speed * speed + s->fading_speed * s->fading_speed);
+            const double innovation[2] = {y[k][0] - z[0], y[k][1] - z[1]};
             double system[4][4], change[4];
             model_derivatives(0.0, z, u, p, xdot);
             model_jacobian_xu(0.0, z, u, p, nonzeros);
@@ -105,19 +106,22 @@ int c_loop(int n, const double *steps, const double (*u_measured)[2], const doub
                 if (i >= 2) {
                     share *= clip(nonzeros[place[0][i]] / s->effect[i - 2], -1.0, 1.0);
                 }
-                change[i] = i < 2 ? h * xdot[i] : h * s->decay[i - 2] * z[i];
+                change[i] = i < 2 ? h * xdot[i] : h * (s->decay[i - 2] * z[i]);
+                for (int j = 0; j < 2; j++) {
+                    system[i][j] = i < 2 ? -h * nonzeros[place[i][j]] : 0.0;
+                    system[i][2 + j] = i < 2 ? -h * nonzeros[place[i][2 + j]] : 0.0;
+                }
+                if (i < 2) {
+                    system[i][i] += 1.0;
+                } else {
+                    system[i][i] = 1.0 - h * s->decay[i - 2];
+                }
                 for (int j = 0; j < 2; j++) {
                     const double integrated = share * s->L[i][2 + j];
-                    const double gain = share * s->L[i][j] + h * integrated;
-                    change[i] += h * (gain * (y[k][j] - z[j]) + integrated * integral[j]);
-                    system[i][j] = h * gain;
-                    system[i][2 + j] = 0.0;
-                    if (i < 2) {
-                        system[i][j] -= h * nonzeros[place[i][j]];
-                        system[i][2 + j] -= h * nonzeros[place[i][2 + j]];
-                    }
+                    const double gain = h * (share * s->L[i][j] + h * integrated);
+                    change[i] += gain * innovation[j] + h * integrated * integral[j];
+                    system[i][j] += gain;
                 }
-                system[i][i] += i < 2 ? 1.0 : 1.0 - h * s->decay[i - 2];
             }
             if (solve(system, change)) {
                 return 1;
@@ -125,7 +129,7 @@ int c_loop(int n, const double *steps, const double (*u_measured)[2], const doub
             const double before = s->ratio * z[1] - z[0];
             for (int i = 0; i < 2; i++) {
                 z[i] += change[i];
-                integral[i] += h * (y[k][i] - z[i]);
+                integral[i] += h * (innovation[i] - change[i]);
                 z[2 + i] = clip(z[2 + i] + change[2 + i], s->low[i], s->high[i]);
             }
             if (fabs(s->radius * z[1]) < s->fading_speed &&
