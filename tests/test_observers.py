@@ -10,6 +10,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from workbench.case import Case, read_cases
 from workbench.cosim import Ending, replay
+from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.objective import judged_window, low_pass, score
 from workbench.observers import Estimator, Gains, estimators
@@ -406,3 +407,14 @@ def test_unstable_gains_end_as_a_value_not_as_an_exception(
     assert run.ending is not Ending.OK or (judged.nrmse or 0.0) > 0.15
     if run.ending is not Ending.OK:
         assert run.ending.value in judged.reason
+
+
+def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(
+    minimal: FMU, system: System
+) -> None:
+    class Silent(OpenLoop):
+        name = "silent"
+        tunable = True
+
+    with pytest.raises(InputError, match=r"silent: found no method `space`.*tunable = False"):
+        Silent.space(minimal, system, Silent.reasoned(minimal, system), 0.1, 10.0)

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future, wait
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -17,6 +17,8 @@ from threadpoolctl import threadpool_info
 
 from workbench.errors import InputError
 from workbench.pool import Pool, WorkerError
+
+from .processes import comes_true, living
 
 ROOT = Path(__file__).parents[1]
 
@@ -246,34 +248,13 @@ def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
         os.killpg(program.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
         out, errors = program.communicate(timeout=60)
     assert (out, errors, program.returncode) == ("interrupted\n", "", 0)
-    assert _comes_true(lambda: not _living(program.pid))
+    assert comes_true(lambda: not living(program.pid))
 
 
 def test_workers_end_with_a_program_that_is_killed(tmp_path: Path) -> None:
     with _started(WAITING, tmp_path) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "under way\n"
-        assert len(_living(program.pid)) > 2
+        assert len(living(program.pid)) > 2
         program.kill()
-    assert _comes_true(lambda: not _living(program.pid))
-
-
-def _comes_true(condition: Callable[[], bool]) -> bool:
-    """Wait half a minute at most, which a machine that has other work to do may need."""
-    end = time.monotonic() + 30.0
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    return condition()
-
-
-def _living(session: int) -> list[int]:
-    """Processes of a session that are not zombies."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            state = (entry / "stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue  # it ended meanwhile
-        if int(state[3]) == session and state[0] != "Z":
-            found.append(int(entry.name))
-    return found
+    assert comes_true(lambda: not living(program.pid))

@@ -35,6 +35,8 @@ from workbench.systems import load_system
 from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
+from .processes import comes_true, living
+
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
@@ -304,10 +306,11 @@ def run(out: Path, report: Callable[[str], None]) -> tuple[list[Diagnosed], bool
 def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -> None:
     """Two short stops: a load cell's gain of 1.6 % is plain, one of 0.05 % is not worth a word."""
     script = (
-        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); import test_power;"
+        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); "
+        "from tests import test_power; "
         "test_power.run(Path(sys.argv[2]), lambda line: print(line, flush=True))"
     )
-    command = [sys.executable, "-c", script, str(ROOT / "tests"), str(tmp_path)]
+    command = [sys.executable, "-c", script, str(ROOT), str(tmp_path)]
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, start_new_session=True, env=environment
@@ -315,10 +318,10 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
         assert process.stdout is not None
         assert "clean" in process.stdout.readline()
         # The next set is under way in a worker.
-        assert _comes_true(lambda: len(_living(process.pid)) > 1)
+        assert comes_true(lambda: len(living(process.pid)) > 1)
         time.sleep(3.0)  # while it starts, it would end by itself
         process.kill()
-    assert _comes_true(lambda: not _living(process.pid))
+    assert comes_true(lambda: not living(process.pid))
 
     lines: list[str] = []
     results, interrupted = run(tmp_path, lines.append)
@@ -328,27 +331,6 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert [one.verdict for one in results] == ["nothing", "found", "nothing"]
     assert named_right(results[1])
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
-
-
-def _comes_true(condition: Callable[[], bool]) -> bool:
-    """Wait a minute at most, which a machine that has other work to do may need."""
-    end = time.monotonic() + 60.0
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    return condition()
-
-
-def _living(session: int) -> list[int]:
-    """Processes of a session that are not zombies."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            state = (entry / "stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue  # it ended meanwhile
-        if int(state[3]) == session and state[0] != "Z":
-            found.append(int(entry.name))
-    return found
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import checked, instance
 from workbench.observers.gains import Gains, SearchSpace
@@ -101,8 +102,18 @@ class Estimator(ABC):
         Parameters
         ----------
         slowest, fastest : angular frequencies that recordings show [rad/s].
+
+        Raises
+        ------
+        InputError
+            If the estimator is called tunable, and does not say where.
         """
-        raise NotImplementedError(f"{cls.name} has no gains")
+        raise InputError(
+            where=f"estimator {cls.name}",
+            found="no method `space`",
+            expected="where gains are sought, because the estimator is called tunable",
+            remedy="write it, or say `tunable = False` in the class",
+        )
 
     @classmethod
     def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:

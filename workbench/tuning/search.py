@@ -144,7 +144,7 @@ def search(
 
 
 class _Objective:
-    """z of all candidates of a generation, called by SciPy in place of `map`.
+    """z of all candidates of a generation, which SciPy asks for at once.
 
     It is asked first for the population before, whose z is known, then for a trial beside each
     member. With deferred updating trial i competes with member i and no other, so that a trial has
@@ -178,8 +178,9 @@ class _Objective:
             if plan.economy:
                 self._limits = before.z
 
-    def __call__(self, function: object, candidates: Matrix) -> Vector:
-        """Z of candidates (s, n); infinite of those that have lost."""
+    def __call__(self, coordinates: Matrix) -> Vector:
+        """Z of candidates, (s,), by their coordinates (n, s); infinite of those that have lost."""
+        candidates = coordinates.T
         limits = np.full(len(candidates), np.inf) if self._limits is None else self._limits
         known = [self._known.get(one.tobytes()) for one in candidates]
         new = [i for i, one in enumerate(known) if one is None]
@@ -215,7 +216,7 @@ def _evolve(
     else:
         members = objective.before.members
     found = differential_evolution(
-        _alone,
+        objective,  # type: ignore[arg-type]  # of all candidates at once
         Bounds(np.zeros(space.start.size), np.ones(space.start.size)),
         init=members,
         maxiter=min(number, 1),
@@ -223,17 +224,12 @@ def _evolve(
         rng=rng,
         polish=False,
         updating="deferred",
-        workers=objective,  # type: ignore[arg-type]  # it is a map of one function
+        vectorized=True,
     )
     population = Population(
         found.population, found.population_energies, objective.z_k(found.population)
     )
     return population, bool(found.success)
-
-
-def _alone(candidate: Vector) -> float:
-    """Stand for the objective of one candidate; `_Objective` evaluates a generation at once."""
-    raise NotImplementedError
 
 
 def _generation(
