@@ -10,7 +10,7 @@ model Tanks "Torricelli's law in both tanks; levels in volts of the sensor"
   output Real level2Reading(unit="V") = sensor.y "Reading of the level of the lower tank";
   output Real outflow(unit="V/s") = lowerOutlet.actual "What leaves through the lower outlet";
 
-  replaceable Slots.Signal drive(u=pump) constrainedby Slots.PartialSignal(u=pump)
+  replaceable Common.Signals.Unchanged drive(u=pump) constrainedby Common.Interfaces.Signal(u=pump)
     "From the voltage to the flow of the pump";
   replaceable Slots.Outlet upperOutlet(nominal=k1*Functions.root(level1), h=level1, k=k1)
     constrainedby Slots.PartialOutlet(nominal=k1*Functions.root(level1), h=level1, k=k1)
@@ -27,7 +27,8 @@ model Tanks "Torricelli's law in both tanks; levels in volts of the sensor"
     constrainedby Slots.PartialRim(
     h=level2, surplus=upperOutlet.actual + upperRim.caught - lowerOutlet.actual)
     "Rim of the lower tank";
-  replaceable Slots.Signal sensor(u=level2) constrainedby Slots.PartialSignal(u=level2)
+  replaceable Common.Signals.Unchanged sensor(u=level2)
+    constrainedby Common.Interfaces.Signal(u=level2)
     "Sensor of the lower level";
 equation
   der(level1) = k4*drive.y - upperOutlet.actual - upperRim.leaves;

@@ -1,6 +1,8 @@
 package CascadedTanks "Two tanks, one above the other, that a pump fills and that may overflow"
+  import Common = Effects;
   annotation (
     version="1.0",
+    uses(Effects(version="1.0")),
     Documentation(info="<html>
 <p>A pump fills an upper tank, which empties into a lower one, which empties into the reservoir of the
 pump. The machine of M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noel, <em>Cascaded tanks benchmark

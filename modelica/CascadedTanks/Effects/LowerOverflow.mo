@@ -4,7 +4,7 @@ model LowerOverflow "a lower tank that overflows"
   parameter Real spilled(unit="1", min=0.0, max=1.0) = 0.0 "Of the surplus at the rim, that runs over";
   parameter Real rim(unit="V", min=2.0, max=20.0) = 10.0 "Level at the rim";
 equation
-  leaves = spilled*Functions.above(surplus, 1e-3)*0.5*(1.0 + tanh((h - rim)/0.1));
+  leaves = spilled*Common.Functions.above(surplus, 1e-3)*0.5*(1.0 + tanh((h - rim)/0.1));
   caught = 0.0;
   annotation (
     __Workbench(effect(

@@ -1,6 +1,6 @@
 within CascadedTanks.Effects;
 model PumpGainChange "a pump whose flow per voltage changes with the voltage"
-  extends Slots.PartialSignal;
+  extends Common.Interfaces.Signal;
   parameter Real curvature(unit="1/V", min=-0.08, max=0.5) = 0.0 "Relative change of the gain, per voltage";
 equation
   y = u*(1.0 + curvature*u);

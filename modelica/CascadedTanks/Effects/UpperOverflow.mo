@@ -5,7 +5,7 @@ model UpperOverflow "an upper tank that overflows, in part into the lower one"
   parameter Real rim(unit="V", min=2.0, max=20.0) = 10.0 "Level at the rim";
   parameter Real share(unit="1", min=0.0, max=1.0) = 0.5 "Of the overflow, that falls into the lower tank";
 equation
-  leaves = spilled*Functions.above(surplus, 1e-3)*0.5*(1.0 + tanh((h - rim)/0.1));
+  leaves = spilled*Common.Functions.above(surplus, 1e-3)*0.5*(1.0 + tanh((h - rim)/0.1));
   caught = share*leaves;
   annotation (
     __Workbench(effect(
