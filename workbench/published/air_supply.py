@@ -44,7 +44,9 @@ def _read_csv(folder: Path) -> list[Recording]:
         rows = list(csv.DictReader(stream))
     stamps = [datetime.fromisoformat(row["timestamp"]) for row in rows]
     time = np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
-    intake, pressure = (np.array([float(row[key]) for row in rows]) for key in ("COMP", "Reservoirs"))
+    intake, pressure = (
+        np.array([float(row[key]) for row in rows]) for key in ("COMP", "Reservoirs")
+    )
     return _cut(time, intake, np.round(pressure, 3), _CSV)
 
 
@@ -55,11 +57,11 @@ def _read_folders(folder: Path) -> list[Recording]:
 
 
 PUBLISHED = Published(
-    title="Air production unit of a metro train: pressure of the reservoir, valve of the compressor",
+    title="Air production unit of a metro train: pressure of its reservoir, flag of its compressor",
     source="N. Davari, B. Veloso, R. P. Ribeiro, J. Gama, MetroPT-3 Dataset (2023), UCI Machine "
     "Learning Repository 791, https://doi.org/10.24432/C5VW3R",
     licence="CC BY 4.0",
-    recordings="The first 1000 rows, 10 s apart: pressure of the reservoir, and COMP, which is 0 while "
+    recordings="The first 1000 rows, 10 s apart: pressure of the reservoir, and COMP, 0 while "
     "the compressor delivers. They are cut into the five cycles of the compressor. The first three "
     "are to be fitted, the last two are held out.",
     layouts=(
