@@ -15,7 +15,13 @@ from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.evidence import Item, Result, Simulations, Variation
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
-from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
+from workbench.diagnosis.quadratic import (
+    Joint,
+    Key,
+    Quadratic,
+    RecordingSystem,
+    minimum_within,
+)
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
@@ -220,14 +226,10 @@ class Fit:
 
     def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
         joint = self.quadratics(replace(lin, inflation=spread))
-        if not common:
-            return self._moved(lin.point, joint, np.zeros(len(joint.shared)))
-        point = lin.point
-        at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
-        low, high = np.array([self._reach(point, key) for key in joint.shared]).reshape(-1, 2).T
-        # Of a point that was begun beyond its bounds, the nearest bound.
-        inside = np.clip(at, low, high)
-        return self._moved(point, joint, joint.solve(low - inside, high - inside) + inside - at)
+        step = np.zeros(len(joint.shared))
+        if common:
+            step = minimum_within(joint.total(), *self.reach(lin.point, joint.shared))
+        return self._moved(lin.point, joint, step)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
@@ -237,7 +239,7 @@ class Fit:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             kind = levels if key in levels else sizes
-            kind[key] = float(np.clip(kind[key] + change, *self._reach(point, key)))
+            kind[key] = float(np.clip(kind[key] + change, *self._ends(point, key)))
         locals_ = [system.local(step) for system in joint.systems]
         count = len(self.unknowns.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
@@ -250,7 +252,14 @@ class Fit:
             phases[name] = point.phases[name] + np.clip(change, -0.5, 0.5)
         return Point(sizes, levels, deviations, phases)
 
-    def _reach(self, point: Point, key: Key) -> tuple[float, float]:
+    def reach(self, point: Point, shared: Sequence[Key]) -> tuple[Vector, Vector]:
+        """Least and greatest step of common unknowns, (p,) each; zero is between them."""
+        at = np.array([{**point.sizes, **point.levels}[key] for key in shared])
+        ends = np.array([self._ends(point, key) for key in shared]).reshape(-1, 2)
+        low, high = ends.T - at
+        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    def _ends(self, point: Point, key: Key) -> tuple[float, float]:
         """Least and greatest value after a step of a common unknown.
 
         Within the bounds of its parameter, and not too unlikely; a shape changes by half at most.

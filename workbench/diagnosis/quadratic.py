@@ -148,7 +148,3 @@ class Joint:
     def total(self) -> Quadratic:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
-
-    def solve(self, low: Vector, high: Vector) -> Vector:
-        """Best step of the common unknowns within bounds, (p,) each."""
-        return minimum_within(self.total(), low, high)

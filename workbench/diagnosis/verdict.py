@@ -11,7 +11,7 @@ from scipy.stats import bootstrap
 from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import lasting
-from workbench.diagnosis.quadratic import Quadratic, add, minimum
+from workbench.diagnosis.quadratic import Quadratic, add, minimum_within
 from workbench.diagnosis.search import (
     Fitted,
     Reporter,
@@ -195,10 +195,11 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
     """
     joint = fit.quadratics(fit.linearise(one.linearised, one.active))
     stops = joint.stops()
-    total = add([*stops, joint.prior])
+    total, within = add([*stops, joint.prior]), fit.reach(one.point, joint.shared)
     result = np.zeros(len(stops))
     for k, (stop, system) in enumerate(zip(stops, joint.systems, strict=True)):
-        z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
+        others = Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0)
+        z = minimum_within(others, *within)
         errors = system.r + system.J @ z + system.P @ system.local(z)
         shape = one.linearised.evidence[k].errors.shape
         whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
