@@ -1,6 +1,6 @@
 """Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -179,17 +179,22 @@ def pruned(
     fit: Fit,
     catalogue: Sequence[Effect],
     best: Fitted,
-    base: Fitted,
+    known: Mapping[frozenset[Effect], Fitted],
     trial: Trial,
     report: Reporter,
-) -> tuple[Fitted, Trial]:
+) -> tuple[Fitted, Trial, dict[Effect, Fitted]]:
     """Drop effects that, beside the others, do not matter or are not significant.
 
     Parameters
     ----------
-    base : the nominal model, with all derivatives.
+    known : fits by their effects, with all derivatives.
+
+    Returns
+    -------
+    best, trial : of the effects that are left.
+    less : see `lesser`.
     """
-    while best.active:
+    while less := lesser(fit, best, known):
         sigma = np.sqrt(np.diag(trial.covariance()))
         ratios = {}
         for effect in best.active:
@@ -197,7 +202,6 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
             ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
-        less = lesser(fit, best, base)
         if len(less) > 1:
             for effect, one in less.items():
                 ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
@@ -206,21 +210,23 @@ def pruned(
             break
         report(f"dropping {weakest.name}")
         best, trial = examine(fit, less[weakest], catalogue, report)
-    return best, trial
+    return best, trial, less
 
 
-def lesser(fit: Fit, best: Fitted, base: Fitted) -> dict[Effect, Fitted]:
+def lesser(
+    fit: Fit, best: Fitted, known: Mapping[frozenset[Effect], Fitted]
+) -> dict[Effect, Fitted]:
     """The best fit without each of the effects, with all derivatives.
 
     Parameters
     ----------
-    base : the nominal model, with all derivatives.
+    known : fits by their effects, with all derivatives, which need not be made again.
     """
 
     def refitted(effect: Effect) -> Fitted:
         kept = tuple(other for other in best.active if other is not effect)
-        if not kept:
-            return base
+        if frozenset(kept) in known:
+            return known[frozenset(kept)]
         start = fit.at(without(best.point, effect))
         one = fitted(fit, start, kept)
         return replace(one, linearised=fit.linearise(one.linearised, kept))

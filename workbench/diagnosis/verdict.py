@@ -20,7 +20,6 @@ from workbench.diagnosis.search import (
     examine,
     extended,
     fitted,
-    lesser,
     pruned,
     seek,
 )
@@ -122,14 +121,13 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     nominal = fitted(fit, fit.at(fit.unknowns.start()), ())
     best, steps, trial, interrupted = seek(fit, catalogue, nominal, report)
     base = steps[0].before if steps else best
-    best, trial = pruned(fit, catalogue, best, base, trial, report)
-    less = lesser(fit, best, base)
+    known = {frozenset(one.active): one for one in (base, *(step.before for step in steps))}
+    best, trial, less = pruned(fit, catalogue, best, known, trial, report)
     while (idle := _idle(fit, best, less)) is not None:
         report(f"dropping {idle.name}")
         # Beside fewer others, one that mattered may do so no longer.
         best, trial = examine(fit, less[idle], catalogue, report)
-        best, trial = pruned(fit, catalogue, best, base, trial, report)
-        less = lesser(fit, best, base)
+        best, trial, less = pruned(fit, catalogue, best, known, trial, report)
     clean = float(best.linearised.inflation.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
     explained = _share(base, best) > 1.0 - fit.decides.left
