@@ -7,6 +7,7 @@ recordings are exact solutions of the linear equations, not of the compiled mode
 from collections.abc import Sequence
 from pathlib import Path
 
+import lxml.html
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,6 +23,7 @@ from workbench.diagnosis import Outcome, diagnose, read_effects
 from workbench.diagnosis.samples import BEYOND
 from workbench.errors import InputError
 from workbench.modelica import read_library
+from workbench.report.diagnosis import write_diagnosis
 from workbench.system import System
 from workbench.systems import load_system
 
@@ -240,3 +242,18 @@ def test_mistakes_in_what_a_sensor_reads_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=match):
         system(tmp_path / "wrong", sensor)
+
+
+def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
+    heater: System, tmp_path: Path
+) -> None:
+    recordings = cases(heater, [simulated(k, LOSS, 0.0) for k in range(3)])
+    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
+    page = lxml.html.fromstring(write_diagnosis(outcome, {}, tmp_path, 1).read_bytes())
+    rows = page.xpath("//table[@id='error-table']/tbody/tr")
+    assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out"]
+    table = pd.read_csv(tmp_path / "errors.csv", dtype={"recording": str})
+    assert list(table["recording"]) == ["00", "01", "02"]
+    shown = [float(cell) for cell in rows[2].xpath("td[@class='number']/@data-value")]
+    names = ["rms_before", "mean_absolute_before", "rms_after", "mean_absolute_after"]
+    assert shown == pytest.approx(table[names].iloc[2].to_list(), rel=1e-4)
