@@ -151,15 +151,20 @@ def heater(tmp_path_factory: pytest.TempPathFactory) -> System:
     return system(tmp_path_factory.mktemp("systems") / "heater")
 
 
-def test_a_single_recording_is_cut_and_its_cause_named(heater: System, tmp_path: Path) -> None:
+def test_parts_of_a_single_recording_are_held_out_and_its_cause_named(
+    heater: System, tmp_path: Path
+) -> None:
     outcome = diagnosed(heater, cases(heater, [simulated(1, LOSS, 12.0)]), tmp_path)
-    assert [case.name for case in outcome.cases] == [f"00, part {k} of 4" for k in range(1, 5)]
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "Draught"
     size = cause.parameters["G"]
     assert size.low <= LOSS <= size.high
-    # Four unknown temperatures of the casing cost little: the interval is no wider than a tenth.
-    assert size.high - size.low < 0.2 * LOSS
+    assert size.high - size.low < 0.1 * LOSS
+    assert outcome.diagnosis.gain is not None
+    parts = outcome.diagnosis.gain.recordings
+    assert list(parts) == [f"part {k} of 10" for k in range(1, 11)]
+    # A part has a hundred seconds, five means of errors that last.
+    assert max(after for _, after in parts.values()) < 3.0
 
 
 def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_path: Path) -> None:
@@ -167,10 +172,10 @@ def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_pa
     assert outcome.diagnosis.verdict == "nothing"
 
 
-def test_a_single_short_recording_is_refused(heater: System, tmp_path: Path) -> None:
-    (case,) = cases(heater, [simulated(1, LOSS, 0.0)])
+def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -> None:
+    differing = system(tmp_path / "heaters", "[diagnosis.tolerances]\nGc = 0.05")
     with pytest.raises(InputError, match="two or more"):
-        diagnosed(heater, [case.part(slice(0, 300))], tmp_path)
+        diagnosed(differing, cases(differing, [simulated(1, LOSS, 0.0)]), tmp_path)
 
 
 def test_a_state_that_nobody_measured_starts_where_the_recording_says(

@@ -20,6 +20,8 @@ from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
 
+# A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
+_PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -133,6 +135,22 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
+    @property
+    def tests(self) -> list[str]:
+        """Names of what is held out in turn: recordings, or parts of a single one."""
+        if self.unknowns.count > 1:
+            return self.unknowns.names
+        return [f"part {k} of {self.parts}" for k in range(1, self.parts + 1)]
+
+    @property
+    def parts(self) -> int:
+        """Of a single recording, each long enough for an error that lasts."""
+        return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
+
+    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """As `quadratics`, in what is held out in turn."""
+        return self.quadratics(lin, extra).apart(self.parts)
+
     def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
@@ -163,7 +181,7 @@ class Fit:
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k])
+        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k], m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""

@@ -140,7 +140,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
         before, after = (held_out(fit, one, fast=fast) for one in (base, best))
-        gain = _gain(fit.unknowns.names, before, after)
+        gain = _gain(fit.tests, before, after)
         causes = _causes(fit, best, less, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
@@ -191,15 +191,13 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
     ----------
     fast : of blocks instead of means over a lasting time.
     """
-    joint = fit.quadratics(fit.linearise(one.linearised, one.active))
+    joint = fit.apart(fit.linearise(one.linearised, one.active))
     stops = joint.stops()
     total = add([*stops, joint.prior])
     result = np.zeros(len(stops))
     for k, (stop, system) in enumerate(zip(stops, joint.systems, strict=True)):
         z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-        errors = system.r + system.J @ z + system.P @ system.local(z)
-        shape = one.linearised.evidence[k].errors.shape
-        whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
+        whitened = system.errors(z) * np.sqrt(one.linearised.inflation)
         result[k] = (whitened**2 if fast else lasting(whitened, one.linearised.lasting)).mean()
     return result
 
