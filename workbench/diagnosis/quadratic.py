@@ -69,6 +69,20 @@ def minimum(total: Quadratic) -> Vector:
     return step
 
 
+def minimum_within(total: Quadratic, low: Vector, high: Vector) -> Vector:
+    """Where chi-squared is least within bounds of the step, (p,) each, which hold zero.
+
+    What would leave them is held there, and the others do their best beside that.
+    """
+    step, free = minimum(total), np.ones(len(low), np.bool_)
+    while (beyond := free & ((step < low) | (step > high))).any():
+        free &= ~beyond
+        step = np.where(free, 0.0, np.clip(step, low, high))
+        N, g = total.N[np.ix_(free, free)], (total.g + total.N @ step)[free]
+        step[free] = minimum(Quadratic(N, g, 0.0, total.rows))
+    return step
+
+
 @dataclass(frozen=True, eq=False)
 class RecordingSystem:
     """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
@@ -182,6 +196,6 @@ class Joint:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
 
-    def solve(self) -> Vector:
-        """Best step of the common unknowns."""
-        return minimum(self.total())
+    def solve(self, low: Vector, high: Vector) -> Vector:
+        """Best step of the common unknowns within bounds, (p,) each."""
+        return minimum_within(self.total(), low, high)
