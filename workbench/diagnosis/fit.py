@@ -15,17 +15,13 @@ from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.evidence import Item, Result, Simulations, Variation
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
-from workbench.diagnosis.quadratic import (
-    Joint,
-    Key,
-    Quadratic,
-    RecordingSystem,
-    minimum_within,
-)
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
 
+# A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
+_PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -139,6 +135,22 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
+    @property
+    def tests(self) -> list[str]:
+        """Names of what is held out in turn: recordings, or parts of a single one."""
+        if self.unknowns.count > 1:
+            return self.unknowns.names
+        return [f"part {k} of {self.parts}" for k in range(1, self.parts + 1)]
+
+    @property
+    def parts(self) -> int:
+        """Of a single recording, each long enough for an error that lasts."""
+        return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
+
+    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """As `quadratics`, in what is held out in turn."""
+        return self.quadratics(lin, extra).apart(self.parts)
+
     def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
@@ -169,7 +181,7 @@ class Fit:
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k])
+        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k], m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
@@ -226,10 +238,14 @@ class Fit:
 
     def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
         joint = self.quadratics(replace(lin, inflation=spread))
-        step = np.zeros(len(joint.shared))
-        if common:
-            step = minimum_within(joint.total(), *self.reach(lin.point, joint.shared))
-        return self._moved(lin.point, joint, step)
+        if not common:
+            return self._moved(lin.point, joint, np.zeros(len(joint.shared)))
+        point = lin.point
+        at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
+        low, high = np.array([self._reach(point, key) for key in joint.shared]).reshape(-1, 2).T
+        # Of a point that was begun beyond its bounds, the nearest bound.
+        inside = np.clip(at, low, high)
+        return self._moved(point, joint, joint.solve(low - inside, high - inside) + inside - at)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
@@ -239,7 +255,7 @@ class Fit:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
             kind = levels if key in levels else sizes
-            kind[key] = float(np.clip(kind[key] + change, *self._ends(point, key)))
+            kind[key] = float(np.clip(kind[key] + change, *self._reach(point, key)))
         locals_ = [system.local(step) for system in joint.systems]
         count = len(self.unknowns.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
@@ -252,14 +268,7 @@ class Fit:
             phases[name] = point.phases[name] + np.clip(change, -0.5, 0.5)
         return Point(sizes, levels, deviations, phases)
 
-    def reach(self, point: Point, shared: Sequence[Key]) -> tuple[Vector, Vector]:
-        """Least and greatest step of common unknowns, (p,) each; zero is between them."""
-        at = np.array([{**point.sizes, **point.levels}[key] for key in shared])
-        ends = np.array([self._ends(point, key) for key in shared]).reshape(-1, 2)
-        low, high = ends.T - at
-        return np.minimum(low, 0.0), np.maximum(high, 0.0)
-
-    def _ends(self, point: Point, key: Key) -> tuple[float, float]:
+    def _reach(self, point: Point, key: Key) -> tuple[float, float]:
         """Least and greatest value after a step of a common unknown.
 
         Within the bounds of its parameter, and not too unlikely; a shape changes by half at most.
