@@ -9,6 +9,7 @@ model SizeZeroIsNominal "No effect of this library has one by default"
   Effects.LowerOutletHead lowerHead(nominal=nominal, h=h, k=0.05);
   Effects.UpperLaminarOutlet upperLaminar(nominal=nominal, h=h, k=0.05);
   Effects.LowerLaminarOutlet lowerLaminar(nominal=nominal, h=h, k=0.05);
+  Effects.LowerTankWidens walls(nominal=nominal, h=h);
   Effects.PumpGainChange gain(u=h);
   Effects.SensorCurvature bent(u=h);
 equation
@@ -16,6 +17,7 @@ equation
     and leak.leaves == 0.0, "A rim");
   assert(upperHead.actual == nominal and lowerHead.actual == nominal and upperLaminar.actual == nominal
     and lowerLaminar.actual == nominal, "An outlet");
+  assert(walls.actual == nominal, "Walls");
   assert(gain.y == h and bent.y == h, "A signal");
   annotation (experiment(StopTime=7.0, Tolerance=1e-6));
 end SizeZeroIsNominal;
