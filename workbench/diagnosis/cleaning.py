@@ -27,10 +27,17 @@ def saturated(values: Vector, signal: Signal) -> Mask:
 def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
 
-    A command is what it is, and what is read in steps repeats itself.
+    A command is what it is, and what is read in steps repeats itself. Samples at the limit of a
+    sensor say nothing of the noise of others.
     """
-    if signal.exact:
-        return np.zeros(values.size, np.bool_)
+    within = ~saturated(values, signal)
+    wrong = np.zeros(values.size, np.bool_)
+    if not signal.exact and within.any():
+        wrong[within] = _outliers(values[within], signal, sound)
+    return wrong
+
+
+def _outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     # Odd at the ends: there too, the median of what rises or falls is the middle sample.
     beside = _ABREAST // 2
     extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
