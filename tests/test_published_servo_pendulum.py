@@ -1,0 +1,42 @@
+"""The servo's published records become cases, from each layout, and its system fits them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.case import read_case
+from workbench.prepare import write_cases
+from workbench.systems import load_system
+
+SYSTEM = load_system("servo_pendulum")
+
+
+@pytest.fixture(scope="module")
+def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Case folders of the published set, if it is at hand."""
+    servo = root.parent / "shared" / "recordings" / "real" / "servo_pendulum"
+    if not servo.exists():
+        pytest.skip("the recordings are not at hand")
+    out: Path = tmp_path_factory.mktemp("servo_pendulum")
+    write_cases("servo_pendulum", servo, out)
+    return out
+
+
+def test_records_of_one_gain_are_held_out(cases: Path) -> None:
+    held_out = {path.name for path in (cases / "held_out").iterdir()}
+    fitted = {path.name for path in (cases / "fitted").iterdir()}
+    assert len(held_out) == 4
+    assert len(fitted) == 12
+    assert {name[:5] for name in held_out} == {"kp200"}
+    assert not {name[:5] for name in fitted} & {"kp200"}
+
+
+def test_a_record_has_its_gain_and_its_signals(cases: Path) -> None:
+    case = read_case(cases / "fitted" / "kp400_lift_and_drop", SYSTEM)
+    assert case.conditions == {"kp": 400}
+    assert case.inputs == ("goal", "volts", "enabled")
+    # The motor is let go after 2 s, and the arm falls from where it was.
+    assert np.all(case["enabled"] == (case.time <= 2.0))
+    assert case["position"][400] < -0.6
+    assert case["position"].max() > 0.4
