@@ -1,13 +1,14 @@
 """Diagnosis: what a simulation gets wrong, the physical cause, and a better model.
 
     recordings -> samples -> prediction errors -> evidence -> fit -> search -> verdict -> extension
+        -> errors on recordings that were held out
 
 One FMU holds the observer model with every effect of the catalogue at size zero; an effect is
 switched on by a parameter.
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.sample_errors import Errors, apart, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
@@ -38,6 +40,7 @@ __all__ = [
     "Dependence",
     "Diagnosis",
     "Effect",
+    "Errors",
     "Extension",
     "Gain",
     "Interval",
@@ -62,6 +65,7 @@ def diagnose(
     workers: int,
     report: Reporter,
     *,
+    held_out: Sequence[Case] = (),
     every_platform: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recordings; write the extended model.
@@ -69,11 +73,14 @@ def diagnose(
     Parameters
     ----------
     system : whose observer model is diagnosed, or an extension of it: its values are kept.
-    cases : what is only there to judge by is compared if all of them have it.
+    cases : what is only there to judge by is compared if all of them have it. A single one is cut
+        into parts, since a cause is judged on what it was not fitted to.
     library : of the system, which holds the effects.
     effects : that are considered.
     out : folder of the extended model.
     report : takes a line on what is being done.
+    held_out : recordings on which only the errors of both models are measured: all that is common
+        is as fitted to the others, only what differs between recordings is fitted.
     every_platform : whether the extended FMU is for all platforms, or only for this machine's.
 
     Raises
@@ -82,13 +89,7 @@ def diagnose(
         If there are too few recordings, or one has too little that counts; if the library cannot be
         compiled, or the model is none of this library.
     """
-    if len(cases) < 2:
-        raise InputError(
-            where="recordings",
-            found=str(len(cases)),
-            expected="two or more, because a cause is judged on those it was not fitted to",
-            remedy="give the folder that holds all recordings of one machine",
-        )
+    cases = apart(cases, system)
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")
@@ -97,34 +98,49 @@ def diagnose(
         with Simulations(everything, system, given, cases, workers) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
-            best = diagnosis.best
-            found = residuals(simulations, fit, diagnosis.base.linearised, best.linearised)
             extension = _extend(
                 *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
             )
-            observers: dict[str, dict[str, tuple[float, float]]] = {}
-            turning = any(effect.order_locked for effect in best.active)
-            judged = all(system.objective.judged in case for case in cases)
-            if extension is not None and judged and not turning:
-                report("observers with both models")
-                observers = _observers(system, cases, extension.fmu)
-            levels = {key: float(value) for key, value in best.point.levels.items()}
-            return Outcome(
-                system=system,
-                cases=tuple(cases),
-                diagnosis=diagnosis,
-                residuals=found,
-                dependences=dependences(simulations, found),
-                levels={key: (value, fit.level_unit(key)) for key, value in levels.items()},
-                deviations={
-                    name: dict(zip(fit.local, map(float, row), strict=True))
-                    for name, row in zip(fit.names, best.point.deviations, strict=True)
-                },
-                set_aside={one.name: one.set_aside for one in simulations.recordings},
-                observers=observers,
-                extension=extension,
-            )
+            base, best = diagnosis.base, diagnosis.best
+            errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
+            if held_out:
+                report("errors on recordings that were held out")
+                fitted = (everything, simulations, effects, base, best)
+                errors += held_out_errors(*fitted, held_out, workers)
+            observers = _observers(simulations, diagnosis, extension, report)
+            return _outcome(simulations, fit, diagnosis, extension, observers, errors)
+
+
+def _outcome(
+    simulations: Simulations,
+    fit: Fit,
+    diagnosis: Diagnosis,
+    extension: Extension | None,
+    observers: Mapping[str, Mapping[str, tuple[float, float]]],
+    errors: Sequence[Errors],
+) -> Outcome:
+    """All that was found, with what shows it."""
+    unknowns, point = fit.unknowns, diagnosis.best.point
+    found = residuals(simulations, fit, diagnosis.base.linearised, diagnosis.best.linearised)
+    return Outcome(
+        system=simulations.system,
+        cases=tuple(simulations.cases),
+        diagnosis=diagnosis,
+        residuals=found,
+        dependences=dependences(simulations, found),
+        levels={
+            key: (float(value), unknowns.level_unit(key)) for key, value in point.levels.items()
+        },
+        deviations={
+            name: dict(zip(unknowns.local, map(float, row), strict=True))
+            for name, row in zip(unknowns.names, point.deviations, strict=True)
+        },
+        set_aside={one.name: one.set_aside for one in simulations.recordings},
+        observers=observers,
+        extension=extension,
+        errors=tuple(errors),
+    )
 
 
 def build_everything(
@@ -195,7 +211,7 @@ def _extend(
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value
-                for name, value in fit.values(point)[k].items()
+                for name, value in fit.unknowns.values(point)[k].items()
                 if name in extended.parameters or name in delays
             }
             errors = extended.at(k, known).errors
@@ -236,15 +252,29 @@ def _usual_levels(simulations: Simulations, diagnosis: Diagnosis) -> dict[str, f
 
 
 def _observers(
-    system: System, cases: Sequence[Case], after: Path
+    simulations: Simulations,
+    diagnosis: Diagnosis,
+    extension: Extension | None,
+    report: Reporter,
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Errors of the judged signal, with the gains of the nominal model in both."""
+    system, cases = simulations.system, simulations.cases
+    turning = any(effect.order_locked for effect in diagnosis.best.active)
+    judged = all(system.objective.judged in case for case in cases)
+    if extension is None or turning or not judged:
+        return {}
+    report("observers with both models")
+    gains = {}
     with open_model(system) as nominal:
-        gains = {kind.name: kind.reasoned(nominal, system) for kind in _TRIED}
+        for kind in _TRIED:
+            try:
+                gains[kind.name] = kind.reasoned(nominal, system)
+            except InputError as refused:  # a model may be fit for this, and for no observer
+                report(f"no {kind.label}: {refused.found}")
     errors: dict[str, dict[str, list[float]]] = {}
-    for one in (system, with_model(system, OBSERVER, after)):
+    for one in (system, with_model(system, OBSERVER, extension.fmu)):
         with open_model(one) as fmu:
-            for kind in _TRIED:
+            for kind in (kind for kind in _TRIED if kind.name in gains):
                 estimator = kind(fmu, one, gains[kind.name])
                 by_case = errors.setdefault(kind.name, {})
                 for case in cases:

@@ -9,15 +9,28 @@ from scipy.signal import savgol_filter
 
 from workbench.diagnosis.thresholds import Soundness
 from workbench.recording import Vector
+from workbench.system import Signal
 
-_ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
+ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 
 Mask = NDArray[np.bool_]
 
 
-def outliers(values: Vector, sound: Soundness) -> Mask:
-    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
+def saturated(values: Vector, signal: Signal) -> Mask:
+    """Where a sensor reads no further."""
+    low, high = signal.limits
+    mask: Mask = (values <= low) | (values >= high)
+    return mask
+
+
+def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
+
+    A command is what it is, and what is read in steps repeats itself.
+    """
+    if signal.exact:
+        return np.zeros(values.size, np.bool_)
     # Odd at the ends: there too, the median of what rises or falls is the middle sample.
     beside = _ABREAST // 2
     extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
@@ -27,7 +40,7 @@ def outliers(values: Vector, sound: Soundness) -> Mask:
     scale = np.maximum(1.4826 * noise, deviation_of(values))
     wrong = away > sound.spike * scale
     same = np.diff(values) == 0.0
-    if same.mean() < 0.2:
+    if same.mean() < 0.2 and not signal.resolution:
         for first, end in runs(same):
             if end - first >= sound.stuck - 1:
                 wrong[first : end + 1] = True
@@ -62,6 +75,13 @@ def smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> V
     return best
 
 
+def noise_in(values: Vector, signal: Signal) -> float:
+    """Standard deviation of the noise of a signal's samples; see `deviation_of`."""
+    if signal.exact:
+        return 0.0
+    return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
+
+
 def deviation_of(values: Vector) -> float:
     """Standard deviation of white noise on a slow signal, from its second differences.
 
@@ -79,7 +99,7 @@ def first_value(time: Vector, values: Vector, noise: float) -> float:
     count = time.size
     while count > 2:
         line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
-        if np.std(values[:count] - line(time[:count])) < _ALONG * noise:
+        if np.std(values[:count] - line(time[:count])) < ALONG * noise:
             return float(line(time[0]))
         count //= 2
     return float(values[0])
