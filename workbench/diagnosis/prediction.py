@@ -128,7 +128,8 @@ class Predictor:
 
         Returns
         -------
-        errors : (n, c) measured minus predicted.
+        errors : (n, c) measured minus predicted; zero from the second sample on after all that
+            counts.
 
         Raises
         ------
@@ -140,9 +141,10 @@ class Predictor:
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()
+        end = int(samples.blocks[-1, 1]) + 1  # one more, for rates at the last that counts
         status = _predict(
             self._model,
-            samples.time,
+            samples.time[:end],
             samples.u,
             samples.held,
             samples.y,
