@@ -238,7 +238,10 @@ def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
 def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     rng = np.random.default_rng(4)
     systems = [
-        RecordingSystem(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d)
+        RecordingSystem(
+            *(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d),
+            channels=3,
+        )
         for d in rng.normal(size=(4, 5))
     ]
     total = add([system.eliminated() for system in systems])

@@ -20,6 +20,8 @@ from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
 
+# A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
+_PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -133,6 +135,22 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
+    @property
+    def tests(self) -> list[str]:
+        """Names of what is held out in turn: recordings, or parts of a single one."""
+        if self.unknowns.count > 1:
+            return self.unknowns.names
+        return [f"part {k} of {self.parts}" for k in range(1, self.parts + 1)]
+
+    @property
+    def parts(self) -> int:
+        """Of a single recording, each long enough for an error that lasts."""
+        return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
+
+    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """As `quadratics`, in what is held out in turn."""
+        return self.quadratics(lin, extra).apart(self.parts)
+
     def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
@@ -163,7 +181,7 @@ class Fit:
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k])
+        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k], m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
@@ -220,8 +238,14 @@ class Fit:
 
     def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
         joint = self.quadratics(replace(lin, inflation=spread))
-        step = joint.solve() if common else np.zeros(len(joint.shared))
-        return self._moved(lin.point, joint, step)
+        if not common:
+            return self._moved(lin.point, joint, np.zeros(len(joint.shared)))
+        point = lin.point
+        at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
+        low, high = np.array([self._reach(point, key) for key in joint.shared]).reshape(-1, 2).T
+        # Of a point that was begun beyond its bounds, the nearest bound.
+        inside = np.clip(at, low, high)
+        return self._moved(point, joint, joint.solve(low - inside, high - inside) + inside - at)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
@@ -230,14 +254,8 @@ class Fit:
     def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
-            if key in levels:
-                middle, sigma = self.unknowns.expected(key)
-                reach = self.decides.furthest_level * sigma
-                low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
-                least, most = max(low, middle - reach), min(high, middle + reach)
-                levels[key] = float(np.clip(levels[key] + change, least, most))
-            elif key in sizes:
-                sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
+            kind = levels if key in levels else sizes
+            kind[key] = float(np.clip(kind[key] + change, *self._reach(point, key)))
         locals_ = [system.local(step) for system in joint.systems]
         count = len(self.unknowns.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
@@ -250,11 +268,19 @@ class Fit:
             phases[name] = point.phases[name] + np.clip(change, -0.5, 0.5)
         return Point(sizes, levels, deviations, phases)
 
-    def _bounded(self, key: tuple[str, str], old: float, new: float) -> float:
-        """Within the bounds of the Modelica class; a shape changes by half at most in a step."""
-        effect = self.unknowns.effects[key[0]]
+    def _reach(self, point: Point, key: Key) -> tuple[float, float]:
+        """Least and greatest value after a step of a common unknown.
+
+        Within the bounds of its parameter, and not too unlikely; a shape changes by half at most.
+        """
+        if key in point.levels:
+            middle, sigma = self.unknowns.expected(key)
+            reach = self.decides.furthest_level * sigma
+            low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
+            return max(low, middle - reach), min(high, middle + reach)
+        effect, old = self.unknowns.effects[key[0]], point.sizes[key]
         parameter = effect.size if key[1] == "amplitude" else key[1]
         low, high = self.unknowns.bounds(effect, parameter)
-        if parameter not in effect.sizes:
-            low, high = max(low, 0.5 * old), min(high, 2.0 * old)
-        return float(np.clip(new, low, high))
+        if parameter in effect.sizes:
+            return low, high
+        return max(low, 0.5 * old), min(high, 2.0 * old)

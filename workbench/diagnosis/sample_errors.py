@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,6 @@ from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import ROUNDS, Fitted
 from workbench.errors import InputError
 from workbench.system import System
-
-_PARTS = 4  # of a single recording: three quarters of it fit nearly as well as all of it
 
 
 @dataclass(frozen=True)
@@ -40,33 +37,22 @@ class Errors:
     mean_absolute: tuple[float, float]
 
 
-def apart(cases: Sequence[Case], system: System) -> list[Case]:
-    """Recordings that can be held out from each other: of a single one, its parts.
-
-    Each part starts in states of its own, which are as unknown as those of a recording.
+def refuse_too_few(cases: Sequence[Case], system: System) -> None:
+    """Refuse recordings of which none can be held out.
 
     Raises
     ------
     InputError
-        If there is only one, and it is too short, or begins with something that is applied.
+        If there is only one, and parameters differ from recording to recording.
     """
-    if len(cases) > 1:
-        return list(cases)
     compare = system.comparison
-    lasts = float(cases[0].time[-1] - cases[0].time[0]) if cases else 0.0
-    count = min(_PARTS, int(lasts / (compare.settling + compare.least)))
-    if count < 2 or compare.begins is not None:
+    if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
         raise InputError(
             where="recordings",
             found=str(len(cases)),
             expected="two or more, because a cause is judged on those it was not fitted to",
             remedy="give the folder that holds all recordings of one machine",
         )
-    edges = np.linspace(0, cases[0].time.size, count + 1).astype(int)
-    return [
-        replace(cases[0].part(slice(a, b)), name=f"{cases[0].name}, part {k} of {count}")
-        for k, (a, b) in enumerate(pairwise(edges), start=1)
-    ]
 
 
 def errors_of(

@@ -20,7 +20,6 @@ from workbench.diagnosis.search import (
     examine,
     extended,
     fitted,
-    lesser,
     pruned,
     seek,
 )
@@ -122,14 +121,13 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     nominal = fitted(fit, fit.at(fit.unknowns.start()), ())
     best, steps, trial, interrupted = seek(fit, catalogue, nominal, report)
     base = steps[0].before if steps else best
-    best, trial = pruned(fit, catalogue, best, base, trial, report)
-    less = lesser(fit, best, base)
+    known = {frozenset(one.active): one for one in (base, *(step.before for step in steps))}
+    best, trial, less = pruned(fit, catalogue, best, known, trial, report)
     while (idle := _idle(fit, best, less)) is not None:
         report(f"dropping {idle.name}")
         # Beside fewer others, one that mattered may do so no longer.
         best, trial = examine(fit, less[idle], catalogue, report)
-        best, trial = pruned(fit, catalogue, best, base, trial, report)
-        less = lesser(fit, best, base)
+        best, trial, less = pruned(fit, catalogue, best, known, trial, report)
     clean = float(best.linearised.inflation.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
     explained = _share(base, best) > 1.0 - fit.decides.left
@@ -142,7 +140,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
         before, after = (held_out(fit, one, fast=fast) for one in (base, best))
-        gain = _gain(fit.unknowns.names, before, after)
+        gain = _gain(fit.tests, before, after)
         causes = _causes(fit, best, less, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
@@ -193,15 +191,13 @@ def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
     ----------
     fast : of blocks instead of means over a lasting time.
     """
-    joint = fit.quadratics(fit.linearise(one.linearised, one.active))
+    joint = fit.apart(fit.linearise(one.linearised, one.active))
     stops = joint.stops()
     total = add([*stops, joint.prior])
     result = np.zeros(len(stops))
     for k, (stop, system) in enumerate(zip(stops, joint.systems, strict=True)):
         z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-        errors = system.r + system.J @ z + system.P @ system.local(z)
-        shape = one.linearised.evidence[k].errors.shape
-        whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
+        whitened = system.errors(z) * np.sqrt(one.linearised.inflation)
         result[k] = (whitened**2 if fast else lasting(whitened, one.linearised.lasting)).mean()
     return result
 
