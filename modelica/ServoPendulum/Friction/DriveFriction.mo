@@ -1,5 +1,5 @@
 within ServoPendulum.Friction;
-model DriveFriction "Friction of the gear that grows with the torque of the motor"
+model DriveFriction "Dry friction of the gear that grows with the torque of the motor"
   extends Common.RotationalFriction.LoadDependent(v0=1e-4, mu(max=0.9));
   annotation (
     __Workbench(effect(

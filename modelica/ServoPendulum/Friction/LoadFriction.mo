@@ -1,5 +1,5 @@
 within ServoPendulum.Friction;
-model LoadFriction "Friction of the gear that grows with the torque it carries"
+model LoadFriction "Dry friction of the gear that grows with the torque it carries"
   extends Common.RotationalFriction.LoadDependent(v0=1e-4, mu(max=0.9));
   annotation (
     __Workbench(effect(

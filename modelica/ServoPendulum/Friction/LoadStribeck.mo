@@ -1,5 +1,5 @@
 within ServoPendulum.Friction;
-model LoadStribeck "Load-dependent friction that is greater close to standstill"
+model LoadStribeck "Dry friction that grows with the load, the more so close to standstill"
   extends Common.Interfaces.Friction;
   parameter Real mu(unit="1", min=0.0, max=0.9) = 0.0 "Excess at standstill, per load";
   parameter Real vS(unit="rad/s", min=0.01, max=20.0) = 0.1 "Speed at which 1/e of it is left";
