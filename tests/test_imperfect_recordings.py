@@ -20,7 +20,9 @@ pytest.importorskip("rumoca")
 from workbench import case_from_frame
 from workbench.case import Case
 from workbench.diagnosis import Outcome, diagnose, read_effects
+from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.samples import BEYOND
+from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.modelica import read_library
 from workbench.report.diagnosis import write_diagnosis
@@ -263,3 +265,28 @@ def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
     shown = [float(cell) for cell in rows[2].xpath("td[@class='number']/@data-value")]
     names = ["rms_before", "mean_absolute_before", "rms_after", "mean_absolute_after"]
     assert shown == pytest.approx(table[names].iloc[2].to_list(), rel=1e-4)
+
+
+def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path: Path) -> None:
+    limit = 40.0
+    cut_off = system(tmp_path / "cut_off", f'saturates = ["-50 K", "{limit} K"]')
+    frames = [simulated(k, 0.0, 0.0) for k in range(3)]
+    for frame in frames:
+        frame["T [K]"] = np.minimum(frame["T [K]"], limit)
+    outcome = diagnosed(cut_off, cases(cut_off, frames), tmp_path / "out")
+    # A right model saturates where the sensor does: all samples are told, those errors are none.
+    for one, frame in zip(outcome.errors, frames, strict=True):
+        assert one.samples > 0.99 * SECONDS  # a sample between two at the limit may pass for wrong
+        below = float((frame["T [K]"] < limit).mean())
+        assert one.rms[0] == pytest.approx(NOISE * np.sqrt(below), rel=0.1)
+
+
+def test_a_fast_rise_between_slow_falls_is_no_spike(heater: System) -> None:
+    sensor = heater.signals["T"]
+    rng = np.random.default_rng(3)
+    # Ten samples up and two hundred down, as a compressor fills a reservoir that leaks.
+    sawtooth = np.tile(np.append(np.linspace(0.0, 20.0, 10), np.linspace(20.0, 0.0, 200)), 4)
+    values = sawtooth + NOISE * rng.standard_normal(sawtooth.size)
+    assert not outliers(values, sensor, SOUND).any()
+    values[[100, 300, 301, 731]] += [1.0, -2.0, -2.0, 1.5]
+    assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 300, 301, 731]

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from workbench.diagnosis.steps import step, steps
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import instance, place
+from workbench.kernel import instance
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -47,7 +47,7 @@ def moved(block: FMU, force: Callable[[float], float], start: float, end: float)
     block.start({"v": start})
     model, work = instance(block, ["F"], [], []), steps(block, np.array([0, 1]), 1)
     model.x[:], model.u[0] = block.get_states(), force(0.0)
-    assert place(model) == 0
+    block.set(block.variables(["F"]), model.u)
     found = [model.x.copy()]
     for k in range(round(end / H)):
         work.to[0] = force((k + 1) * H)

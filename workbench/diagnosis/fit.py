@@ -6,16 +6,17 @@ leaves-one-out are made of.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
-from workbench.diagnosis.evidence import Item, Result, Simulations, Variation
+from workbench.diagnosis.evidence import Evidence, Item, Result, Simulations, Variation
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
-from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
@@ -50,6 +51,31 @@ class Fit:
         self._compare = simulations.system.comparison
         self.decides = decides or thresholds(len(effects), left=self._compare.left)
         self.unknowns = Unknowns(simulations, effects, beside)
+        self._hidden = slice(0)  # blocks that do not count
+
+    def without(self, part: int) -> "Fit":
+        """The same without one part of a single recording."""
+        other = copy(self)
+        other._hidden = self.blocks_of(part)
+        return other
+
+    def blocks_of(self, part: int) -> slice:
+        """Blocks of a part of a single recording."""
+        edges = part_edges(len(self._simulations.recordings[0].blocks), self.parts)
+        return slice(edges[part], edges[part + 1])
+
+    def hide(self, lin: Linearised) -> Linearised:
+        """The same, as if what is hidden from this fit had neither errors nor derivatives."""
+        return replace(lin, evidence=tuple(self._shown(lin.evidence)))
+
+    def _shown(self, evidence: Sequence[Evidence]) -> Sequence[Evidence]:
+        if self._hidden == slice(0):
+            return evidence
+        (one,) = evidence
+        errors, jacobian = one.errors.copy(), one.jacobian.copy()
+        errors[self._hidden] = 0.0
+        jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
+        return (replace(one, errors=errors, jacobian=jacobian),)
 
     @property
     def delays(self) -> tuple[Key, ...]:
@@ -63,7 +89,7 @@ class Fit:
 
     def at(self, point: Point) -> Linearised:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
-        evidence = self._simulations.at(self.unknowns.values(point))
+        evidence = self._shown(self._simulations.at(self.unknowns.values(point)))
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
@@ -95,9 +121,8 @@ class Fit:
         if not missing:
             return lin
         values = self.unknowns.values(lin.point)
-        return lin.extended(
-            missing, self._simulations.derivatives(values, list(missing.values()), lin.evidence)
-        )
+        more = self._simulations.derivatives(values, list(missing.values()), lin.evidence)
+        return self.hide(lin.extended(missing, more))
 
     def _tolerances(self) -> dict[Key, Variation]:
         """Columns of what differs from stop to stop."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
 
@@ -132,9 +133,14 @@ class RecordingSystem:
         return step
 
 
+def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
+    """First block of each part of a recording, and the end of the last one, (parts + 1,)."""
+    return np.linspace(0, blocks, parts + 1).astype(np.intp)
+
+
 def _cut(one: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
     """One recording in parts, of blocks that follow each other; the first has the error at rest."""
-    edges = np.linspace(0, (one.r.size - 1) // one.channels, parts + 1).astype(int) * one.channels
+    edges = part_edges((one.r.size - 1) // one.channels, parts) * one.channels
     rest = np.zeros(one.r.size)
     rest[-1] = 1.0
     cut = []

@@ -24,7 +24,7 @@ class Errors:
     Attributes
     ----------
     held_out : whether nothing common to the recordings was fitted to this one.
-    samples : that count.
+    samples : whose errors are told.
     rms, mean_absolute : of these, (before, after) [unit].
     """
 
@@ -62,7 +62,7 @@ def errors_of(
     found = []
     for k, one in enumerate(simulations.recordings):
         sizes = [lin.evidence[k].sizes for lin in (before, after)]
-        samples = int((one.blocks[:, 1] - one.blocks[:, 0]).sum())
+        samples = int(one.told.sum())
         for c, channel in enumerate(channels(simulations.system, one.signals)):
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
             found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))

@@ -18,6 +18,7 @@ from workbench.kernel import (
     compiled,
     differentiate,
     evaluate,
+    implicit,
     linearise,
     place,
     set_inputs,
@@ -41,7 +42,8 @@ class Steps(NamedTuple):
     stiff : (p,) states that are stepped implicitly.
     nominal : (n,) sizes of the states.
     a : (n, p) columns of the Jacobian by the stiff states.
-    inverse : (p, p) of I - gamma h A, for them; step : (1,) that it is for [s].
+    system : (p, 2 p) I - gamma h A for them, and its inverse; step : (1,) that it is for [s].
+    full : (n, n + 1) the same of all states, and Newton's correction.
     age : (1,) steps that the Jacobian has served.
     from_, to : (m,) inputs at the beginning and at the end of a step.
     """
@@ -49,10 +51,9 @@ class Steps(NamedTuple):
     stiff: NDArray[np.intp]
     nominal: Vector
     a: Matrix
-    inverse: Matrix
+    system: Matrix
     step: Vector
     age: NDArray[np.intp]
-    system: Matrix
     full: Matrix
     from_: Vector
     to: Vector
@@ -63,7 +64,6 @@ class Steps(NamedTuple):
     k2: Vector
     begin: Vector
     known: Vector
-    residual: Matrix
     scale: Vector
     picked: Vector
 
@@ -78,14 +78,13 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
     """
     n, p = len(fmu.states), stiff.size
     nominal = {v.name: v.nominal for v in fmu.description.variables}
-    square = np.zeros((p, p))
     return Steps(
         stiff,
         np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
-        *(np.zeros((n, p)), square, np.zeros(1), np.full(1, _KEPT), square.copy()),
-        *(np.zeros((n, n)), np.zeros(inputs), np.zeros(inputs)),
+        *(np.zeros((n, p)), np.zeros((p, 2 * p)), np.zeros(1), np.full(1, _KEPT)),
+        *(np.zeros((n, n + 1)), np.zeros(inputs), np.zeros(inputs)),
         *(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)),
-        *(np.zeros(n), np.zeros((n, 1)), np.zeros(n), np.zeros(p)),
+        *(np.zeros(n), np.zeros(n), np.zeros(p)),
     )
 
 
@@ -105,20 +104,20 @@ def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
     for r in range(p):
         for c in range(p):
             work.system[r, c] = -_GAMMA * h * work.a[work.stiff[r], c]
-            work.inverse[r, c] = 1.0 if r == c else 0.0
+            work.system[r, p + c] = 1.0 if r == c else 0.0
         work.system[r, r] += 1.0
     work.step[0] = h
-    return solve(work.system, work.inverse)
+    return solve(work.system)
 
 
 @compiled
 def _solve(work, h, k):  # type: ignore[no-untyped-def]
     """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
-    stiff, picked = work.stiff, work.picked
-    for r in range(stiff.size):
+    stiff, picked, p = work.stiff, work.picked, work.stiff.size
+    for r in range(p):
         picked[r] = 0.0
-        for c in range(stiff.size):
-            picked[r] += work.inverse[r, c] * k[stiff[c]]
+        for c in range(p):
+            picked[r] += work.system[r, p + c] * k[stiff[c]]
     for i in range(k.size):
         for c in range(stiff.size):
             k[i] += _GAMMA * h * work.a[i, c] * picked[c]
@@ -264,7 +263,7 @@ def _implicit(model, work, h):  # type: ignore[no-untyped-def]
         share = 1.0
         for i in range(n):
             known[i] = model.x[i]
-            work.moved[i] = work.residual[i, 0]
+            work.moved[i] = work.full[i, n]
         for _ in range(_HALVED):
             for i in range(n):
                 model.x[i] = known[i] + share * work.moved[i]
@@ -278,7 +277,7 @@ def _implicit(model, work, h):  # type: ignore[no-untyped-def]
             return 1
         if left < _CLOSE:
             for i in range(n):
-                model.x[i] += work.residual[i, 0]
+                model.x[i] += work.full[i, n]
             return set_states(model)
         if linearise(model, n) or evaluate(model):
             return 1
@@ -288,15 +287,14 @@ def _implicit(model, work, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def _correction(model, work, h):  # type: ignore[no-untyped-def]
-    """Newton's correction by the Jacobian at hand into work.residual; returns its relative size."""
+    """Newton's correction becomes the last column of work.full; returns its relative size."""
     n = model.x.size
-    for r in range(n):
-        work.residual[r, 0] = work.begin[r] + h * model.dx[r] - model.x[r]
-        for c in range(n):
-            work.full[r, c] = (1.0 if r == c else 0.0) - h * model.jacobian[c, r]
-    if solve(work.full, work.residual):
+    implicit(model, h, work.full)
+    for i in range(n):
+        work.full[i, n] = work.begin[i] + h * model.dx[i] - model.x[i]
+    if solve(work.full):
         return np.inf
     size = 0.0
     for i in range(n):
-        size = max(size, abs(work.residual[i, 0]) / work.scale[i])
+        size = max(size, abs(work.full[i, n]) / work.scale[i])
     return size

@@ -1,4 +1,11 @@
-"""A servo that swings a pendulum: recordings of the Rhoban team for its friction models."""
+"""A servo that swings a pendulum: recordings of the Rhoban team for its friction models.
+
+Protocol: the twelve records of gains 100, 400 and 800 are fitted, the four of gain 200 held out.
+Each is simulated freely over its 6 s, controller in the loop, from goal, supply voltage and whether
+the motor is driven, which are taken as exactly known; torque constant, resistance, inertia and zero
+are common to all records. It starts at rest where the encoder reads, both within what its steps
+leave open. Metric: mean absolute error of the position, over all samples and records.
+"""
 
 import json
 from collections.abc import Mapping
