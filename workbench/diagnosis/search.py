@@ -1,6 +1,6 @@
 """Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -51,28 +51,34 @@ class Step:
 
 
 def seek(
-    fit: Fit, catalogue: Sequence[Effect], best: Fitted, report: Reporter
-) -> tuple[Fitted, list[Step], Trial, bool]:
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: Fitted,
+    steps: list[Step],
+    dropped: Collection[Effect],
+    report: Reporter,
+) -> tuple[Fitted, Trial, bool]:
     """Find what is missing.
 
     Parameters
     ----------
-    best : the nominal model, fitted.
+    best : what was found before, fitted; at first the nominal model.
+    steps : how that was found; more are added.
+    dropped : effects that are not sought.
 
     Returns
     -------
     best : the effects that are needed, fitted.
-    steps : how they were found.
     trial : all other effects about the best point.
     interrupted : whether Ctrl-C ended it; before anything was found it ends the diagnosis.
     """
-    steps: list[Step] = []
+    sought = [effect for effect in catalogue if effect not in dropped]
     try:
         while True:
             best, trial = examine(fit, best, catalogue, report)
-            step = _step(fit, catalogue, best, trial, report)
+            step = _step(fit, sought, best, trial, report)
             if step is None:
-                return best, steps, trial, False
+                return best, trial, False
             steps.append(step)
             best = step.rivals[0]
     except KeyboardInterrupt:
@@ -80,14 +86,14 @@ def seek(
             raise
         report("interrupted: no more causes are sought, what was found is finished")
         best, trial = examine(fit, best, catalogue, report)
-        return best, steps, trial, True
+        return best, trial, True
 
 
 def _step(
     fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
 ) -> Step | None:
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
-    scores = tuple(trial.scores())
+    scores = tuple(one for one in trial.scores() if one.effect in catalogue)
     rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
     if not rivals:
         return None

@@ -1,0 +1,189 @@
+"""Which effects recordings need: found one by one, dropped, exchanged, until nothing changes.
+
+Source: A. J. Miller (2002), Subset Selection in Regression, 2nd ed., chapter 3 (forward selection,
+elimination, replacement).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from workbench.diagnosis.catalogue import Effect, variant
+from workbench.diagnosis.crossvalidation import CrossValidation
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.search import (
+    Fitted,
+    Reporter,
+    Step,
+    beyond,
+    examine,
+    extended,
+    fitted,
+    pruned,
+    seek,
+)
+from workbench.diagnosis.trial import Prospect, Trial, shapes
+from workbench.fmu import Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The effects that are needed, and how they were found.
+
+    Attributes
+    ----------
+    base, best : the nominal model and the last one, fitted.
+    less : the best fit without each of the effects.
+    steps : how they were found.
+    trial : of all other effects about the best point.
+    twins : names of effects that explain the data as well as each of them.
+    names, cosines : effects, and the similarity of their signatures in these data, (e, e).
+    interrupted : whether the search was ended before its end.
+    validation : of the fits.
+    """
+
+    base: Fitted
+    best: Fitted
+    less: Mapping[Effect, Fitted]
+    steps: tuple[Step, ...]
+    trial: Trial
+    twins: Mapping[Effect, tuple[str, ...]]
+    names: tuple[str, ...]
+    cosines: Matrix
+    interrupted: bool
+    validation: CrossValidation
+
+
+def select(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Selection:
+    """Find what a set of recordings needs.
+
+    An effect that was dropped beside others is not taken up again; one that explains clearly more
+    in place of another replaces it. So each round has less to choose from, or fits better.
+    """
+    report("nominal model, levels calibrated")
+    best = fitted(fit, fit.at(fit.unknowns.start()), ())
+    validation, dropped = CrossValidation(fit), set[Effect]()
+    steps: list[Step] = []
+    while True:
+        best, trial, interrupted = seek(fit, catalogue, best, steps, dropped, report)
+        base = steps[0].before if steps else best
+        known = {frozenset(one.active): one for one in (base, *(step.before for step in steps))}
+        sought = set(best.active)
+        best, trial, less = pruned(fit, catalogue, best, known, trial, report)
+        while (idle := _idle(fit, validation, best, less)) is not None:
+            report(f"dropping {idle.name}")
+            # Beside fewer others, one that mattered may do so no longer.
+            best, trial = examine(fit, less[idle], catalogue, report)
+            best, trial, less = pruned(fit, catalogue, best, known, trial, report)
+        if (gone := sought - set(best.active)) and not interrupted:
+            dropped |= gone
+            continue
+        names, cosines = _confusability(trial, catalogue)
+        alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
+        replaced = [one for fits in alike.values() for one in fits.values()]
+        better = min(replaced, key=lambda one: beyond(one, best), default=best)
+        if interrupted or beyond(best, better) < fit.decides.needed:
+            break
+        report(f"{better.active[-1].name} explains more than what it replaces")
+        best = better
+    twins = {
+        one: tuple(name for name, other in fits.items() if _close(fit, less[one], other, best))
+        for one, fits in alike.items()
+    }
+    return Selection(
+        *(base, best, less, tuple(steps), trial, twins, names, cosines, interrupted, validation)
+    )
+
+
+def _idle(
+    fit: Fit, validation: CrossValidation, best: Fitted, less: Mapping[Effect, Fitted]
+) -> Effect | None:
+    """A cause that beside others explains next to nothing on held-out stops, if there is one."""
+    if len(best.active) < 2:
+        return None
+    shares = {
+        effect: validation.explained(one, best, fast=effect.order_locked)[0]
+        for effect, one in less.items()
+    }
+    weakest = min(shares, key=lambda effect: shares[effect])
+    return weakest if shares[weakest] < fit.decides.idle else None
+
+
+def _alike(
+    fit: Fit,
+    effect: Effect,
+    best: Fitted,
+    less: Fitted,
+    steps: Sequence[Step],
+    names: Sequence[str],
+    cosines: Matrix,
+) -> dict[str, Fitted]:
+    """Fits of effects in place of one, beside the other causes, by name.
+
+    Of those with a like signature, and of rivals that it met in a step; where it was named and they
+    were no match for it, they are none now.
+
+    Parameters
+    ----------
+    less : the best fit without the effect.
+    """
+    row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
+    alike = {name for name in names if row[name] > 1.0 - fit.decides.twin}
+    found: dict[str, Fitted] = {}
+    for step in steps:
+        winner = step.rivals[0]
+        rivals = {rival.active[-1].name: rival for rival in step.rivals}
+        if effect.name not in rivals:
+            continue
+        close = {name for name, one in rivals.items() if _close(fit, step.before, one, winner)}
+        named = winner.active[-1] is effect
+        alike |= close if named else set(rivals)
+        if named and set(winner.active) == set(best.active):
+            found |= {name: rivals[name] for name in close}
+            alike -= set(rivals)
+    alike -= {one.name for one in best.active} | set(found)
+    others: dict[str, Prospect] = {}
+    for score in (score for step in steps for score in step.scores):
+        if score.effect.name in alike:
+            others.setdefault(score.effect.name, score)
+    fits = fit.together(partial(extended, fit, less), list(others.values()))
+    found |= dict(zip(others, fits, strict=True))
+    return {name: one for name, one in found.items() if name not in {e.name for e in best.active}}
+
+
+def _close(fit: Fit, before: Fitted, one: Fitted, best: Fitted) -> bool:
+    """Whether chi-squared does not tell two effects apart, either of which explains."""
+    form = max(fit.decides.form, fit.decides.form_share * beyond(before, best))
+    return beyond(one, best) < form
+
+
+def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
+    """Cosines of the signatures of all effects, beside levels and tolerances; 1 is a twin."""
+    joint = trial.joint
+    total = joint.total().N
+    levels = [j for j, key in enumerate(joint.shared) if key in trial.levels]
+    own: dict[str, list[int]] = {}
+    for effect in catalogue:
+        middle = variant(effect, shapes(effect)[len(shapes(effect)) // 2])
+        keys = [(effect.name, effect.label), *((middle, name) for name in effect.sizes)]
+        at = [joint.shared.index(key) for key in keys if key in joint.shared]
+        if at:
+            own[effect.name] = at
+    solved = np.linalg.lstsq(total[np.ix_(levels, levels)], total[levels], rcond=None)[0]
+    rest = total - total[:, levels] @ solved
+    roots = {name: _inverse_root(rest[np.ix_(at, at)]) for name, at in own.items()}
+    cosines = np.eye(len(own))
+    for i, (a, at_a) in enumerate(own.items()):
+        for j, (b, at_b) in enumerate(own.items()):
+            coupling = roots[a] @ rest[np.ix_(at_a, at_b)] @ roots[b]
+            cosines[i, j] = np.linalg.norm(coupling, 2)
+    return tuple(own), np.clip(cosines, 0.0, 1.0)
+
+
+def _inverse_root(matrix: Matrix) -> Matrix:
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > 1e-9 * max(values[-1], 1e-300)
+    root: Matrix = (vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T
+    return root
