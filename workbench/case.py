@@ -55,12 +55,19 @@ class Case:
     @property
     def u(self) -> Matrix:
         """(n, m) measured inputs, SI."""
-        return read_only(np.column_stack([self.signals[name] for name in self.inputs]))
+        return self._table(self.inputs)
 
     @property
     def y(self) -> Matrix:
         """(n, l) measured outputs, SI."""
-        return read_only(np.column_stack([self.signals[name] for name in self.outputs]))
+        return self._table(self.outputs)
+
+    def _table(self, names: Sequence[str]) -> Matrix:
+        """Some signals as columns, also none."""
+        table = np.empty((self.time.size, len(names)))
+        for j, name in enumerate(names):
+            table[:, j] = self.signals[name]
+        return read_only(table)
 
     def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
         """The same case with some signals replaced."""

@@ -97,7 +97,8 @@ class System:
     settles : [s] in which a model comes to rest at an operating point.
     sample_time : [s] of usual recordings.
     cases : folder of recordings that come with the system, or None.
-    states : of the observer model that the system comes with; observers correct these.
+    states : of the observer model that the system comes with, None before that is known; observers
+        correct these.
     """
 
     name: str
@@ -130,7 +131,7 @@ class System:
     shortest: float = 0.0
     settles: float = 10.0
     sample_time: float = 0.005
-    states: tuple[str, ...] = ()
+    states: tuple[str, ...] | None = None
     cases: Path | None = None
 
     @property

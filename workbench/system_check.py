@@ -120,7 +120,7 @@ def _parameters(system: System) -> Iterator[_Reference]:
 def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference]:
     """States and outputs of the model."""
     state, output = "a continuous state of the model", "a variable of the model"
-    states, compared = system.states, system.comparison
+    states, compared = system.states or (), system.comparison
     for name in (*system.walks, *system.spreads):
         yield f"{system.source}, [states.{name}]", name, states, state
     for one in system.estimated:

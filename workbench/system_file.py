@@ -89,7 +89,7 @@ def with_model(system: System, role: str, path: Path | None) -> System:
     return replace(
         changed,
         values={**_values(description), **system.given},
-        states=system.states or description.states,
+        states=description.states if system.states is None else system.states,
     )
 
 
@@ -114,14 +114,13 @@ def _models(file: Table, path: Path) -> dict[str, Model]:
 def _measured(file: Table) -> dict[str, tuple[Signal, ...]]:
     """Measured signals by group."""
     groups = {group: read_measured(file, group) for group in ("inputs", "outputs", "judged")}
-    for group in ("inputs", "outputs"):
-        if not groups[group]:
-            raise InputError(
-                where=file.where,
-                found=f"no [{group}]",
-                expected="measured inputs, which drive the model, and outputs, which correct it",
-                remedy=f"add a table [{group}.NAME] for each",
-            )
+    if not groups["outputs"]:
+        raise InputError(
+            where=file.where,
+            found="no [outputs]",
+            expected="measured outputs, which correct the model",
+            remedy="add a table [outputs.NAME] for each",
+        )
     return groups
 
 

@@ -285,7 +285,7 @@ class Predictor:
         stiff = [
             i
             for i, name in enumerate(fmu.states)
-            if name in self._system.states or rates[i] > _SWIFT
+            if name in (self._system.states or ()) or rates[i] > _SWIFT
         ]
         p = len(stiff)
         square = np.zeros((p, p))

@@ -62,7 +62,7 @@ def _spectrum(N: Matrix) -> tuple[Vector, Vector, Matrix]:
 def minimum(total: Quadratic) -> Vector:
     """Where chi-squared is least; unknowns that the data do not show stay."""
     scale, values, vectors = _spectrum(total.N)
-    kept = values > 1e-10 * values[-1]
+    kept = values > 1e-10 * values.max(initial=0.0)
     along = vectors[:, kept]
     step: Vector = -scale * (along @ ((along.T @ (scale * total.g)) / values[kept]))
     return step
