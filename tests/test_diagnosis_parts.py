@@ -262,7 +262,9 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
 
 
 def linearised(errors: Matrix) -> Linearised:
-    evidence = (Evidence(errors, 0.0, np.zeros((errors.size + 1, 0))),)
+    evidence = (
+        Evidence(errors, 0.0, np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))),
+    )
     return Linearised(Point({}, {}, np.zeros((1, 5)), {}), (), evidence, 20, np.ones(3), 0.0)
 
 

@@ -175,6 +175,7 @@ def diagnose(
     system: System,
     cases: Sequence[Case],
     *,
+    held_out: Sequence[Case] = (),
     effects: Sequence[str] = (),
     out: str | Path | None = None,
     workers: int | None = None,
@@ -184,6 +185,7 @@ def diagnose(
 
     Parameters
     ----------
+    held_out : recordings on which only the errors of both models are measured.
     effects : names of those to consider; all of the library unless some are given.
     out : folder of the extended model; a temporary one unless another is given.
     workers : processes, one per processor unless another number is given.
@@ -198,4 +200,6 @@ def diagnose(
     chosen = choose(effects, read_effects(library, system.models[OBSERVER].name))
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="diagnosis-"))
     number = workers or os.cpu_count() or 1
-    return diagnose_system(system, cases, library, chosen, folder, number, report)
+    return diagnose_system(
+        *(system, cases, library, chosen, folder, number, report), held_out=held_out
+    )

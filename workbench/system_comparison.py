@@ -123,6 +123,7 @@ class Comparison:
     lasting : [s] from which on an error is no noise.
     least : [s] of a recording that must count.
     settling : [s] at the start, in which the simulation finds its states.
+    left : share of lasting errors that right causes may leave: what the model simplifies [1].
     channels : what is compared, in this order.
     leading : a motion that is led, or None.
     begins : input that is applied in each recording, and by how much above its rest.
@@ -137,6 +138,7 @@ class Comparison:
     lasting: float
     least: float
     settling: float
+    left: float
     channels: tuple[Channel, ...]
     leading: Leading | None
     begins: Threshold | None

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from workbench.comparison_tables import read_comparison
 from workbench.description import Description, read_description
 from workbench.errors import InputError
 from workbench.system import OBSERVER, System
@@ -11,7 +12,6 @@ from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
 from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
-    read_comparison,
     read_condition_kinds,
     read_derived,
     read_estimated,
@@ -154,7 +154,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
         objective=Objective("", {}, 0.0, None, None, ""),
-        comparison=Comparison(0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
+        comparison=Comparison(0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
         cases=path.parent / cases if (cases := file.text("cases", "")) else None,

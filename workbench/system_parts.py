@@ -44,7 +44,8 @@ class Signal:
     unit : SI, of the model's variable and of all values.
     label : what it is, for people.
     shown : unit in figures.
-    noise, relative_noise : standard deviation of one sample [unit], plus this share of its size.
+    noise, relative_noise : standard deviation of one sample [unit], plus this share of its size;
+        an input without noise is exactly known.
     relative_error : share of its size by which a filter lets it be wrong, beyond noise [1].
     scale : typical size [unit].
     scale_error : share by which its scale may be wrong, which gains must bear [1].
@@ -53,6 +54,8 @@ class Signal:
     smoothed : [s] windows of a parabola and of a line that take the noise from an input where it
         allows that, before it drives a model; empty: it is taken as it is.
     held : whether an input stays as it was sampled until the next sample; else it goes there.
+    resolution : step in which it is read, 0 where that is not known [unit].
+    limits : between which its sensor reads; what reaches them is saturated [unit].
     """
 
     name: str
@@ -68,10 +71,17 @@ class Signal:
     mode: Mode | None
     smoothed: tuple[float, ...]
     held: bool
+    resolution: float
+    limits: tuple[float, float]
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
         return self.noise + self.relative_noise * np.abs(values)
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is known without an error, as a command is."""
+        return self.noise == 0.0 and self.relative_noise == 0.0 and self.resolution == 0.0
 
     @property
     def noise_at_scale(self) -> float:

@@ -2,10 +2,13 @@
 
 import argparse
 import time
+from collections.abc import Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from importlib.metadata import version
 from pathlib import Path
 
+from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
     add_recordings,
@@ -15,6 +18,7 @@ from workbench.commands.arguments import (
     require_compiler,
 )
 from workbench.diagnosis import choose, diagnose, read_effects
+from workbench.errors import InputError, closest
 from workbench.modelica import read_library
 from workbench.report.diagnosis import write_diagnosis
 from workbench.system import OBSERVER
@@ -35,6 +39,7 @@ def add(commands: Commands) -> None:
         epilog="examples:\n"
         "  python -m workbench diagnose my_recordings --out results/mine\n"
         "  python -m workbench diagnose --system my_machine --effects Seepage\n"
+        "  python -m workbench diagnose my_recordings --held-out 'cold_*'\n"
         "  python -m workbench diagnose new_recordings --model results/mine/model/Extended.fmu\n"
         "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
         "  python -m workbench diagnose --list",
@@ -42,6 +47,14 @@ def add(commands: Commands) -> None:
     )
     add_recordings(parser, out="results/diagnose")
     add_system(parser)
+    parser.add_argument(
+        "--held-out",
+        nargs="+",
+        default=[],
+        metavar="CASE",
+        help="recordings by name (* is any letters), on which only errors of both models are "
+        "measured",
+    )
     parser.add_argument(
         "--model",
         type=Path,
@@ -74,6 +87,23 @@ def add(commands: Commands) -> None:
     parser.set_defaults(run=_diagnose)
 
 
+def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
+    """Recordings that are fitted, and those that are held out."""
+    names = [case.name for case in cases]
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise InputError(
+                where=f"--held-out {pattern}",
+                found=f"no recording of this name{closest(pattern, names)}",
+                expected=f"some of {', '.join(names)}",
+                remedy="correct the name",
+            )
+    held_out = [
+        case for case in cases if any(fnmatchcase(case.name, pattern) for pattern in patterns)
+    ]
+    return [case for case in cases if case not in held_out], held_out
+
+
 def _diagnose(options: argparse.Namespace) -> int:
     system = load_system(options.system)
     if options.library is not None:
@@ -86,16 +116,17 @@ def _diagnose(options: argparse.Namespace) -> int:
         print("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return 0
     require_compiler()
-    cases = given_cases(options.cases, system)
+    cases, held_out = _parted(given_cases(options.cases, system), options.held_out)
     begin = time.perf_counter()
 
     def report(line: str) -> None:
         print(f"{time.perf_counter() - begin:6.1f} s  {line}", flush=True)
 
-    report(f"{len(cases)} recordings")
+    report(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
     options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
         *(system, cases, library, effects, options.out, options.workers, report),
+        held_out=held_out,
         every_platform=options.platforms == "all",
     )
     with open_model(system) as model:

@@ -1,6 +1,7 @@
 """Diagnosis: what a simulation gets wrong, the physical cause, and a better model.
 
     recordings -> samples -> prediction errors -> evidence -> fit -> search -> verdict -> extension
+        -> errors on recordings that were held out
 
 One FMU holds the observer model with every effect of the catalogue at size zero; an effect is
 switched on by a parameter.
@@ -20,6 +21,7 @@ from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.sample_errors import Errors, apart, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
@@ -38,6 +40,7 @@ __all__ = [
     "Dependence",
     "Diagnosis",
     "Effect",
+    "Errors",
     "Extension",
     "Gain",
     "Interval",
@@ -62,6 +65,7 @@ def diagnose(
     workers: int,
     report: Reporter,
     *,
+    held_out: Sequence[Case] = (),
     every_platform: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recordings; write the extended model.
@@ -69,11 +73,14 @@ def diagnose(
     Parameters
     ----------
     system : whose observer model is diagnosed, or an extension of it: its values are kept.
-    cases : what is only there to judge by is compared if all of them have it.
+    cases : what is only there to judge by is compared if all of them have it. A single one is cut
+        into parts, since a cause is judged on what it was not fitted to.
     library : of the system, which holds the effects.
     effects : that are considered.
     out : folder of the extended model.
     report : takes a line on what is being done.
+    held_out : recordings on which only the errors of both models are measured: all that is common
+        is as fitted to the others, only what differs between recordings is fitted.
     every_platform : whether the extended FMU is for all platforms, or only for this machine's.
 
     Raises
@@ -82,13 +89,7 @@ def diagnose(
         If there are too few recordings, or one has too little that counts; if the library cannot be
         compiled, or the model is none of this library.
     """
-    if len(cases) < 2:
-        raise InputError(
-            where="recordings",
-            found=str(len(cases)),
-            expected="two or more, because a cause is judged on those it was not fitted to",
-            remedy="give the folder that holds all recordings of one machine",
-        )
+    cases = apart(cases, system)
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")
@@ -98,7 +99,8 @@ def diagnose(
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
             best = diagnosis.best
-            found = residuals(simulations, fit, diagnosis.base.linearised, best.linearised)
+            ends = diagnosis.base.linearised, best.linearised
+            found = residuals(simulations, fit, *ends)
             extension = _extend(
                 *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
@@ -122,6 +124,13 @@ def diagnose(
                     for name, row in zip(fit.names, best.point.deviations, strict=True)
                 },
                 set_aside={one.name: one.set_aside for one in simulations.recordings},
+                errors=(
+                    *errors_of(simulations, *ends, held_out=False),
+                    *held_out_errors(
+                        *(everything, simulations, effects, diagnosis.base, best),
+                        *(held_out, workers),
+                    ),
+                ),
                 observers=observers,
                 extension=extension,
             )

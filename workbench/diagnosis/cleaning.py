@@ -9,6 +9,7 @@ from scipy.signal import savgol_filter
 
 from workbench.diagnosis.thresholds import Soundness
 from workbench.recording import Vector
+from workbench.system import Signal
 
 _ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
@@ -16,8 +17,20 @@ _ABREAST = 11  # samples of the running median
 Mask = NDArray[np.bool_]
 
 
-def outliers(values: Vector, sound: Soundness) -> Mask:
-    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme."""
+def saturated(values: Vector, signal: Signal) -> Mask:
+    """Where a sensor reads no further."""
+    low, high = signal.limits
+    mask: Mask = (values <= low) | (values >= high)
+    return mask
+
+
+def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
+
+    A command is what it is, and what is read in steps repeats itself.
+    """
+    if signal.exact:
+        return np.zeros(values.size, np.bool_)
     # Odd at the ends: there too, the median of what rises or falls is the middle sample.
     beside = _ABREAST // 2
     extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
@@ -27,7 +40,7 @@ def outliers(values: Vector, sound: Soundness) -> Mask:
     scale = np.maximum(1.4826 * noise, deviation_of(values))
     wrong = away > sound.spike * scale
     same = np.diff(values) == 0.0
-    if same.mean() < 0.2:
+    if same.mean() < 0.2 and not signal.resolution:
         for first, end in runs(same):
             if end - first >= sound.stuck - 1:
                 wrong[first : end + 1] = True
@@ -60,6 +73,13 @@ def smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> V
             # Of a parabola over n samples, the variance is 9/4 of that of a mean.
             noise *= 1.5 / np.sqrt(window)
     return best
+
+
+def noise_in(values: Vector, signal: Signal) -> float:
+    """Standard deviation of the noise of a signal's samples; see `deviation_of`."""
+    if signal.exact:
+        return 0.0
+    return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
 
 
 def deviation_of(values: Vector) -> float:

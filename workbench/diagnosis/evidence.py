@@ -61,11 +61,13 @@ class Evidence:
     ----------
     errors : (b, c) whitened prediction errors of the blocks, by channel.
     rest : whitened error of the input at rest.
+    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units.
     jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
     """
 
     errors: Matrix
     rest: float
+    sizes: Matrix
     jacobian: Matrix
 
     @property
@@ -117,14 +119,16 @@ class Simulator:
         values : of the FMU's variables and of delays, SI.
         """
         simulated, rest = self._simulated(number, values)
-        errors = self._whitened(number, simulated, values)
+        read_ = self._read(number, simulated, values)
+        errors = self._whitened(number, read_)
         columns = []
         for name, spread in self._delays.values():
             step = _DELAY_STEP * spread
-            late = self._whitened(number, simulated, {**values, name: values[name] + step})
+            delayed = {**values, name: values[name] + step}
+            late = self._whitened(number, self._read(number, simulated, delayed))
             columns.append(np.append((late - errors).ravel() / step, 0.0))
         jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
-        return Evidence(errors, rest, jacobian)
+        return Evidence(errors, rest, self._recordings[number].sizes(read_), jacobian)
 
     def derivatives(
         self,
@@ -146,7 +150,7 @@ class Simulator:
             moved = {**values, **column.setting}
             moved |= dict.fromkeys(column.variables, start + column.step)
             simulated, rest = self._simulated(number, moved)
-            errors = self._whitened(number, simulated, values)
+            errors = self._whitened(number, self._read(number, simulated, values))
             jacobian[:-1, j] = (errors - about.errors).ravel() / column.step
             jacobian[-1, j] = (rest - about.rest) / column.step
         return jacobian
@@ -161,15 +165,20 @@ class Simulator:
             return errors, 0.0
         return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
 
-    def _whitened(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
-        """Whitened errors of the blocks, (b, c), with sensors as late as `values` say."""
+    def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
         one = self._recordings[number]
         if self._delays:
             errors = errors.copy()
         for j, (name, _) in self._delays.items():
             measured = one.y[:, j]
-            read_ = one.behind_structure(j, measured - errors[:, j])
-            errors[:, j] = measured - (read_ - values[name] * np.gradient(read_, one.time))
+            behind = one.behind_structure(j, measured - errors[:, j])
+            errors[:, j] = measured - (behind - values[name] * np.gradient(behind, one.time))
+        return errors
+
+    def _whitened(self, number: int, errors: Matrix) -> Matrix:
+        """Whitened errors of the blocks, (b, c)."""
+        one = self._recordings[number]
         whitened: Matrix = np.einsum("bij,bj->bi", one.whitening, one.channels(errors))
         return whitened
 

@@ -38,6 +38,7 @@ class Fit:
     simulations : that give the evidence.
     effects : that may be asked for.
     decides : thresholds, those of the usual rate of false alarms if none are given.
+    beside : other recordings of the machine, whose conditions say what it has too.
     """
 
     def __init__(
@@ -45,17 +46,18 @@ class Fit:
         simulations: Simulations,
         effects: Sequence[Effect],
         decides: Thresholds | None = None,
+        beside: Sequence[Case] = (),
     ) -> None:
         self._simulations = simulations
-        self.decides = decides or thresholds(len(effects))
         self._compare = simulations.system.comparison
+        self.decides = decides or thresholds(len(effects), left=self._compare.left)
         self._effects = {effect.name: effect for effect in effects}
         self._modes = {
             delay(one.name): one.mode
             for one in simulations.system.judged + simulations.system.outputs
             if one.mode is not None and one.name in simulations.recordings[0].signals
         }
-        self.presence = Presence(simulations.cases, simulations.recordings)
+        self.presence = Presence(simulations.cases, simulations.recordings, beside)
         self.count = len(simulations.cases)
 
     @cached_property
@@ -313,7 +315,13 @@ class Fit:
         return middle, spread * abs(middle)
 
     def refine(
-        self, best: Linearised, active: Sequence[Effect], rounds: int, spread: Vector | None = None
+        self,
+        best: Linearised,
+        active: Sequence[Effect],
+        rounds: int,
+        spread: Vector | None = None,
+        *,
+        common: bool = True,
     ) -> Linearised:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
@@ -323,13 +331,15 @@ class Fit:
         rounds : most evaluations; a step that made things worse is halved, which costs one.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
+        common : whether common unknowns are fitted, or only what differs between recordings.
 
         Returns
         -------
         best : the best point that was met; derivatives may be missing.
         """
         best = self.linearise(best, active)
-        point, halved = self._stepped(best, best.spread if spread is None else spread), 0
+        first = best.spread if spread is None else spread
+        point, halved = self._stepped(best, first, common=common), 0
         worse = self.decides.worse
         for left in reversed(range(rounds)):
             tried = self.at(point)
@@ -340,14 +350,15 @@ class Fit:
                 break
             if better:
                 best = self.linearise(best, active)
-                point = self._stepped(best, best.spread)
+                point = self._stepped(best, best.spread, common=common)
             else:
                 point, halved = between(best.point, point), halved + 1
         return best
 
-    def _stepped(self, lin: Linearised, spread: Vector) -> Point:
+    def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
         joint = self.quadratics(replace(lin, inflation=spread))
-        return self._moved(lin.point, joint, joint.solve())
+        step = joint.solve() if common else np.zeros(len(joint.shared))
+        return self._moved(lin.point, joint, step)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
@@ -359,7 +370,9 @@ class Fit:
             if key in levels:
                 middle, sigma = self._expected(key)
                 reach = self.decides.furthest_level * sigma
-                levels[key] = float(np.clip(levels[key] + change, middle - reach, middle + reach))
+                low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
+                least, most = max(low, middle - reach), min(high, middle + reach)
+                levels[key] = float(np.clip(levels[key] + change, least, most))
             elif key in sizes:
                 sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
         locals_ = [system.local(step) for system in joint.systems]

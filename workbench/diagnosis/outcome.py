@@ -1,7 +1,7 @@
 """What a diagnosis found, as a value: a sentence, numbers, a table, a figure."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,11 +11,13 @@ import pandas as pd
 
 from workbench.case import Case
 from workbench.diagnosis.residuals import Dependence, Residuals
+from workbench.diagnosis.sample_errors import Errors
 from workbench.diagnosis.samples import FAULTY, MISSING
 from workbench.diagnosis.search import Step
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
 from workbench.system import Channel, Signal, System
+from workbench.units import si_factor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +57,7 @@ class Outcome:
     observers : by observer and recording, error of the judged signal (rms over mean [1]) with the
         model before and after; empty where nothing was extended or it was not measured, and for
         effects that turn with a shaft, whose phase an observer does not know.
+    errors : of the nominal and of the last model, by recording and channel.
     """
 
     system: System
@@ -67,6 +70,7 @@ class Outcome:
     set_aside: Mapping[str, Mapping[str, int]]
     observers: Mapping[str, Mapping[str, tuple[float, float]]]
     extension: Extension | None
+    errors: tuple[Errors, ...]
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -121,12 +125,34 @@ class Outcome:
         lines = [self.sentence]
         for cause in self.diagnosis.causes:
             lines += ["", *_told(cause)]
+        lines += ["", *self._sample_errors()]
         if self.extension is not None:
             lines += ["", f"extended model: {self.extension.modelica}, {self.extension.fmu}"]
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and set aside")
         return "\n".join(lines)
+
+    def _sample_errors(self) -> list[str]:
+        """Lines on the errors of both models, over all recordings that were fitted or not."""
+        lines = ["errors of single samples, root mean square and mean absolute:"]
+        for channel in self.channels:
+            factor = si_factor(channel.shown, channel.unit, channel.name)
+            for held_out in (False, True):
+                own = [
+                    e for e in self.errors if (e.channel, e.held_out) == (channel.name, held_out)
+                ]
+                if not own:
+                    continue
+                counts = [e.samples for e in own]
+                squares = np.average(np.square([e.rms for e in own]), axis=0, weights=counts)
+                means = np.average([e.mean_absolute for e in own], axis=0, weights=counts)
+                ends = zip(np.sqrt(squares) / factor, means / factor, strict=True)
+                before, after = (f"{rms:.3g} and {mean:.3g} {channel.shown}" for rms, mean in ends)
+                change = f"{before}, now {after}" if self.diagnosis.best.active else before
+                fate = "held out" if held_out else "fitted"
+                lines.append(f"  {channel.label}, {len(own)} recordings {fate}: {change}")
+        return lines
 
     def to_frame(self) -> pd.DataFrame:
         """Causes, strongest first, a row for each of their parameters."""
@@ -179,6 +205,7 @@ class Outcome:
             "deviations": {name: dict(row) for name, row in self.deviations.items()},
             "set_aside": {name: dict(counts) for name, counts in self.set_aside.items()},
             "channels": {one.name: one.unit for one in self.channels},
+            "errors": [asdict(one) for one in self.errors],
             "observers": {
                 name: {
                     recording: {"before": _known(before), "after": _known(after)}

@@ -9,10 +9,18 @@ from workbench.errors import InputError
 
 
 class Presence:
-    """Of effects, in one set of recordings."""
+    """Of effects, in one set of recordings.
 
-    def __init__(self, cases: Sequence[Case], recordings: Sequence[Samples]) -> None:
-        self._cases = cases
+    Parameters
+    ----------
+    recordings : the cases, made ready.
+    beside : others of the same machine.
+    """
+
+    def __init__(
+        self, cases: Sequence[Case], recordings: Sequence[Samples], beside: Sequence[Case]
+    ) -> None:
+        self._cases = [*cases, *beside]
         self._recordings = recordings
 
     def at(self, effect: Effect, k: int) -> bool:

@@ -20,8 +20,10 @@ from workbench.diagnosis.cleaning import (
     bridge,
     deviation_of,
     first_value,
+    noise_in,
     outliers,
     runs,
+    saturated,
     smooth,
 )
 from workbench.diagnosis.motion import (
@@ -39,7 +41,8 @@ from workbench.system import Channel, Comparison, Exclusion, Mode, System
 
 _EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
 _RELEASED = 0.1  # share of the greatest value
-FAULTY, MISSING = "spike, dropout or saturation", "missing"  # reasons of every system
+# Reasons of every system.
+FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +132,15 @@ class Samples:
         read: Vector = lfilter(numerator, denominator, values, zi=begin)[0]
         return read
 
+    def sizes(self, errors: Matrix) -> Matrix:
+        """Root mean square and mean absolute error of samples that count, by channel, (2, c)."""
+        first, end = self.blocks.T
+        counts = np.concatenate([np.arange(a, b) for a, b in zip(first, end, strict=True)])
+        by_channel = errors[counts] @ self.slopes.T
+        return np.array(
+            [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
+        )
+
     def channels(self, errors: Matrix) -> Matrix:
         """Means of prediction errors (n, c) over each block, by channel, (b, c)."""
         total = np.zeros((len(errors) + 1, len(self.slopes)))
@@ -175,21 +187,27 @@ def prepare(
         If the recording has too little that counts.
     """
     compare, time = system.comparison, case.time
-    h, steps = float(np.median(np.diff(time))), np.diff(time)
-    names = (*case.inputs, *signals)
-    wrong = {name: outliers(case[name], sound) for name in names}
+    h, names = float(np.median(np.diff(time))), (*case.inputs, *signals)
+    beyond = {name: saturated(case[name], system.signals[name]) for name in names}
+    faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}
+    wrong = {name: beyond[name] | faulty[name] for name in names}
     clean = {name: bridge(time, case[name], wrong[name]) for name in names}
     applied = _applied(clean, system, time)
-    excluded = {FAULTY: np.logical_or.reduce(list(wrong.values()))}
-    for one in compare.exclusions:
-        excluded[one.reason] = _excluded(one, clean, system, time, h, applied)
-    excluded["settling"] = time < time[0] + compare.settling
+    excluded = {
+        FAULTY: np.logical_or.reduce(list(faulty.values())),
+        BEYOND: np.logical_or.reduce(list(beyond.values())),
+        **{
+            one.reason: _excluded(one, clean, system, time, h, applied)
+            for one in compare.exclusions
+        },
+        "settling": time < time[0] + compare.settling,
+    }
     usable = ~np.logical_or.reduce(list(excluded.values()))
     blocks = _blocks(usable, time, compare.block, h)
     _refuse_too_few(case, system, blocks, excluded)
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    deviation = {name: deviation_of(clean[name]) for name in names}
+    deviation = {name: noise_in(clean[name], system.signals[name]) for name in names}
     gain, lead, ahead = _led(case, system, signals, clean, deviation, wrong, motion)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest, rest_noise = _at_rest(compare, clean, applied)
@@ -217,7 +235,7 @@ def prepare(
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
-            MISSING: int(np.sum(np.maximum(0, np.round(steps / h) - 1))),
+            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1))),
             **{reason: int(mask.sum()) for reason, mask in excluded.items()},
         },
     )
@@ -363,7 +381,9 @@ def _whitening(
     # Predicted outputs are uncertain too, by what led them.
     predicted = np.array([ahead[first:end].mean(axis=0) for first, end in blocks])
     covariance += slopes @ predicted @ slopes.T
-    return np.linalg.inv(np.linalg.cholesky(covariance / size))
+    # A signal that rests within a step of its reading is wrong by the same in all samples.
+    steps = np.array([system.signals[name].resolution ** 2 / 12.0 for name in signals])
+    return np.linalg.inv(np.linalg.cholesky(covariance / size + slopes * steps @ slopes.T))
 
 
 def _growing(

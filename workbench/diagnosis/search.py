@@ -17,7 +17,7 @@ Reporter = Callable[[str], None]
 
 _BEGUN = 3  # rounds after which a rival that is far behind is given up
 _HALVINGS = 2  # of the size that a fit begins with
-_ROUNDS = 12  # of Gauss-Newton, most
+ROUNDS = 12  # of Gauss-Newton, most
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ def _begun(fit: Fit, best: Fitted, rival: Prospect) -> Fitted:
     return one
 
 
-def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = _ROUNDS) -> Fitted:
+def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted:
     """Fit with one more effect, begun where it was fitted without."""
     start, spread = fit.at(joined(before.point, rival)), before.linearised.spread
     return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
@@ -242,7 +242,7 @@ def fitted(
     fit: Fit,
     start: Linearised,
     active: tuple[Effect, ...],
-    rounds: int = _ROUNDS,
+    rounds: int = ROUNDS,
     spread: Vector | None = None,
 ) -> Fitted:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""

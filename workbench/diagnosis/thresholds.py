@@ -98,13 +98,14 @@ class Thresholds:
         return self.form + self.fall
 
 
-def thresholds(candidates: int, rate: float = RATE) -> Thresholds:
+def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.left) -> Thresholds:
     """Thresholds by which at most a share of clean sets is called something else.
 
     Parameters
     ----------
     candidates : effects that are tried; any of them may raise an alarm (Bonferroni).
     rate : of false alarms, between 0 and 1.
+    left : see `Thresholds`; a system says what its models simplify.
 
     Notes
     -----
@@ -123,4 +124,5 @@ def thresholds(candidates: int, rate: float = RATE) -> Thresholds:
         fall=size**2,
         immaterial=float(norm.isf(0.5 * rate)),
         tied=-2.0 * math.log(rate),
+        left=left,
     )

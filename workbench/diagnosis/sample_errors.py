@@ -1,0 +1,117 @@
+"""Errors of both models sample by sample, in units of the sensors, on recordings fitted or not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Linearised
+from workbench.diagnosis.samples import channels
+from workbench.diagnosis.search import ROUNDS, Fitted
+from workbench.errors import InputError
+from workbench.system import System
+
+_PARTS = 4  # of a single recording: three quarters of it fit nearly as well as all of it
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of one channel along one recording, by the nominal and by the last model.
+
+    Attributes
+    ----------
+    held_out : whether nothing common to the recordings was fitted to this one.
+    samples : that count.
+    rms, mean_absolute : of these, (before, after) [unit].
+    """
+
+    recording: str
+    channel: str
+    unit: str
+    held_out: bool
+    samples: int
+    rms: tuple[float, float]
+    mean_absolute: tuple[float, float]
+
+
+def apart(cases: Sequence[Case], system: System) -> list[Case]:
+    """Recordings that can be held out from each other: of a single one, its parts.
+
+    Each part starts in states of its own, which are as unknown as those of a recording.
+
+    Raises
+    ------
+    InputError
+        If there is only one, and it is too short, or begins with something that is applied.
+    """
+    if len(cases) > 1:
+        return list(cases)
+    compare = system.comparison
+    lasts = float(cases[0].time[-1] - cases[0].time[0]) if cases else 0.0
+    count = min(_PARTS, int(lasts / (compare.settling + compare.least)))
+    if count < 2 or compare.begins is not None:
+        raise InputError(
+            where="recordings",
+            found=str(len(cases)),
+            expected="two or more, because a cause is judged on those it was not fitted to",
+            remedy="give the folder that holds all recordings of one machine",
+        )
+    edges = np.linspace(0, cases[0].time.size, count + 1).astype(int)
+    return [
+        replace(cases[0].part(slice(a, b)), name=f"{cases[0].name}, part {k} of {count}")
+        for k, (a, b) in enumerate(pairwise(edges), start=1)
+    ]
+
+
+def errors_of(
+    simulations: Simulations, before: Linearised, after: Linearised, *, held_out: bool
+) -> list[Errors]:
+    """Errors of all recordings by two models."""
+    found = []
+    for k, one in enumerate(simulations.recordings):
+        sizes = [lin.evidence[k].sizes for lin in (before, after)]
+        samples = int((one.blocks[:, 1] - one.blocks[:, 0]).sum())
+        for c, channel in enumerate(channels(simulations.system, one.signals)):
+            rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
+            found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))
+    return found
+
+
+def held_out_errors(
+    everything: Path,
+    fitted: Simulations,
+    effects: Sequence[Effect],
+    before: Fitted,
+    after: Fitted,
+    cases: Sequence[Case],
+    workers: int,
+) -> list[Errors]:
+    """Errors on recordings that no common unknown was fitted to.
+
+    Of these recordings, only what differs from one to the other by nature is fitted: states at the
+    start, and deviations within tolerances.
+
+    Parameters
+    ----------
+    everything : FMU with all effects.
+    fitted : the other recordings.
+    before, after : the nominal and the last model, as fitted to those.
+    """
+    if not cases:
+        return []
+    with Simulations(everything, fitted.system, fitted.given, cases, workers) as simulations:
+        fit = Fit(simulations, effects, beside=fitted.cases)
+        ends = []
+        for one in (before, after):
+            start = fit.start()
+            levels = {key: one.point.levels.get(key, usual) for key, usual in start.levels.items()}
+            phases = {name: np.zeros(len(cases)) for name in one.point.phases}
+            point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)
+            ends.append(fit.refine(fit.at(point), one.active, ROUNDS, common=False))
+        return errors_of(simulations, *ends, held_out=True)
