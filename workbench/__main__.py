@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 
+import workbench.commands
+from workbench.companion import companion_part
 from workbench.errors import FMUError, InputError
 from workbench.installed import companions
 
@@ -35,11 +37,11 @@ def _parser(command: str) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    packages = ["workbench.commands", *(f"{name}.commands" for name in companions())]
-    for package in packages:
-        for name, text in import_module(package).COMMANDS.items():
+    parts = [companion_part(name, "commands") for name in companions()]
+    for package in (workbench.commands, *(part for part in parts if part)):
+        for name, text in package.COMMANDS.items():
             if name == command:
-                import_module(f"{package}.{name}").add(commands)
+                import_module(f"{package.__name__}.{name}").add(commands)
             else:
                 commands.add_parser(name, help=text)
     return parser

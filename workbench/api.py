@@ -22,7 +22,7 @@ from workbench.cosim import Run, replay
 from workbench.diagnosis import Outcome, choose, read_effects
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
-from workbench.installed import system_files
+from workbench.installed import usual_system
 from workbench.modelica import read_library
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
@@ -41,7 +41,7 @@ def read_cases(path: str | Path | Sequence[str | Path], system: System | None = 
 
     Parameters
     ----------
-    system : that the recordings are of; the first installed one unless another is given.
+    system : that the recordings are of; unless given, the usual one, which comes with recordings.
 
     Raises
     ------
@@ -49,9 +49,7 @@ def read_cases(path: str | Path | Sequence[str | Path], system: System | None = 
         If a path holds no case, or a case cannot be read.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    return read_folders(
-        [Path(one) for one in paths], system or load_system(next(iter(system_files())))
-    )
+    return read_folders([Path(one) for one in paths], system or load_system(usual_system()))
 
 
 def case_from_frame(

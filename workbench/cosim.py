@@ -5,7 +5,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.case import Case
+from workbench.companion import companion_part
 from workbench.errors import FMUError
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimate, Estimator
@@ -153,8 +153,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
 
 def _rules(estimator: Estimator) -> Mapping[str, object]:
     """Rules of the system's companion on when a quantity is shown, by its name."""
-    companion = estimator.system.companion
-    return import_module(f"{companion}.claims").CLAIMS if companion else {}
+    part = companion_part(estimator.system.companion, "claims")
+    return part.CLAIMS if part else {}
 
 
 def _doubted(estimator: Estimator) -> list[str]:

@@ -15,6 +15,15 @@ def system_files() -> dict[str, Path]:
     return {content.get("name", path.parent.name): path for path, content in _contents().items()}
 
 
+def usual_system() -> str:
+    """Name of the system that is meant where none is named: the first that comes with recordings.
+
+    Commands without any arguments work on it.
+    """
+    with_cases = [path for path, content in _contents().items() if "cases" in content]
+    return next(name for name, path in system_files().items() if path in with_cases)
+
+
 def built_models() -> dict[Path, list[str]]:
     """Models whose FMUs come with the workbench: dotted names by library, its `package.mo`."""
     found = {}

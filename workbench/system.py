@@ -92,7 +92,7 @@ class System:
     judged : measured, but only there to judge by.
     reported : outputs of the model that estimates hold, with their units.
     export : estimators as FMUs.
-    companion : Python package with a virtual rig and more estimators; empty: none.
+    companion : Python package with a virtual rig and more estimators, or a module; empty: none.
     shortest : [s] that a recording must last.
     settles : [s] in which a model comes to rest at an operating point.
     sample_time : [s] of usual recordings.

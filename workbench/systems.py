@@ -23,9 +23,20 @@ def load_system(which: str | Path) -> System:
     InputError
         If there is none of this name, or its file or its library has a mistake.
     """
+    return _built(read_system(system_path(which)))
+
+
+def system_path(which: str | Path) -> Path:
+    """The file of a system, by its name, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
     known, path = system_files(), Path(which)
     if str(which) in known:
-        return _built(read_system(known[str(which)]))
+        return known[str(which)]
     if path.is_dir():
         path /= FILE
     if not path.is_file():
@@ -35,7 +46,7 @@ def load_system(which: str | Path) -> System:
             expected=f"a system file, or one of {', '.join(known)}",
             remedy="correct the name or path; 'workbench systems' lists what is installed",
         )
-    return _built(read_system(path))
+    return path
 
 
 def _built(system: System) -> System:

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
 from workbench.benchmark.fmpy_loop import open_loop
+from workbench.companion import companion_part
 from workbench.fmu import FMU
 from workbench.observers import Gains
 from workbench.observers.open_loop import OpenLoop
@@ -43,5 +42,4 @@ def by_c(estimator: str, fmu: FMU, system: System, gains: Gains) -> Loop | None:
 
 
 def _companion(system: System) -> ModuleType | None:
-    name = f"{system.companion}.benchmark"
-    return import_module(name) if system.companion and find_spec(name) else None
+    return companion_part(system.companion, "benchmark")

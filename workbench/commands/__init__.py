@@ -9,6 +9,7 @@ COMMANDS = {
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
     "systems": "list the systems that are installed",
+    "prepare": "turn published recordings of a system into case folders",
     "new": "write a system of one's own to begin with",
     "bench": "time calls into the FMUs, the observers, and the tuning",
 }

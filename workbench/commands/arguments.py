@@ -11,7 +11,7 @@ from typing import TypeAlias
 from workbench import resources
 from workbench.case import Case, check_names, read_cases
 from workbench.errors import InputError
-from workbench.installed import system_files
+from workbench.installed import usual_system
 from workbench.system import FULL, OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
@@ -35,10 +35,9 @@ def positive(text: str) -> int:
 
 def add_system(parser: argparse.ArgumentParser) -> None:
     """Add the option --system, which `load_system` reads."""
-    usual, *_ = system_files()
     parser.add_argument(
         "--system",
-        default=usual,
+        default=usual_system(),
         metavar="NAME|FILE",
         help="an installed system, or a system file (default: %(default)s)",
     )

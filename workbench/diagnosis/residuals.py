@@ -7,13 +7,12 @@ shares with its explanation fakes causes; it uses prediction errors.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Protocol
 
 import numpy as np
 
 from workbench.case import Case, sign
+from workbench.companion import companion_part
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
@@ -120,10 +119,7 @@ def residuals(
 
 def _balances(system: System) -> Balances | None:
     """Balances that the system's companion knows."""
-    name = f"{system.companion}.balances"
-    if not system.companion or find_spec(name) is None:
-        return None
-    found: Balances = import_module(name)
+    found: Balances | None = companion_part(system.companion, "balances")
     return found
 
 

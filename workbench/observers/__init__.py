@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from types import ModuleType
 
+from workbench.companion import companion_part
 from workbench.errors import InputError, closest
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
@@ -19,7 +20,8 @@ __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimator
 
 def estimators(system: System) -> dict[str, type[Estimator]]:
     """All estimators that run on a system, by name, in the order of tables."""
-    packages = [__name__] + ([f"{system.companion}.estimators"] if system.companion else [])
+    own = companion_part(system.companion, "estimators")
+    packages = [__name__] + ([own.__name__] if own else [])
     found = [kind for package in packages for kind in _estimators(package)]
     return {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
 

@@ -3,13 +3,13 @@
 import math
 import tomllib
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomli_w
 
+from workbench.companion import companion_part
 from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
 from workbench.observers.contract import Estimator
@@ -82,11 +82,9 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
 
 def tuned_file(system: System, name: str) -> Path | None:
     """The file of tuned gains that a system's companion brings for an estimator, if it does."""
-    if not system.companion:
-        return None
-    (folder,) = import_module(system.companion).__path__
-    path = Path(folder) / "gains" / f"{name}.toml"
-    return path if path.exists() else None
+    gains = companion_part(system.companion, "gains")
+    path = Path(gains.__path__[0]) / f"{name}.toml" if gains else None
+    return path if path and path.exists() else None
 
 
 def _content(path: Path) -> dict[str, Any]:

@@ -1,11 +1,10 @@
 """What a system's companion provides for recordings in which something is planted."""
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
+from workbench.companion import companion_part
 from workbench.errors import InputError
 from workbench.power.planting import Plantable, SheetError
 from workbench.system import System
@@ -55,13 +54,13 @@ def open_virtual_rig(system: System, names: Sequence[str], model: Path) -> Virtu
     InputError
         If the system has none, or it refuses what is asked.
     """
-    module = f"{system.companion}.planting"
-    if not system.companion or find_spec(module) is None:
+    planting = companion_part(system.companion, "planting")
+    if planting is None:
         raise InputError(
             where=str(system.source),
             found="no companion that can plant effects",
             expected="a Python package with a module 'planting', which makes recordings",
             remedy='name it as companion = "...", or choose a system that has one',
         )
-    found: VirtualRig = import_module(module).virtual_rig(names, model)
+    found: VirtualRig = planting.virtual_rig(names, model)
     return found

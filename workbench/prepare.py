@@ -1,0 +1,224 @@
+"""Published recordings become case folders: the publisher's own files, checked by their checksums.
+
+The workbench holds none of them. What it knows of a set is a `Published`, which a system's
+companion has as `PUBLISHED`.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from workbench.errors import InputError
+from workbench.files import write_json, write_whole
+from workbench.provenance import commit
+from workbench.recording import Vector
+from workbench.systems import system_path
+from workbench.tables import read_table
+
+PREPARED = "prepared.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One recording of a published set, or a piece of one.
+
+    Attributes
+    ----------
+    name : of the case folder.
+    title : one line for reports.
+    columns : (n,) each, by `name [unit]` as the case's CSV has it; the first is `time [s]`.
+    file : that it was read from, of those of the layout.
+    rows : first and last row of that file's samples, from 0.
+    changed : what was converted, chosen or cut, for people.
+    conditions : of the case, as `case.toml` has them.
+    held_out : it is there to judge by, and not to be fitted.
+    """
+
+    name: str
+    title: str
+    columns: Mapping[str, Vector]
+    file: str
+    rows: tuple[int, int]
+    changed: tuple[str, ...] = ()
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    held_out: bool = False
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A way in which the set lies in a folder.
+
+    Attributes
+    ----------
+    name : for people, such as "the publisher's own files".
+    files : SHA-256 of each, by its path in the folder; all must be there.
+    read : the recordings in a folder with these files.
+    """
+
+    name: str
+    files: Mapping[str, str]
+    read: Callable[[Path], Sequence[Recording]]
+
+
+@dataclass(frozen=True)
+class Published:
+    """A set of recordings that somebody published.
+
+    Attributes
+    ----------
+    title : what was measured on which machine.
+    source : authors, year, where it is to be had.
+    licence : under which it was published.
+    recordings : what they are, which are fitted and which are held out.
+    layouts : in which it is read, the publisher's own first.
+    """
+
+    title: str
+    source: str
+    licence: str
+    recordings: str
+    layouts: tuple[Layout, ...]
+
+    def __str__(self) -> str:
+        parts = [f"{self.title}\n\n{self.recordings}\n", f"source:  {self.source}"]
+        parts += [f"licence: {self.licence}"]
+        for layout in self.layouts:
+            parts += [f"\n{layout.name}:"]
+            parts += [f"  {sha256}  {path}" for path, sha256 in layout.files.items()]
+        return "\n".join(parts)
+
+
+def published(which: str) -> Published:
+    """What a system's companion knows of its published recordings.
+
+    Parameters
+    ----------
+    which : name of a system, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is no such system, or its recordings were not published.
+    """
+    path = system_path(which)
+    companion = read_table(path, "name a system", 'title = "..."').text("companion", "")
+    found = getattr(import_module(companion), "PUBLISHED", None) if companion else None
+    if not isinstance(found, Published):
+        raise InputError(
+            where=str(path),
+            found="no companion that knows of published recordings",
+            expected="a Python module with a 'PUBLISHED'",
+            remedy="choose another system; write case folders for your own recordings",
+        )
+    return found
+
+
+def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
+    """Write case folders of a published set: `out/fitted`, `out/held_out`, `out/prepared.json`.
+
+    Parameters
+    ----------
+    which : see `published`.
+    source : folder that holds the set in one of its layouts.
+    out : a new folder, an empty one, or one that was written so before.
+
+    Raises
+    ------
+    InputError
+        If the set is not in `source`, a file of it is another one, or `out` holds other files.
+    """
+    known = published(which)
+    _refuse_other_files(out)
+    layout = _layout(known, source)
+    recordings = list(layout.read(source))
+    for one in recordings:
+        _write_case(out / _group(one) / one.name, one)
+    write_json(
+        out / PREPARED,
+        {
+            "system": which,
+            "title": known.title,
+            "source": known.source,
+            "licence": known.licence,
+            "workbench": commit(),
+            "layout": layout.name,
+            "read": dict(layout.files),
+            "cases": {f"{_group(one)}/{one.name}": _described(one) for one in recordings},
+        },
+    )
+    return recordings
+
+
+def _group(one: Recording) -> str:
+    return "held_out" if one.held_out else "fitted"
+
+
+def _described(one: Recording) -> dict[str, Any]:
+    time = next(iter(one.columns.values()))
+    return {
+        "file": one.file,
+        "rows": list(one.rows),
+        "samples": time.size,
+        "seconds": float(time[-1] - time[0]),
+        "columns": list(one.columns),
+        "conditions": dict(one.conditions),
+        "changed": list(one.changed),
+    }
+
+
+def _refuse_other_files(out: Path) -> None:
+    if out.exists() and not (out / PREPARED).is_file() and any(out.iterdir()):
+        raise InputError(
+            where=str(out),
+            found="a folder with other files",
+            expected="a new or an empty folder, or one with prepared recordings",
+            remedy="choose another folder",
+        )
+
+
+def _layout(known: Published, source: Path) -> Layout:
+    """The layout in which the set lies in a folder, of files with the right checksums."""
+    for layout in known.layouts:
+        if any((source / path).is_file() for path in layout.files):
+            for path, sha256 in layout.files.items():
+                _check(source / path, sha256)
+            return layout
+    expected = [next(iter(layout.files)) for layout in known.layouts]
+    raise InputError(
+        where=str(source),
+        found="none of the files" if source.is_dir() else "no such folder",
+        expected=f"a folder with {' or '.join(expected)}",
+        remedy=f"get them from {known.source}",
+    )
+
+
+def _check(path: Path, sha256: str) -> None:
+    if not path.is_file():
+        raise InputError(
+            where=str(path),
+            found="no such file",
+            expected="all files of the set",
+            remedy="complete the folder",
+        )
+    found = hashlib.sha256(path.read_bytes()).hexdigest()
+    if found != sha256:
+        raise InputError(
+            where=str(path),
+            found=f"another file (SHA-256 {found})",
+            expected=f"the file as it was published (SHA-256 {sha256})",
+            remedy="get it again; to use other recordings, write case folders for them",
+        )
+
+
+def _write_case(folder: Path, one: Recording) -> None:
+    case = {"title": one.title, "measurement": {"file": "measured.csv"}}
+    conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
+    write_whole(folder / "case.toml", tomli_w.dumps(case | conditions))
+    rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
+    lines = [",".join(one.columns), *(",".join(map(repr, row)) for row in rows)]
+    write_whole(folder / "measured.csv", "\n".join(lines) + "\n")

@@ -1,0 +1,1 @@
+"""What was published of systems: where recordings are to be had, and readers of them."""
