@@ -1,5 +1,6 @@
 """Systems without states, and systems without inputs, go the way of all others."""
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -300,6 +301,19 @@ def test_observability_of_a_quantity_without_a_state(balance: Path, tmp_path: Pa
     assert main(["observability", str(balance / "recordings" / "00_pull"), *options]) == 0
     windows = pd.read_csv(tmp_path / "00_pull.csv")
     assert windows["Observer.bound_dc [N/m]"].median() < 0.5
+
+
+def test_a_model_without_anything_to_estimate_is_refused(
+    balance: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """By estimators; the diagnosis asks for none."""
+    known = BALANCE_FILE[: BALANCE_FILE.index("[estimated.c]")] + "[diagnosis.levels]\nc = {}\n"
+    folder = written(tmp_path / "known", BALANCE, known)
+    shutil.copytree(balance / "recordings", folder / "recordings")
+    options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(["simulate", str(folder / "recordings"), *options]) == 2
+    assert "expected something to estimate" in capsys.readouterr().err
+    assert diagnosed(folder, tmp_path, ["DryFriction"]).diagnosis.verdict == "found"
 
 
 # --- without inputs ---

@@ -108,7 +108,8 @@ def diagnose(
             observers: dict[str, dict[str, tuple[float, float]]] = {}
             turning = any(effect.order_locked for effect in best.active)
             judged = all(system.objective.judged in case for case in cases)
-            if extension is not None and judged and not turning:
+            observed = judged and bool(system.states or system.estimated)
+            if extension is not None and observed and not turning:
                 report("observers with both models")
                 observers = _observers(system, cases, extension.fmu)
             levels = {key: float(value) for key, value in best.point.levels.items()}
