@@ -1,4 +1,4 @@
-"""The claims of `WheelsetRig.Tests`: each model is built and simulated, its asserts must hold."""
+"""The claims of the libraries' `Tests`: each is built and simulated, its asserts must hold."""
 
 import shutil
 from pathlib import Path
@@ -11,14 +11,24 @@ pytest.importorskip("rumoca")
 
 from workbench import compiler
 
-LIBRARY = Path(__file__).parent.parent / "modelica" / "WheelsetRig"
-CLAIMS = (LIBRARY / "Tests" / "package.order").read_text().split()
+LIBRARIES = sorted(
+    path.parents[1]
+    for path in (Path(__file__).parent.parent / "modelica").glob("*/Tests/package.mo")
+)
+RIG = Path(__file__).parent.parent / "modelica" / "WheelsetRig"
+CLAIMS = [
+    (library, claim)
+    for library in LIBRARIES
+    for claim in (library / "Tests" / "package.order").read_text().split()
+]
 
 
 def simulate(package: Path, claim: str, folder: Path) -> list[str]:
     """Build a claim and co-simulate it to its StopTime; returns what the FMU complained of."""
     path = folder / f"{claim}.fmu"
-    compiler.build(package, f"WheelsetRig.Tests.{claim}", path, platforms=["linux-x86_64"])
+    compiler.build(
+        package, f"{package.parent.name}.Tests.{claim}", path, platforms=["linux-x86_64"]
+    )
     experiment = fmpy.read_model_description(str(path)).defaultExperiment
     messages: list[str] = []
 
@@ -40,18 +50,22 @@ def simulate(package: Path, claim: str, folder: Path) -> list[str]:
     return messages
 
 
-def test_every_claim_is_listed() -> None:
-    assert sorted(CLAIMS) == sorted(p.stem for p in (LIBRARY / "Tests").glob("[A-Z]*.mo"))
+@pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
+def test_every_claim_is_listed(library: Path) -> None:
+    listed = [claim for one, claim in CLAIMS if one == library]
+    assert sorted(listed) == sorted(p.stem for p in (library / "Tests").glob("[A-Z]*.mo"))
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_claim(claim: str, tmp_path: Path) -> None:
-    assert simulate(LIBRARY / "package.mo", claim, tmp_path) == []
+@pytest.mark.parametrize(
+    ("library", "claim"), CLAIMS, ids=lambda value: getattr(value, "name", value)
+)
+def test_claim(library: Path, claim: str, tmp_path: Path) -> None:
+    assert simulate(library / "package.mo", claim, tmp_path) == []
 
 
 def test_a_wrong_claim_fails_with_its_text(tmp_path: Path) -> None:
     copy = tmp_path / "WheelsetRig"
-    shutil.copytree(LIBRARY, copy)
+    shutil.copytree(RIG, copy)
     claim = copy / "Tests" / "PolachSlopeIsKalkerStiffness.mo"
     claim.write_text(claim.read_text().replace("kS=1.0", "kS=0.9"))
     messages = simulate(copy / "package.mo", claim.stem, tmp_path)

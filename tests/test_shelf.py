@@ -36,11 +36,12 @@ def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -
 
 
 def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
-    before = shelf.key(library, "Model", "model Model end Model;")
-    assert before == shelf.key(library, "Model", "model Model end Model;")
-    assert before != shelf.key(library, "Model", "model Model Real x; end Model;")
-    (library / "package.mo").write_text("package Library constant Real c = 1; end Library;")
-    assert before != shelf.key(library, "Model", "model Model end Model;")
+    package = library / "package.mo"
+    before = shelf.key(package, "Model", "model Model end Model;")
+    assert before == shelf.key(package, "Model", "model Model end Model;")
+    assert before != shelf.key(package, "Model", "model Model Real x; end Model;")
+    package.write_text("package Library constant Real c = 1; end Library;")
+    assert before != shelf.key(package, "Model", "model Model end Model;")
 
 
 def test_a_cache_that_cannot_be_written_costs_only_time(cache: Path, tmp_path: Path) -> None:

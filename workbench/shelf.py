@@ -17,7 +17,10 @@ from pathlib import Path
 
 import platformdirs
 
+from workbench.modelica import files, packages
+
 _COMPILER = Path(__file__).parent / "compiler"
+_CODE = (".py", ".c", ".h")
 _TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
 _MOST = 32  # files, of 0.1 to 0.5 MB: the library and what was found in a few weeks' recordings
 
@@ -32,16 +35,15 @@ def key(library: Path, *parts: str) -> str:
 
     Parameters
     ----------
-    library : its file; of package.mo, all files in its folder count.
+    library : its file; the libraries that it uses count, too.
     parts : such as the name and the source of a model that extends it.
     """
-    known = {".mo", ".order", ".py", ".c", ".h"}
     digest = hashlib.sha256()
-    whole = library.parent if library.name == "package.mo" else library
-    for root in (whole, _COMPILER):
-        files = [root] if root.is_file() else sorted(root.rglob("*"))
-        for file in (path for path in files if path.suffix in known):
-            for part in (file.relative_to(root.parent).as_posix().encode(), file.read_bytes()):
+    found = [(package.parent, files(package)) for package in packages(library)]
+    found.append((_COMPILER, tuple(p for p in sorted(_COMPILER.rglob("*")) if p.suffix in _CODE)))
+    for root, inside in found:
+        for file in inside:
+            for part in (file.relative_to(root).as_posix().encode(), file.read_bytes()):
                 digest.update(len(part).to_bytes(8, "little") + part)
     for text in (*parts, platform.system(), platform.machine(), *map(_version, _TOOLS)):
         digest.update(len(text.encode()).to_bytes(8, "little") + text.encode())

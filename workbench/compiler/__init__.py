@@ -15,6 +15,7 @@ from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
+from workbench.modelica import files, packages
 
 __all__ = [
     "PLATFORMS",
@@ -31,17 +32,15 @@ __all__ = [
 FMI_VERSIONS = (2, 3)
 
 
-def source_hash(*packages: Path) -> str:
-    """SHA-256 over all Modelica files of libraries and all files of the compiler."""
+def source_hash(*libraries: Path) -> str:
+    """SHA-256 over all files of libraries, of those that they use, and of the compiler."""
     here = Path(__file__).parent
-    found = [
-        (root, sorted(p for p in root.rglob("*") if p.suffix in (".mo", ".order")))
-        for root in (package.parent for package in packages)
-    ]
-    found.append((here, sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")])))
+    every = dict.fromkeys(one for library in libraries for one in packages(library))
+    found = [(package.parent, files(package)) for package in every]
+    found.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
     parts: list[str | bytes] = []
-    for root, files in found:
-        for file in files:
+    for root, inside in found:
+        for file in inside:
             parts += [file.relative_to(root).as_posix(), file.read_bytes()]
     return digest(parts)
 

@@ -19,6 +19,7 @@ import rumoca
 
 from workbench.compiler.expressions import BINARY, Arena, Value, each, lift
 from workbench.errors import InputError
+from workbench.modelica import packages
 
 SCHEMA = 43
 
@@ -77,6 +78,8 @@ class FlatModel:
 def flatten(package: Path, model: str) -> FlatModel:
     """Flatten `model` (dotted name) of the library whose `package.mo` is given.
 
+    Libraries that it uses are found as `workbench.modelica.packages` says.
+
     Raises
     ------
     InputError
@@ -90,8 +93,9 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected="the package.mo of a Modelica library",
             remedy="give the path of the library's package.mo",
         )
+    used = [str(one.parent) for one in packages(package)[1:]]
     try:
-        dae = rumoca.Session().load(str(package), model=model).to_dict("dae")
+        dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
         raise InputError(
             where=f"{package.parent}, model {model}",

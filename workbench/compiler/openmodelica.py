@@ -16,6 +16,7 @@ from pathlib import Path
 from workbench.compiler.ccode import identifier
 from workbench.errors import InputError
 from workbench.files import write_whole
+from workbench.modelica import packages
 
 _OPTIONS = ("--fmiFlags=s:cvode", "-d=-disableDirectionalDerivatives")
 _MESSAGE = re.compile(
@@ -70,8 +71,12 @@ def build_with_omc(package: Path, models: Sequence[str], folder: Path) -> list[P
     return [_build(omc, package, model, folder) for model in models]
 
 
-def script(package: Path, model: str) -> str:
+def script(package: Path, model: str, used: Sequence[Path] = ()) -> str:
     """Commands for omc: load, count equations and unknowns, build.
+
+    Parameters
+    ----------
+    used : `package.mo` of libraries that the model's library uses.
 
     Examples
     --------
@@ -82,11 +87,11 @@ def script(package: Path, model: str) -> str:
     getErrorString();
     <BLANKLINE>
     """
-    path = package.as_posix().replace('"', '\\"')
+    paths = [package.as_posix().replace('"', '\\"') for package in (*used, package)]
     name = identifier(model)
     return (
-        f'loadFile("{path}"); getErrorString();\n'
-        f"checkModel({model}); getErrorString();\n"
+        "".join(f'loadFile("{path}"); getErrorString();\n' for path in paths)
+        + f"checkModel({model}); getErrorString();\n"
         f'buildModelFMU({model}, version="2.0", fmuType="me_cs", fileNamePrefix="{name}");\n'
         "getErrorString();\n"
     )
@@ -116,8 +121,9 @@ def errors_in(output: str) -> list[Message]:
 
 def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
     name = f"{identifier(model)}.fmu"
+    library, *used = (one.resolve() for one in packages(package))
     with tempfile.TemporaryDirectory() as scratch:
-        (Path(scratch) / "build.mos").write_text(script(package.resolve(), model))
+        (Path(scratch) / "build.mos").write_text(script(library, model, used))
         run = subprocess.run(
             [omc, *_OPTIONS, "build.mos"], cwd=scratch, capture_output=True, text=True, check=False
         )

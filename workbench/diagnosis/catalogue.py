@@ -114,7 +114,7 @@ class Effect:
 
 
 def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
-    """Effects of a library, in its order.
+    """Effects of a library, in its order; those of libraries that it uses are not among them.
 
     Of effects that nothing in the data tells apart the usual one stands first. Where the order of
     `package.order` does not serve that, `after="Other"` puts an effect right behind the other one.
@@ -133,6 +133,8 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
     effects: dict[str, Effect] = {}
     after: dict[str, str] = {}
     for one in library.classes.values():
+        if not one.name.startswith(f"{library.name}."):
+            continue
         said = _Said(f"{one.where}, __Workbench", one.vendor)
         said.only("effect")
         if "effect" not in one.vendor:
@@ -263,6 +265,7 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> E
         falling=_falling(said),
     )
     _check_parameters(library, one, effect)
+    _check_extends(library, one)
     return effect
 
 
@@ -311,6 +314,20 @@ def _falling(said: _Said) -> Falling | None:
     part = said.part("falling")
     part.only("signal", "because")
     return Falling(part.text("signal"), part.text("because"))
+
+
+def _check_extends(library: Library, one: Class) -> None:
+    """Refuse `extends Law(p(max=1) = 0.5)`, of which the compiler takes the value alone."""
+    for name in (one.name, *library.ancestors(one.name)):
+        for base in library.classes[name].extends:
+            for key, modifier in base.modifier.inner.items():
+                if modifier.value and modifier.inner:
+                    raise InputError(
+                        where=library.classes[name].where,
+                        found=f"{key}(...) = {modifier.value} where it extends {base.name}",
+                        expected="a value or attributes, not both",
+                        remedy="give the attributes in a class between the two",
+                    )
 
 
 def _check_parameters(library: Library, one: Class, effect: Effect) -> None:

@@ -6,13 +6,16 @@ Needs the extra `[compiler]` to build; sources can be written without it.
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from workbench import shelf
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError
-from workbench.modelica import Library
+from workbench.modelica import Library, beside, files, packages
+
+_USED = "Used"  # before the name of another library
 
 
 def component(name: str) -> str:
@@ -56,6 +59,7 @@ def source(
         If effects of one slot cannot stand together.
     """
     nested: list[str] = []
+    used: set[str] = set()
     redeclared = [f"    {parameter}={float(value)!r}" for parameter, value in parameters.items()]
     for slot in read_slots(library, base):
         inside = [effect for effect in effects if slot.name in effect.slots]
@@ -64,6 +68,10 @@ def source(
         label = slot.name[0].upper() + slot.name[1:]
         if label == library.name:
             label += "Slot"  # it would hide the library
+        used |= {one.partition(".")[0] for one in (slot.partial, slot.nominal)} - {library.name}
+        slot = replace(
+            slot, partial=_written(slot.partial, library), nominal=_written(slot.nominal, library)
+        )
         if slot.chained or len(inside) == 1:
             nested.append(_chain(label, slot, inside, values))
         else:
@@ -72,10 +80,16 @@ def source(
     modifiers = ",\n".join(redeclared)
     return (
         f'model {name} "{about}"\n'
+        + "".join(f"  import {_USED}{one} = {one};\n" for one in sorted(used))
         + f"  extends {library.find(base).name}(\n{modifiers});\n\n"
         + "\n".join(nested)
         + f"end {name};\n"
     )
+
+
+def _written(name: str, library: Library) -> str:
+    """A class as the extended model names it, in which the library may hide another one."""
+    return name if name.partition(".")[0] == library.name else _USED + name
 
 
 def _chain(
@@ -173,13 +187,18 @@ def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: 
         platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
         with tempfile.TemporaryDirectory() as scratch:
             copy = Path(scratch) / library.name
-            if library.file.name == "package.mo":
-                shutil.copytree(library.file.parent, copy)
-            else:
-                copy.mkdir()
-                shutil.copyfile(library.file, copy / library.file.name)
+            _copy(library.file, copy)
+            for used in packages(library.file)[1:]:
+                _copy(used, beside(copy / library.file.name) / used.parent.name)
             (copy / f"{name}.mo").write_text(f"within {library.name};\n{text}")
             whole = f"{library.name}.{name}"
             compiler.build(copy / library.file.name, whole, path, platforms=platforms)
 
     shelf.fetch(shelf.key(library.file, name, text, f"{every_platform}"), fmu, make)
+
+
+def _copy(package: Path, folder: Path) -> None:
+    for file in files(package):
+        copy = folder / file.relative_to(package.parent)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copy)

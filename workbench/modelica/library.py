@@ -9,16 +9,17 @@ from pathlib import Path
 
 from workbench.errors import InputError, closest
 from workbench.modelica.classes import Class, Component, Modifier
+from workbench.modelica.files import packages, read
 from workbench.modelica.source import Reader
 
 
 class Library:
-    """The classes of a Modelica library, and what their names mean.
+    """The classes of a Modelica library and of those that it uses, and what their names mean.
 
     Parameters
     ----------
     file : `package.mo` of the library, or its only file.
-    classes : all, in the order of `package.order` and of the files.
+    classes : all, in the order of `package.order` and of the files; those of used libraries last.
 
     Attributes
     ----------
@@ -68,11 +69,12 @@ class Library:
             return ".".join([found or head, *rest])
         for part in rest:
             if not (inside := self._member(part, found)):
+                hidden = f"; to mean the library {head}, import it" if head != found else ""
                 raise InputError(
                     where=self.classes[scope].where,
                     found=f"'{name}', but {found} has no class '{part}'",
                     expected="a class of the library",
-                    remedy="correct the name",
+                    remedy=f"correct the name{hidden}",
                 )
             found = inside
         return found
@@ -112,26 +114,29 @@ class Library:
 
     def components(self, name: str) -> dict[str, Component]:
         """Components of a class, inherited ones first, with the values it gives them."""
+        self.ancestors(name)  # refuses a class that extends itself
         found: dict[str, Component] = {}
-        for one in (*reversed(self.ancestors(name)), name):
-            for base in self.classes[one].extends:
-                for key, modifier in base.modifier.inner.items():
-                    if key in found:
-                        found[key] = replace(
-                            found[key], modifier=_merged(found[key].modifier, modifier)
-                        )
-            found |= {component.name: component for component in self.classes[one].components}
-        return found
+        for base, dotted in zip(self.classes[name].extends, self.bases(name), strict=True):
+            inherited = self.components(dotted) if dotted in self.classes else {}
+            for key, component in inherited.items():
+                modifier = component.modifier
+                if key in found:  # a class may be inherited on two ways
+                    modifier = _merged(found[key].modifier, modifier)
+                if key in base.modifier.inner:
+                    modifier = _merged(modifier, base.modifier.inner[key])
+                found[key] = replace(component, modifier=modifier)
+        return found | {component.name: component for component in self.classes[name].components}
 
     def unit(self, component: Component) -> str:
-        """Unit of a component; the name of its type if no class of the library has one for it."""
+        """Unit of a component; where it has none, the name of the type that could have one."""
         modifier, name, scope = component.modifier, component.type, component.owner
+        kind = ""
         while "unit" not in modifier.inner:
             name = self.resolve(name, scope)
             if name not in self.classes or not self.bases(name):
-                return name
+                return kind or name
             self.ancestors(name)  # refuses a type that is its own
-            scope, base = name, self.classes[name].extends[0]
+            kind, scope, base = name, name, self.classes[name].extends[0]
             modifier, name = base.modifier, base.name
         return modifier.inner["unit"].value.strip('"')
 
@@ -154,7 +159,7 @@ class Library:
 
 
 def read_library(file: Path) -> Library:
-    """Read a Modelica library.
+    """Read a Modelica library, and those that it uses.
 
     Parameters
     ----------
@@ -163,30 +168,15 @@ def read_library(file: Path) -> Library:
     Raises
     ------
     InputError
-        With file and line, if something is not Modelica, or not in its place.
+        With file and line, if something is not Modelica, or not in its place; if a library that it
+        uses is not found.
     """
-    return Library(file, list(_read(file, "")))
+    return Library(file, [one for package in packages(file) for one in _read(package, "")])
 
 
 def _read(file: Path, enclosing: str) -> Iterator[Class]:
     """Classes of a file and, of a package.mo, of all files and folders beside it."""
-    if not file.is_file():
-        raise InputError(
-            where=str(file),
-            found="no such file",
-            expected="the package.mo of a Modelica library, or its only file",
-            remedy="give its path, with --library on the command line",
-        )
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            where=str(file),
-            found=f"no text ({error})",
-            expected="Modelica in UTF-8",
-            remedy="save the file as UTF-8",
-        ) from None
-    classes = Reader(file, text).file(enclosing)
+    classes = Reader(file, read(file)).file(enclosing)
     name = classes[0].name
     is_package = file.name == "package.mo"
     expected = file.parent.name if is_package else file.stem

@@ -1,0 +1,3 @@
+within Effects;
+package Functions "Smooth forms of kinks"
+end Functions;

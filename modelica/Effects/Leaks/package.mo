@@ -1,0 +1,3 @@
+within Effects;
+package Leaks "What flows through gaps, pores and holes"
+end Leaks;
