@@ -329,12 +329,14 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
     def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
         with Simulations(everything, SYSTEM, {}, of, 1) as simulations:
             fit = Fit(simulations, EFFECTS)
-            point = replace(fit.start(), sizes={("WaterFilm", "film"): 0.3})
-            values = fit.values(point)
-            both = [[fit.presence.at(one, k) for k in range(len(of))] for one in (film, lag)]
+            point = replace(fit.unknowns.start(), sizes={("WaterFilm", "film"): 0.3})
+            values = fit.unknowns.values(point)
+            both = [
+                [fit.unknowns.presence.at(one, k) for k in range(len(of))] for one in (film, lag)
+            ]
             assert [one["padFriction.waterFilm.film"] > 0.0 for one in values] == both[0]
             wet = [one.get("padFriction.waterFilm.wet") for one in values]
-            return both[0], both[1], wet, fit.presence.unseen(single)
+            return both[0], both[1], wet, fit.unknowns.presence.unseen(single)
 
     reason = "the conditions of the stops say which discs are wet"
     assert asked(cases) == ([False, True, True], [True] * 3, [0.0, 1 / 3, 1.0], reason)

@@ -61,5 +61,6 @@ def test_what_was_read_and_cut_is_told_to_machines(tmp_path: Path, root: Path) -
     told = json.loads((tmp_path / PREPARED).read_text())
     assert told["licence"] == "CC BY-SA 4.0"
     assert list(told["read"]) == ["dataBenchmark.mat"]
-    assert told["cases"].keys() == {"fitted/estimation", "held_out/test"}
-    assert told["cases"]["held_out/test"]["rows"] == [0, 1023]
+    assert told["cases"].keys() == {"estimation", "test"}
+    assert told["held_out"] == ["test"]
+    assert told["cases"]["test"]["rows"] == [0, 1023]

@@ -36,7 +36,7 @@ class Recording:
     rows : first and last row of that file's samples, from 0.
     changed : what was converted, chosen or cut, for people.
     conditions : of the case, as `case.toml` has them.
-    held_out : it is there to judge by, and not to be fitted.
+    held_out : it is there to judge a fit to the others by.
     """
 
     name: str
@@ -119,7 +119,7 @@ def published(which: str) -> Published:
 
 
 def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
-    """Write case folders of a published set: `out/fitted`, `out/held_out`, `out/prepared.json`.
+    """Write case folders of a published set, and what was done as `prepared.json`.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
     layout = _layout(known, source)
     recordings = list(layout.read(source))
     for one in recordings:
-        _write_case(out / _group(one) / one.name, one)
+        _write_case(out / one.name, one)
     write_json(
         out / PREPARED,
         {
@@ -148,14 +148,11 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
             "workbench": commit(),
             "layout": layout.name,
             "read": dict(layout.files),
-            "cases": {f"{_group(one)}/{one.name}": _described(one) for one in recordings},
+            "held_out": [one.name for one in recordings if one.held_out],
+            "cases": {one.name: _described(one) for one in recordings},
         },
     )
     return recordings
-
-
-def _group(one: Recording) -> str:
-    return "held_out" if one.held_out else "fitted"
 
 
 def _described(one: Recording) -> dict[str, Any]:

@@ -39,12 +39,8 @@ def _prepare(options: argparse.Namespace) -> int:
         print(f"\nnext: workbench prepare {options.system} --from FOLDER --out CASES")
         return 0
     recordings = write_cases(options.system, options.source, options.out)
-    fitted = sum(not one.held_out for one in recordings)
-    print(f"{fitted} recordings to fit      {nearby(options.out / 'fitted')}")
-    if fitted < len(recordings):
-        print(
-            f"{len(recordings) - fitted} recordings held out    {nearby(options.out / 'held_out')}"
-        )
-    print(f"what was read and cut    {nearby(options.out / PREPARED)}")
-    print(f"next: workbench diagnose --system {options.system} {nearby(options.out / 'fitted')}")
+    held_out = [one.name for one in recordings if one.held_out]
+    print(f"{len(recordings)} recordings in {nearby(options.out)}, see {PREPARED} there")
+    command = f"workbench diagnose --system {options.system} {nearby(options.out)}"
+    print(f"next: {command}" + " --held-out " * bool(held_out) + " ".join(held_out))
     return 0

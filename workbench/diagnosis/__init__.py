@@ -8,7 +8,7 @@ switched on by a parameter.
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -98,43 +98,49 @@ def diagnose(
         with Simulations(everything, system, given, cases, workers) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
-            best = diagnosis.best
-            ends = diagnosis.base.linearised, best.linearised
-            found = residuals(simulations, fit, *ends)
             extension = _extend(
                 *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
             )
-            observers: dict[str, dict[str, tuple[float, float]]] = {}
-            turning = any(effect.order_locked for effect in best.active)
-            judged = all(system.objective.judged in case for case in cases)
-            observed = judged and bool(system.states or system.estimated)
-            if extension is not None and observed and not turning:
-                report("observers with both models")
-                observers = _observers(system, cases, extension.fmu)
-            levels = {key: float(value) for key, value in best.point.levels.items()}
-            return Outcome(
-                system=system,
-                cases=tuple(cases),
-                diagnosis=diagnosis,
-                residuals=found,
-                dependences=dependences(simulations, found),
-                levels={key: (value, fit.level_unit(key)) for key, value in levels.items()},
-                deviations={
-                    name: dict(zip(fit.local, map(float, row), strict=True))
-                    for name, row in zip(fit.names, best.point.deviations, strict=True)
-                },
-                set_aside={one.name: one.set_aside for one in simulations.recordings},
-                errors=(
-                    *errors_of(simulations, *ends, held_out=False),
-                    *held_out_errors(
-                        *(everything, simulations, effects, diagnosis.base, best),
-                        *(held_out, workers),
-                    ),
-                ),
-                observers=observers,
-                extension=extension,
-            )
+            base, best = diagnosis.base, diagnosis.best
+            errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
+            if held_out:
+                report("errors on recordings that were held out")
+                fitted = (everything, simulations, effects, base, best)
+                errors += held_out_errors(*fitted, held_out, workers)
+            observers = _observers(simulations, diagnosis, extension, report)
+            return _outcome(simulations, fit, diagnosis, extension, observers, errors)
+
+
+def _outcome(
+    simulations: Simulations,
+    fit: Fit,
+    diagnosis: Diagnosis,
+    extension: Extension | None,
+    observers: Mapping[str, Mapping[str, tuple[float, float]]],
+    errors: Sequence[Errors],
+) -> Outcome:
+    """All that was found, with what shows it."""
+    unknowns, point = fit.unknowns, diagnosis.best.point
+    found = residuals(simulations, fit, diagnosis.base.linearised, diagnosis.best.linearised)
+    return Outcome(
+        system=simulations.system,
+        cases=tuple(simulations.cases),
+        diagnosis=diagnosis,
+        residuals=found,
+        dependences=dependences(simulations, found),
+        levels={
+            key: (float(value), unknowns.level_unit(key)) for key, value in point.levels.items()
+        },
+        deviations={
+            name: dict(zip(unknowns.local, map(float, row), strict=True))
+            for name, row in zip(unknowns.names, point.deviations, strict=True)
+        },
+        set_aside={one.name: one.set_aside for one in simulations.recordings},
+        observers=observers,
+        extension=extension,
+        errors=tuple(errors),
+    )
 
 
 def build_everything(
@@ -205,7 +211,7 @@ def _extend(
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value
-                for name, value in fit.values(point)[k].items()
+                for name, value in fit.unknowns.values(point)[k].items()
                 if name in extended.parameters or name in delays
             }
             errors = extended.at(k, known).errors
@@ -246,15 +252,29 @@ def _usual_levels(simulations: Simulations, diagnosis: Diagnosis) -> dict[str, f
 
 
 def _observers(
-    system: System, cases: Sequence[Case], after: Path
+    simulations: Simulations,
+    diagnosis: Diagnosis,
+    extension: Extension | None,
+    report: Reporter,
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Errors of the judged signal, with the gains of the nominal model in both."""
+    system, cases = simulations.system, simulations.cases
+    turning = any(effect.order_locked for effect in diagnosis.best.active)
+    judged = all(system.objective.judged in case for case in cases)
+    if extension is None or turning or not judged:
+        return {}
+    report("observers with both models")
+    gains = {}
     with open_model(system) as nominal:
-        gains = {kind.name: kind.reasoned(nominal, system) for kind in _TRIED}
+        for kind in _TRIED:
+            try:
+                gains[kind.name] = kind.reasoned(nominal, system)
+            except InputError as refused:  # a model may be fit for this, and for no observer
+                report(f"no {kind.label}: {refused.found}")
     errors: dict[str, dict[str, list[float]]] = {}
-    for one in (system, with_model(system, OBSERVER, after)):
+    for one in (system, with_model(system, OBSERVER, extension.fmu)):
         with open_model(one) as fmu:
-            for kind in _TRIED:
+            for kind in (kind for kind in _TRIED if kind.name in gains):
                 estimator = kind(fmu, one, gains[kind.name])
                 by_case = errors.setdefault(kind.name, {})
                 for case in cases:

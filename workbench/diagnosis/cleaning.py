@@ -11,7 +11,7 @@ from workbench.diagnosis.thresholds import Soundness
 from workbench.recording import Vector
 from workbench.system import Signal
 
-_ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
+ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 
 Mask = NDArray[np.bool_]
@@ -99,7 +99,7 @@ def first_value(time: Vector, values: Vector, noise: float) -> float:
     count = time.size
     while count > 2:
         line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
-        if np.std(values[:count] - line(time[:count])) < _ALONG * noise:
+        if np.std(values[:count] - line(time[:count])) < ALONG * noise:
             return float(line(time[0]))
         count //= 2
     return float(values[0])

@@ -93,7 +93,7 @@ def residuals(
     simulations: Simulations, fit: Fit, before: Linearised, after: Linearised
 ) -> list[Residuals]:
     """Residuals of all recordings, with the levels of the nominal model as fitted."""
-    values = fit.values(before.point)
+    values = fit.unknowns.values(before.point)
     system, known = simulations.system, _balances(simulations.system)
     found = []
     for k, (case, one) in enumerate(zip(simulations.cases, simulations.recordings, strict=True)):

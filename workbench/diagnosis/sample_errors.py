@@ -103,13 +103,11 @@ def held_out_errors(
     fitted : the other recordings.
     before, after : the nominal and the last model, as fitted to those.
     """
-    if not cases:
-        return []
     with Simulations(everything, fitted.system, fitted.given, cases, workers) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
         ends = []
         for one in (before, after):
-            start = fit.start()
+            start = fit.unknowns.start()
             levels = {key: one.point.levels.get(key, usual) for key, usual in start.levels.items()}
             phases = {name: np.zeros(len(cases)) for name in one.point.phases}
             point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)

@@ -167,7 +167,7 @@ def examine(
     candidates: list[Option] = [
         (effect, shape)
         for effect in catalogue
-        if effect not in best.active and not fit.presence.unseen(effect)
+        if effect not in best.active and not fit.unknowns.presence.unseen(effect)
         for shape in shapes(effect)
     ]
     report(f"signatures of {len(candidates)} candidates")

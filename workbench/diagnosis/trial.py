@@ -124,7 +124,7 @@ class Trial:
         if effect.order_locked:
             phases = np.array([_phase(stop, at) for stop in self._stops])
             own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
-        low, high = self._fit.bounds(effect, effect.size)
+        low, high = self._fit.unknowns.bounds(effect, effect.size)
         stops, prior = self._select(own, effect.name)
         total = add([*stops, prior])
         best = minimum(total)
@@ -145,7 +145,7 @@ class Trial:
             shape=shape,
             size=size,
             sigma=sigma,
-            units={name: self._fit.unit(effect, name) for name in (effect.size, *shape)},
+            units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
             gain=self._reference - total.at(best),
             held_out=self._without - _held_out(alone, prior),
             phases=phases,

@@ -119,7 +119,7 @@ class Diagnosis:
 def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of stops."""
     report("nominal model, levels calibrated")
-    nominal = fitted(fit, fit.at(fit.start()), ())
+    nominal = fitted(fit, fit.at(fit.unknowns.start()), ())
     best, steps, trial, interrupted = seek(fit, catalogue, nominal, report)
     base = steps[0].before if steps else best
     best, trial = pruned(fit, catalogue, best, base, trial, report)
@@ -142,7 +142,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
         before, after = (held_out(fit, one, fast=fast) for one in (base, best))
-        gain = _gain(fit.names, before, after)
+        gain = _gain(fit.unknowns.names, before, after)
         causes = _causes(fit, best, less, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
@@ -156,7 +156,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         scores=steps[0].scores if steps else tuple(trial.scores()),
         names=names,
         cosines=cosines,
-        not_visible={one.name: reason for one in catalogue if (reason := fit.presence.unseen(one))},
+        not_visible={
+            one.name: reason for one in catalogue if (reason := fit.unknowns.presence.unseen(one))
+        },
     )
 
 
@@ -243,7 +245,7 @@ def _causes(
             if key[0] != effect.name:
                 continue
             parameter = effect.size if key[1] == effect.label else key[1]
-            low, high = fit.bounds(effect, parameter)
+            low, high = fit.unknowns.bounds(effect, parameter)
             # Beside the noise: forms of laws that differ in detail, and immaterial companions.
             form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
             reach = float(_QUANTILE * np.hypot(sigma[trial.joint.known.index(key)], form))
@@ -251,7 +253,7 @@ def _causes(
                 value,
                 max(value - reach, low),
                 min(value + reach, high),
-                fit.unit(effect, parameter),
+                fit.unknowns.unit(effect, parameter),
             )
         causes.append(
             Cause(

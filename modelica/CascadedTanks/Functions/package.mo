@@ -1,0 +1,3 @@
+within CascadedTanks;
+package Functions "Laws"
+end Functions;

@@ -1,0 +1,242 @@
+"""Recordings as real machines give them: one alone, in coarse steps, cut off, from unknown states.
+
+A heated block whose casing takes some of the heat; the casing's temperature is not measured. The
+recordings are exact solutions of the linear equations, not of the compiled model.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench import case_from_frame
+from workbench.case import Case
+from workbench.diagnosis import Outcome, diagnose, read_effects
+from workbench.diagnosis.samples import BEYOND
+from workbench.errors import InputError
+from workbench.modelica import read_library
+from workbench.system import System
+from workbench.systems import load_system
+
+LIBRARY = """within ;
+package Heater "A heated block in a casing"
+  partial model PartialLoss "Slot: from temperature to heat"
+    input Real T(unit="K") "Above the surroundings";
+    output Real Q(unit="W") "Lost";
+  end PartialLoss;
+
+  model NoLoss "Null version"
+    extends PartialLoss;
+  equation
+    Q = 0.0;
+  end NoLoss;
+
+  model Draught "a draught that takes heat"
+    extends PartialLoss;
+    parameter Real G(unit="W/K", min=0.0, max=5.0) = 0.0 "Conductance";
+  equation
+    Q = G*T;
+    annotation (__Workbench(effect(
+      size="G", step=1e-3, matters=0.02, separation="the surface in a closed box")));
+  end Draught;
+
+  model Radiation "heat that is radiated"
+    extends PartialLoss;
+    parameter Real s(unit="W/K2", min=0.0, max=0.1) = 0.0 "Quadratic part";
+  equation
+    Q = s*T*abs(T);
+    annotation (__Workbench(effect(
+      size="s", step=1e-5, matters=5e-4, separation="a hotter block")));
+  end Radiation;
+
+  model Observer "Block and casing"
+    parameter Real C(unit="J/K") = 100.0 "Heat capacity of the block";
+    parameter Real Cc(unit="J/K") = 200.0 "Heat capacity of the casing";
+    parameter Real K(unit="W/K") = 2.0 "From block to casing";
+    parameter Real Gc(unit="W/K") = 0.5 "From casing to the surroundings";
+    input Real P(unit="W") "Heating power";
+    input Real dGc(unit="W/K") "Correction of Gc";
+    output Real T(unit="K", start=0.0, fixed=true, nominal=20.0) "Block";
+    Real Tc(unit="K", start=0.0, fixed=true, nominal=20.0) "Casing";
+    replaceable NoLoss loss(T=T) constrainedby PartialLoss(T=T) "From the block";
+  equation
+    C*der(T) = P - K*(T - Tc) - loss.Q;
+    Cc*der(Tc) = K*(T - Tc) - (Gc + dGc)*Tc;
+  end Observer;
+end Heater;
+"""
+SYSTEM = """
+name = "heater"
+title = "A heated block in a casing"
+sample_time = "1 s"
+
+[models]
+observer = {{ class = "Observer" }}
+
+[inputs.P]
+unit = "W"
+noise = "0 W"
+scale = "40 W"
+held = true
+
+[outputs.T]
+unit = "K"
+noise = "0.05 K"
+scale = "20 K"
+{sensor}
+
+[states.Tc]
+spread = "30 K"
+
+[estimated.Gc]
+correction = "dGc"
+unit = "W/K"
+range = ["0.1 W/K", "2 W/K"]
+walk = "0.01 W/K"
+"""
+LOSS, NOISE, SECONDS = 0.2, 0.05, 1200  # [W/K] planted; [K], [s]
+
+
+def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
+    """Exact solution for a power that is held for a minute each time, with noise.
+
+    Parameters
+    ----------
+    casing : temperature at the start [K], which nobody measured.
+    """
+    rng = np.random.default_rng(seed)
+    power = np.repeat(rng.uniform(0.0, 60.0, SECONDS // 60), 60)
+    A = np.array([[-2.0 - loss, 2.0], [2.0, -2.5]]) / np.array([[100.0], [200.0]])
+    whole = expm(np.block([[A, np.array([[0.01], [0.0]])], [np.zeros((1, 3))]]))
+    x, found = np.array([5.0, casing]), []
+    for one in power:
+        found.append(x[0])
+        x = whole[:2, :2] @ x + whole[:2, 2] * one
+    measured = np.array(found) + NOISE * rng.standard_normal(SECONDS)
+    return pd.DataFrame(
+        {"time [s]": np.arange(SECONDS, dtype=float), "P [W]": power, "T [K]": measured}
+    )
+
+
+def system(folder: Path, sensor: str = "") -> System:
+    folder.mkdir()
+    (folder / "package.mo").write_text(LIBRARY)
+    (folder / "system.toml").write_text(SYSTEM.format(sensor=sensor))
+    return load_system(folder)
+
+
+def cases(of: System, frames: Sequence[pd.DataFrame]) -> list[Case]:
+    return [case_from_frame(of, frame, name=f"{k:02}") for k, frame in enumerate(frames)]
+
+
+def diagnosed(
+    of: System, fitted: Sequence[Case], out: Path, held_out: Sequence[Case] = ()
+) -> Outcome:
+    library = read_library(of.library)
+    effects = read_effects(library, "Observer")
+    return diagnose(of, fitted, library, effects, out, 1, lambda _: None, held_out=held_out)
+
+
+@pytest.fixture(scope="module")
+def heater(tmp_path_factory: pytest.TempPathFactory) -> System:
+    return system(tmp_path_factory.mktemp("systems") / "heater")
+
+
+def test_a_single_recording_is_cut_and_its_cause_named(heater: System, tmp_path: Path) -> None:
+    outcome = diagnosed(heater, cases(heater, [simulated(1, LOSS, 12.0)]), tmp_path)
+    assert [case.name for case in outcome.cases] == [f"00, part {k} of 4" for k in range(1, 5)]
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "Draught"
+    size = cause.parameters["G"]
+    assert size.low <= LOSS <= size.high
+    # Four unknown temperatures of the casing cost little: the interval is no wider than a tenth.
+    assert size.high - size.low < 0.2 * LOSS
+
+
+def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_path: Path) -> None:
+    outcome = diagnosed(heater, cases(heater, [simulated(2, 0.0, -8.0)]), tmp_path)
+    assert outcome.diagnosis.verdict == "nothing"
+
+
+def test_a_single_short_recording_is_refused(heater: System, tmp_path: Path) -> None:
+    (case,) = cases(heater, [simulated(1, LOSS, 0.0)])
+    with pytest.raises(InputError, match="two or more"):
+        diagnosed(heater, [case.part(slice(0, 300))], tmp_path)
+
+
+def test_a_state_that_nobody_measured_starts_where_the_recording_says(
+    heater: System, tmp_path: Path
+) -> None:
+    starts = [15.0, -10.0, 4.0]
+    recordings = cases(heater, [simulated(k, 0.0, at) for k, at in enumerate(starts)])
+    outcome = diagnosed(heater, recordings, tmp_path)
+    assert outcome.diagnosis.verdict == "nothing"
+    found = [30.0 * outcome.deviations[case.name]["Tc"] for case in recordings]
+    # By noise alone a casing is known to some 0.1 K; its prior draws it to zero by less.
+    assert found == pytest.approx(starts, abs=0.5)
+
+
+def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_path: Path) -> None:
+    recordings = cases(heater, [simulated(k, LOSS, 3.0 * k) for k in range(4)])
+    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
+    assert [one.recording for one in outcome.errors if one.held_out] == ["02", "03"]
+    for one in outcome.errors:
+        assert one.rms[0] > 10.0 * NOISE
+        # Sampling scatter of a standard deviation over a thousand samples is 2 %.
+        assert one.rms[1] == pytest.approx(NOISE, rel=0.1)
+        # Of normal errors.
+        assert one.mean_absolute[1] == pytest.approx(one.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05)
+    assert "2 recordings held out" in outcome.summary()
+
+
+def in_steps(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    return step * np.round(values / step)
+
+
+def test_coarse_steps_of_a_reading_are_no_cause(tmp_path: Path) -> None:
+    step = 2.0
+    coarse = system(tmp_path / "coarse", f'resolution = "{step} K"')
+    frames = [simulated(k, 0.0, 0.0) for k in range(3)]
+    for frame in frames:
+        frame["T [K]"] = in_steps(frame["T [K]"].to_numpy(), step)
+    outcome = diagnosed(coarse, cases(coarse, frames), tmp_path / "out")
+    assert outcome.diagnosis.verdict == "nothing"
+    # Nothing that repeats itself is taken for a stuck sensor.
+    assert all(sum(counts.values()) == 0 for counts in outcome.set_aside.values())
+
+
+def test_samples_at_the_limit_of_a_sensor_do_not_count(tmp_path: Path) -> None:
+    limit = 40.0
+    cut_off = system(tmp_path / "cut_off", f'saturates = ["-50 K", "{limit} K"]')
+    frames = [simulated(k, LOSS, 0.0) for k in range(3)]
+    beyond = [int((frame["T [K]"] >= limit).sum()) for frame in frames]
+    assert min(beyond) > 100
+    for frame in frames:
+        frame["T [K]"] = np.minimum(frame["T [K]"], limit)
+    outcome = diagnosed(cut_off, cases(cut_off, frames), tmp_path / "out")
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "Draught"
+    assert cause.parameters["G"].low <= LOSS <= cause.parameters["G"].high
+    assert [one[BEYOND] for one in outcome.set_aside.values()] == beyond
+
+
+@pytest.mark.parametrize(
+    ("sensor", "match"),
+    [
+        ('saturates = ["20 K", "-50 K"]', "the lower limit before the upper one"),
+        ('saturates = ["20 K"]', "2 numbers"),
+        ('resolution = "1 bar"', "cannot be converted|bar"),
+    ],
+)
+def test_mistakes_in_what_a_sensor_reads_are_refused(
+    sensor: str, match: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=match):
+        system(tmp_path / "wrong", sensor)
