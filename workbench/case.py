@@ -33,6 +33,7 @@ class Case:
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
+    leads : samples at the start that only lead a simulation to where the others count.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Case:
     outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
+    leads: int = 0
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""

@@ -17,7 +17,7 @@ from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
 from workbench.diagnosis.thresholds import Thresholds, thresholds
-from workbench.diagnosis.unknowns import SENSOR, Unknowns
+from workbench.diagnosis.unknowns import SENSOR, SINGLE, Unknowns
 from workbench.fmu import Vector
 
 _HALVED = 4  # times: after that a step is given up
@@ -100,7 +100,7 @@ class Fit:
     def _tolerances(self) -> dict[Key, Variation]:
         """Columns of what differs from stop to stop."""
         start = self.unknowns.start()
-        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.local}
+        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.differing}
         return {
             (_LOCAL, name): Variation((name,), 0.5 * self.unknowns.spread(start, name, 0, spread))
             for name, spread in spreads.items()
@@ -141,7 +141,7 @@ class Fit:
         at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
-            if key in point.levels and key[1] == SENSOR:
+            if key in point.levels and key[1] in (SENSOR, SINGLE):
                 J[:, j] = at[_LOCAL, key[0]]
             elif key in point.levels:
                 if key[1] == self.unknowns.choice(key[0], case):

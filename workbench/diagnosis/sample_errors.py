@@ -43,7 +43,8 @@ class Errors:
 def apart(cases: Sequence[Case], system: System) -> list[Case]:
     """Recordings that can be held out from each other: of a single one, its parts.
 
-    Each part starts in states of its own, which are as unknown as those of a recording.
+    Each part is simulated from the start of the recording, whose states are no more unknown than
+    they were, and counts from where the one before it ends.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def apart(cases: Sequence[Case], system: System) -> list[Case]:
         )
     edges = np.linspace(0, cases[0].time.size, count + 1).astype(int)
     return [
-        replace(cases[0].part(slice(a, b)), name=f"{cases[0].name}, part {k} of {count}")
+        replace(cases[0].part(slice(b)), name=f"{cases[0].name}, part {k} of {count}", leads=int(a))
         for k, (a, b) in enumerate(pairwise(edges), start=1)
     ]
 

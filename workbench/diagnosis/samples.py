@@ -203,6 +203,7 @@ def prepare(
         "settling": time < time[0] + compare.settling,
     }
     usable = ~np.logical_or.reduce(list(excluded.values()))
+    usable[: case.leads] = False
     blocks = _blocks(usable, time, compare.block, h)
     _refuse_too_few(case, system, blocks, excluded)
     formed = channels(system, signals)
@@ -235,8 +236,8 @@ def prepare(
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
-            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1))),
-            **{reason: int(mask.sum()) for reason, mask in excluded.items()},
+            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time[case.leads :]) / h) - 1))),
+            **{reason: int(mask[case.leads :].sum()) for reason, mask in excluded.items()},
         },
     )
 
