@@ -1,7 +1,8 @@
-"""Systems without states, and systems without inputs, go the way of all others."""
+"""Systems without states, without inputs, and with few samples go the way of all others."""
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.api import diagnose
-from workbench.case import read_cases
+from workbench.case import check_recording, read_cases
 from workbench.diagnosis import Outcome
+from workbench.diagnosis.cleaning import deviation_of
 from workbench.diagnosis.motion import led_by, motion
+from workbench.errors import InputError
 from workbench.fitness import check, is_fit
 from workbench.fmu import FMU, CoSimulation
 from workbench.observers.operating import corrected_states
@@ -168,6 +171,11 @@ held = { p = "5e5" }
 
 [states.p]
 spread = "10 mbar"
+
+[diagnosis]
+block = "2 s"
+lasting = "10 s"
+least = "20 s"
 """
 STIFFNESS, FRICTION, LEAK = 103.0, 0.4, 0.01
 
@@ -316,7 +324,7 @@ def test_a_model_without_anything_to_estimate_is_refused(
     assert diagnosed(folder, tmp_path, ["DryFriction"]).diagnosis.verdict == "found"
 
 
-# --- without inputs ---
+# --- without inputs, and few samples ---
 
 
 def test_estimators_follow_a_leak_without_an_input(bottle: Path, tmp_path: Path) -> None:
@@ -334,6 +342,37 @@ def test_the_pore_is_named_and_not_the_wall(bottle: Path, tmp_path: Path) -> Non
     (cause,) = diagnosis.causes
     assert cause.effect.name == "Pore"
     assert cause.parameters["k"].low < LEAK < cause.parameters["k"].high
+
+
+def test_parts_of_a_single_recording_have_one_start(bottle: Path, tmp_path: Path) -> None:
+    """The last quarter says by how much the first sample was read wrongly, and the leak."""
+    system = loaded(bottle)
+    cases = read_cases([bottle / "recordings" / "01_leak"], system)
+    outcome = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None)
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "Pore"
+    # Of 200 samples with 2 mbar: a start known to 1 mbar, a leak to a thousandth of it.
+    assert outcome.levels["p", "this recording"] == (pytest.approx(5.3e5, abs=300.0), "Pa")
+    assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
+    assert [one.samples for one in outcome.errors] == [50, 50, 50, 50]
+    assert all(not row for row in outcome.deviations.values())
+
+
+def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:
+    system = loaded(bottle)
+    case = read_cases([bottle / "recordings" / "00_leak"], system)[0].part(slice(12))
+    check_recording(case.time, replace(system, fewest=12), "here, column 'time'")
+    with pytest.raises(InputError, match="12 samples over 11 s; expected at least 20 samples"):
+        check_recording(case.time, system, "here, column 'time'")
+
+
+def test_curvature_of_a_signal_sampled_slowly_is_no_noise() -> None:
+    """A decay of a seventh from sample to sample bends by more than the noise of 3 mbar."""
+    rng = np.random.default_rng(3)
+    noise = 3e2 * rng.standard_normal(40)
+    decay = 7e5 * np.exp(-np.arange(40.0) / 7.0)
+    assert deviation_of(decay + noise) == pytest.approx(3e2, rel=0.4)
+    assert deviation_of(noise) == pytest.approx(3e2, rel=0.4)
 
 
 def test_observability_without_an_input(bottle: Path, tmp_path: Path) -> None:

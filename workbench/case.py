@@ -14,8 +14,6 @@ from workbench.system import Condition, System
 from workbench.tables import Table, read_table
 from workbench.units import quantity, si_factor
 
-_MIN_SAMPLES = 20  # fewer say nothing about noise
-
 Value = float | int | str | tuple[Any, ...]
 
 
@@ -33,7 +31,8 @@ class Case:
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
-    leads : samples at the start that only lead a simulation to where the others count.
+    counts : first sample and end of what counts, None for all: those before only lead a simulation
+        there.
     """
 
     name: str
@@ -45,7 +44,7 @@ class Case:
     outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
-    leads: int = 0
+    counts: tuple[int, int] | None = None
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -203,11 +202,11 @@ def check_recording(time: Vector, system: System, where: str, first_line: int | 
             expected="strictly increasing time",
             remedy="export with more digits, or remove the repeated or misplaced samples",
         )
-    if time.size < _MIN_SAMPLES or time[-1] - time[0] < system.shortest:
+    if time.size < system.fewest or time[-1] - time[0] < system.shortest:
         raise InputError(
             where=where,
             found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
-            expected=f"at least {_MIN_SAMPLES} samples, which tell signal from noise"
+            expected=f"at least {system.fewest} samples, which tell signal from noise"
             + (f", over {system.shortest:g} s" if system.shortest else ""),
             remedy="export the whole recording, from before it begins to its end",
         )

@@ -94,6 +94,7 @@ class System:
     export : estimators as FMUs.
     companion : Python package with a virtual rig and more estimators, or a module; empty: none.
     shortest : [s] that a recording must last.
+    fewest : samples that a recording must have.
     settles : [s] in which a model comes to rest at an operating point.
     sample_time : [s] of usual recordings.
     cases : folder of recordings that come with the system, or None.
@@ -129,6 +130,7 @@ class System:
     export: Export = field(default_factory=lambda: Export({}, OperatingPoint({}, {}, {})))
     companion: str = ""
     shortest: float = 0.0
+    fewest: int = 20
     settles: float = 10.0
     sample_time: float = 0.005
     states: tuple[str, ...] | None = None

@@ -42,7 +42,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest sample_time cases"
+        "export shortest fewest sample_time cases"
     )
     return _read(file, path, _models(file, path))
 
@@ -157,6 +157,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         comparison=Comparison(0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
+        fewest=round(file.number("fewest", "1", 20.0)),
         cases=path.parent / cases if (cases := file.text("cases", "")) else None,
         settles=file.table("points").number("settles", "s", 10.0),
         sample_time=file.number("sample_time", "s"),

@@ -258,7 +258,9 @@ def _observers(
     report: Reporter,
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Errors of the judged signal, with the gains of the nominal model in both."""
-    system, cases = simulations.system, simulations.cases
+    system = simulations.system
+    # Observers run on whole recordings: of the parts of one, any of them is the whole.
+    cases = [one for one in simulations.cases if one.counts is None] or simulations.cases[:1]
     turning = any(effect.order_locked for effect in diagnosis.best.active)
     judged = all(system.objective.judged in case for case in cases)
     if extension is None or turning or not judged:

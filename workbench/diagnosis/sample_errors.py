@@ -65,8 +65,8 @@ def apart(cases: Sequence[Case], system: System) -> list[Case]:
         )
     edges = np.linspace(0, cases[0].time.size, count + 1).astype(int)
     return [
-        replace(cases[0].part(slice(b)), name=f"{cases[0].name}, part {k} of {count}", leads=int(a))
-        for k, (a, b) in enumerate(pairwise(edges), start=1)
+        replace(cases[0], name=f"{cases[0].name}, part {k} of {count}", counts=(a, b))
+        for k, (a, b) in enumerate(pairwise(edges.tolist()), start=1)
     ]
 
 

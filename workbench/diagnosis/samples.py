@@ -203,7 +203,8 @@ def prepare(
         "settling": time < time[0] + compare.settling,
     }
     usable = ~np.logical_or.reduce(list(excluded.values()))
-    usable[: case.leads] = False
+    first, end = case.counts or (0, time.size)
+    usable[:first] = usable[end:] = False
     blocks = _blocks(usable, time, compare.block, h)
     _refuse_too_few(case, system, blocks, excluded)
     formed = channels(system, signals)
@@ -216,12 +217,12 @@ def prepare(
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
         name=case.name,
-        time=time,
+        time=time[:end],
         inputs=case.inputs,
-        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
+        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T[:end]),
         signals=signals,
-        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
-        gain=gain,
+        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])[:end]),
+        gain=gain[:end],
         lead=lead,
         held=np.array([one.held for one in system.inputs]),
         begin=_begin(
@@ -236,8 +237,8 @@ def prepare(
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
-            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time[case.leads :]) / h) - 1))),
-            **{reason: int(mask[case.leads :].sum()) for reason, mask in excluded.items()},
+            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time[first:end]) / h) - 1))),
+            **{reason: int(mask[first:end].sum()) for reason, mask in excluded.items()},
         },
     )
 

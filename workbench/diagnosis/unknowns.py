@@ -52,7 +52,7 @@ class Unknowns:
         }
         self.presence = Presence(simulations.cases, simulations.recordings, beside)
         self.count = len(simulations.cases)
-        self._single = any(case.leads for case in simulations.cases)
+        self._single = any(case.counts for case in simulations.cases)
 
     @property
     def names(self) -> list[str]:

@@ -44,7 +44,9 @@ def _read_csv(folder: Path) -> list[Recording]:
         rows = list(csv.DictReader(stream))
     stamps = [datetime.fromisoformat(row["timestamp"]) for row in rows]
     time = np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
-    intake, pressure = (np.array([float(row[key]) for row in rows]) for key in ("COMP", "Reservoirs"))
+    intake, pressure = (
+        np.array([float(row[key]) for row in rows]) for key in ("COMP", "Reservoirs")
+    )
     return _cut(time, intake, np.round(pressure, 3), _CSV)
 
 
