@@ -8,9 +8,9 @@ equation
   y = u + drift*t;
   annotation (
     __Workbench(effect(
-      size="drift", step=1.0, matters=42.0, slots={"gauge"},
+      size="drift", step=1.0, matters=17.0, slots={"gauge"},
       separation="its reading at a pressure that is kept")),
     Documentation(info="<html>
-<p>A sensor that warms up. 42 Pa/s are 50 mbar in two minutes.</p>
+<p>A sensor that warms up. 17 Pa/s are 20 mbar in two minutes.</p>
 </html>"));
 end GaugeDrift;

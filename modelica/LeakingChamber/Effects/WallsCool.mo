@@ -7,10 +7,10 @@ equation
   rate = pAir/T*slope;
   annotation (
     __Workbench(effect(
-      size="slope", step=1e-3, matters=0.015,
+      size="slope", step=1e-3, matters=6e-3,
       separation="a thermometer at the wall")),
     Documentation(info="<html>
 <p>After it was handled, or filled with warm air, a wall comes back to the temperature of the room;
-over two minutes in proportion to time. 0.015 K/s are 50 mbar.</p>
+over two minutes in proportion to time. 0.006 K/s are 20 mbar.</p>
 </html>"));
 end WallsCool;
