@@ -24,7 +24,14 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import RecordingSystem, add, covariance, minimum
+from workbench.diagnosis.quadratic import (
+    Quadratic,
+    RecordingSystem,
+    add,
+    covariance,
+    minimum,
+    minimum_within,
+)
 from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
 from workbench.errors import InputError
@@ -235,10 +242,29 @@ def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
         assert np.abs(read).max() == pytest.approx(gain, rel=0.02)
 
 
+def test_a_step_that_is_held_at_its_bound_lets_the_others_do_their_best() -> None:
+    rng = np.random.default_rng(5)
+    J, r = rng.normal(size=(40, 3)), rng.normal(size=40)
+    J[:, 1] += 2.0 * J[:, 0]  # what one of them does the other may do too
+    total = Quadratic(J.T @ J, J.T @ r, float(r @ r), 40)
+    free = minimum(total)
+    bound = 0.5 * abs(free[0])
+    wide = np.array([bound, np.inf, np.inf])
+    step = minimum_within(total, -wide, wide)
+    assert step[0] == pytest.approx(0.5 * free[0], rel=1e-12)
+    best = np.linalg.lstsq(J[:, 1:], -(r + step[0] * J[:, 0]), rcond=None)[0]
+    # Of normal equations, whose condition is some ten: rounding.
+    np.testing.assert_allclose(step[1:], best, rtol=1e-9)
+    np.testing.assert_allclose(minimum_within(total, np.full(3, -9.0), np.full(3, 9.0)), free)
+
+
 def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     rng = np.random.default_rng(4)
     systems = [
-        RecordingSystem(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d)
+        RecordingSystem(
+            *(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d),
+            channels=3,
+        )
         for d in rng.normal(size=(4, 5))
     ]
     total = add([system.eliminated() for system in systems])

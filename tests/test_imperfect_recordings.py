@@ -7,6 +7,7 @@ recordings are exact solutions of the linear equations, not of the compiled mode
 from collections.abc import Sequence
 from pathlib import Path
 
+import lxml.html
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,9 +20,12 @@ pytest.importorskip("rumoca")
 from workbench import case_from_frame
 from workbench.case import Case
 from workbench.diagnosis import Outcome, diagnose, read_effects
+from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.samples import BEYOND
+from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.modelica import read_library
+from workbench.report.diagnosis import write_diagnosis
 from workbench.system import System
 from workbench.systems import load_system
 
@@ -149,15 +153,21 @@ def heater(tmp_path_factory: pytest.TempPathFactory) -> System:
     return system(tmp_path_factory.mktemp("systems") / "heater")
 
 
-def test_a_single_recording_is_cut_and_its_cause_named(heater: System, tmp_path: Path) -> None:
+def test_parts_of_a_single_recording_are_held_out_and_its_cause_named(
+    heater: System, tmp_path: Path
+) -> None:
     outcome = diagnosed(heater, cases(heater, [simulated(1, LOSS, 12.0)]), tmp_path)
-    assert [case.name for case in outcome.cases] == [f"00, part {k} of 4" for k in range(1, 5)]
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "Draught"
     size = cause.parameters["G"]
     assert size.low <= LOSS <= size.high
-    # Four unknown temperatures of the casing cost little: the interval is no wider than a tenth.
-    assert size.high - size.low < 0.2 * LOSS
+    assert size.high - size.low < 0.1 * LOSS
+    assert outcome.diagnosis.gain is not None
+    gain = outcome.diagnosis.gain
+    assert list(gain.recordings) == [f"part {k} of 10" for k in range(1, 11)]
+    # Parts that are held out are predicted nearly as well as those that were fitted.
+    assert gain.before > 100.0
+    assert gain.low < 1.0 < gain.high
 
 
 def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_path: Path) -> None:
@@ -165,10 +175,10 @@ def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_pa
     assert outcome.diagnosis.verdict == "nothing"
 
 
-def test_a_single_short_recording_is_refused(heater: System, tmp_path: Path) -> None:
-    (case,) = cases(heater, [simulated(1, LOSS, 0.0)])
+def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -> None:
+    differing = system(tmp_path / "heaters", "[diagnosis.tolerances]\nGc = 0.05")
     with pytest.raises(InputError, match="two or more"):
-        diagnosed(heater, [case.part(slice(0, 300))], tmp_path)
+        diagnosed(differing, cases(differing, [simulated(1, LOSS, 0.0)]), tmp_path)
 
 
 def test_a_state_that_nobody_measured_starts_where_the_recording_says(
@@ -240,3 +250,43 @@ def test_mistakes_in_what_a_sensor_reads_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=match):
         system(tmp_path / "wrong", sensor)
+
+
+def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
+    heater: System, tmp_path: Path
+) -> None:
+    recordings = cases(heater, [simulated(k, LOSS, 0.0) for k in range(3)])
+    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
+    page = lxml.html.fromstring(write_diagnosis(outcome, {}, tmp_path, 1).read_bytes())
+    rows = page.xpath("//table[@id='error-table']/tbody/tr")
+    assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out"]
+    table = pd.read_csv(tmp_path / "errors.csv", dtype={"recording": str})
+    assert list(table["recording"]) == ["00", "01", "02"]
+    shown = [float(cell) for cell in rows[2].xpath("td[@class='number']/@data-value")]
+    names = ["rms_before", "mean_absolute_before", "rms_after", "mean_absolute_after"]
+    assert shown == pytest.approx(table[names].iloc[2].to_list(), rel=1e-4)
+
+
+def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path: Path) -> None:
+    limit = 40.0
+    cut_off = system(tmp_path / "cut_off", f'saturates = ["-50 K", "{limit} K"]')
+    frames = [simulated(k, 0.0, 0.0) for k in range(3)]
+    for frame in frames:
+        frame["T [K]"] = np.minimum(frame["T [K]"], limit)
+    outcome = diagnosed(cut_off, cases(cut_off, frames), tmp_path / "out")
+    # A right model saturates where the sensor does: all samples are told, those errors are none.
+    for one, frame in zip(outcome.errors, frames, strict=True):
+        assert one.samples > 0.99 * SECONDS  # a sample between two at the limit may pass for wrong
+        below = float((frame["T [K]"] < limit).mean())
+        assert one.rms[0] == pytest.approx(NOISE * np.sqrt(below), rel=0.1)
+
+
+def test_a_fast_rise_between_slow_falls_is_no_spike(heater: System) -> None:
+    sensor = heater.signals["T"]
+    rng = np.random.default_rng(3)
+    # Ten samples up and two hundred down, as a compressor fills a reservoir that leaks.
+    sawtooth = np.tile(np.append(np.linspace(0.0, 20.0, 10), np.linspace(20.0, 0.0, 200)), 4)
+    values = sawtooth + NOISE * rng.standard_normal(sawtooth.size)
+    assert not outliers(values, sensor, SOUND).any()
+    values[[100, 300, 301, 731]] += [1.0, -2.0, -2.0, 1.5]
+    assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 300, 301, 731]

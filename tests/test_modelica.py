@@ -198,6 +198,23 @@ def test_what_cannot_be_read_is_refused_with_its_line(
     assert re.search(rf"P\.mo:{line}\b", refused.value.where)
 
 
+def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path: Path) -> None:
+    found = library(
+        tmp_path,
+        "package P partial model A input Real u; input Real w; end A; "
+        'partial model B extends A(u(unit="m")); end B; '
+        "model L extends A(u(min=1)); parameter Real p(max=3) = 0; end L; "
+        "model K extends L; end K; model C extends B; extends K(p(min=2)); end C; end P;",
+    )
+    parts = found.components("P.C")
+    assert list(parts) == ["u", "w", "p"]
+    assert {key: one.value for key, one in parts["u"].modifier.inner.items()} == {
+        "unit": '"m"',
+        "min": "1",
+    }
+    assert set(parts["p"].modifier.inner) == {"min", "max"}
+
+
 def test_a_file_must_stand_where_its_class_belongs(tmp_path: Path) -> None:
     (tmp_path / "package.mo").write_text("package P end P;")
     part = tmp_path / "A.mo"

@@ -344,18 +344,13 @@ def test_the_pore_is_named_and_not_the_wall(bottle: Path, tmp_path: Path) -> Non
     assert cause.parameters["k"].low < LEAK < cause.parameters["k"].high
 
 
-def test_parts_of_a_single_recording_have_one_start(bottle: Path, tmp_path: Path) -> None:
-    """The last quarter says by how much the first sample was read wrongly, and the leak."""
+def test_a_single_recording_will_do(bottle: Path, tmp_path: Path) -> None:
     system = loaded(bottle)
     cases = read_cases([bottle / "recordings" / "01_leak"], system)
-    outcome = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None)
-    (cause,) = outcome.diagnosis.causes
+    diagnosis = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None).diagnosis
+    (cause,) = diagnosis.causes
     assert cause.effect.name == "Pore"
-    # Of 200 samples with 2 mbar: a start known to 1 mbar, a leak to a thousandth of it.
-    assert outcome.levels["p", "this recording"] == (pytest.approx(5.3e5, abs=300.0), "Pa")
     assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
-    assert [one.samples for one in outcome.errors] == [50, 50, 50, 50]
-    assert all(not row for row in outcome.deviations.values())
 
 
 def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:

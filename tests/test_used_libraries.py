@@ -10,6 +10,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench import compiler, resources, shelf
+from workbench.compiler.flat import flatten
 from workbench.diagnosis import read_effects
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.slots import read_slots
@@ -159,6 +160,28 @@ def test_an_extended_model_has_the_common_laws(beside: bool, tmp_path: Path) -> 
         np.testing.assert_allclose(fmu.derivatives(), [-resists / 2.0], rtol=1e-12)
         reading = fmu.get(fmu.variables(["reading"]))
         np.testing.assert_allclose(reading, [0.5 * 0.6], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "units"),
+    [
+        ("Dry", {"coulomb": "N.m", "v0": "rad/s"}),
+        ("Viscous", {"damping": "N.m.s/rad"}),
+        ("Stribeck", {"excess": "N.m", "vS": "rad/s", "v0": "rad/s"}),
+        ("LoadDependent", {"mu": "1", "v0": "rad/s"}),
+        ("Quadratic", {"drag": "N.m.s2/rad2"}),
+    ],
+)
+def test_laws_of_turning_motion_have_its_units(law: str, units: dict[str, str]) -> None:
+    file, name = (
+        resources.modelica() / "Effects" / "package.mo",
+        f"Effects.RotationalFriction.{law}",
+    )
+    library = read_library(file)
+    inherited = library.components(name).values()
+    read = {one.name: library.unit(one) for one in inherited if "parameter" in one.prefixes}
+    compiled = {one.name: one.unit for one in flatten(file, name).parameters}
+    assert read == compiled == units
 
 
 def test_a_name_that_a_package_hides_is_refused_with_a_way_out(tmp_path: Path) -> None:

@@ -31,8 +31,6 @@ class Case:
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
-    counts : first sample and end of what counts, None for all: those before only lead a simulation
-        there.
     """
 
     name: str
@@ -44,7 +42,6 @@ class Case:
     outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
-    counts: tuple[int, int] | None = None
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""

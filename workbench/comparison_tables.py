@@ -53,7 +53,7 @@ def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
     """Channels as declared; else what is measured, one by one."""
     measured = {one.name: one for one in (*system.outputs, *system.judged)}
     if not table.content:
-        usual = {name: {"is": name, "unit": one.unit} for name, one in measured.items()}
+        usual = {n: {"is": n, "unit": one.unit, "shown": one.shown} for n, one in measured.items()}
         table = Table(usual, table.where)
     found = []
     for name in table.content:

@@ -23,6 +23,7 @@ from workbench.loaded import Loaded
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+References = NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Variables:
     """
 
     names: tuple[str, ...]
-    references: NDArray[np.uint32]
+    references: References
     values: Vector
 
     @cached_property

@@ -13,14 +13,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import platformdirs
+from llvmlite import ir
 from numba import njit, types
-from numba.core import caching
-from numba.core.types import WrapperAddressProtocol
-from numba.experimental import function_type as _first_class_functions  # noqa: F401  registers them
-from numpy.typing import NDArray
+from numba.core import caching, cgutils
+from numba.extending import intrinsic
 
 from workbench.errors import FMUError
-from workbench.fmu import FMU, Matrix, Vector
+from workbench.fmu import FMU, Matrix, References, Vector
 
 
 def _folder() -> Path:
@@ -74,27 +73,25 @@ def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
 compiled = _compiler(inline="never")
 inlined = _compiler(inline="always")
 
-_WORD = types.intp
-_ARRAY_CALL = types.int32(_WORD, _WORD, _WORD)
-_REAL_CALL = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD)
-_DIRECTIONAL_2 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
-_DIRECTIONAL_3 = types.int32(_WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD, _WORD)
-
 OK, REFUSED, SINGULAR = 0, 1, 2
 
 
-class _Function(WrapperAddressProtocol):  # type: ignore[misc]
-    """A C function as numba takes it: address and signature."""
+@intrinsic
+def _call(typing, address, words):  # type: ignore[no-untyped-def]
+    """Call a C function of whole numbers, which returns an int; an array is passed by address."""
 
-    def __init__(self, address: int, signature: Any) -> None:
-        self._address = address
-        self._signature = signature
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        given = []
+        for kind, value in zip(words.types, cgutils.unpack_tuple(builder, values[1]), strict=True):
+            if isinstance(kind, types.Array):
+                data = context.make_array(kind)(context, builder, value).data
+                given.append(builder.ptrtoint(data, context.get_value_type(types.intp)))
+            else:
+                given.append(context.cast(builder, value, kind, types.intp))
+        function = ir.FunctionType(ir.IntType(32), [word.type for word in given])
+        return builder.call(builder.inttoptr(values[0], function.as_pointer()), given)
 
-    def __wrapper_address__(self) -> int:
-        return self._address
-
-    def signature(self) -> Any:
-        return self._signature
+    return types.int32(types.intp, words), generate
 
 
 class Instance(NamedTuple):
@@ -103,25 +100,24 @@ class Instance(NamedTuple):
     Attributes
     ----------
     address : of the FMU instance.
-    set_states, derivatives, set_real, get_real : functions of the FMU. FMI 2.0 takes no length of
-        values in set_real and get_real; the register it would be in is not read.
-    directional_2, directional_3 : directional derivatives; only that of `fmi` is called.
+    set_states, derivatives, set_real, get_real, directional : addresses of the FMU's functions.
+        FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is
+        not read.
     fmi : 2 or 3 with directional derivatives, 0 for differences.
     x, dx : (n,) states and their derivatives.
     u, y : (m,) inputs, (l,) outputs.
     jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
     seed : (1,) one.
-    *_at : addresses of the buffers and of the value references.
-    keep : what must live as long as the addresses.
+    inputs, outputs, unknowns, knowns : value references of u and y, of columns and rows of the
+        Jacobian.
     """
 
     address: int
-    set_states: Any
-    derivatives: Any
-    set_real: Any
-    get_real: Any
-    directional_2: Any
-    directional_3: Any
+    set_states: int
+    derivatives: int
+    set_real: int
+    get_real: int
+    directional: int
     fmi: int
     x: Vector
     dx: Vector
@@ -129,17 +125,10 @@ class Instance(NamedTuple):
     y: Vector
     jacobian: Matrix
     seed: Vector
-    x_at: int
-    dx_at: int
-    u_at: int
-    y_at: int
-    jacobian_at: int
-    seed_at: int
-    inputs_at: int
-    outputs_at: int
-    unknowns_at: int
-    knowns_at: int
-    keep: tuple[NDArray[np.uint32], ...]
+    inputs: References
+    outputs: References
+    unknowns: References
+    knowns: References
 
 
 def instance(
@@ -154,50 +143,32 @@ def instance(
     outputs : what estimates are made of, (l,).
     """
     n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
-    references = {
-        "inputs": fmu.variables([*inputs, *corrections]).references,
-        "outputs": fmu.variables(outputs).references,
-        "unknowns": np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
-        "knowns": fmu.variables([*fmu.states, *corrections]).references,
-    }
-    x, dx, u, y = np.zeros(n), np.zeros(n), np.zeros(m + q), np.zeros(k)
-    jacobian, seed = np.zeros((n + q, n + k)), np.ones(1)
-    version = int(fmu.version[0]) if fmu.has_directional_derivatives else 0
-    directional = fmu.function_address("directional")
     return Instance(
         address=fmu.instance_address,
-        set_states=_Function(fmu.function_address("set_states"), _ARRAY_CALL),
-        derivatives=_Function(fmu.function_address("derivatives"), _ARRAY_CALL),
-        set_real=_Function(fmu.function_address("set"), _REAL_CALL),
-        get_real=_Function(fmu.function_address("get"), _REAL_CALL),
-        directional_2=_Function(directional, _DIRECTIONAL_2),
-        directional_3=_Function(directional, _DIRECTIONAL_3),
-        fmi=version,
-        x=x,
-        dx=dx,
-        u=u,
-        y=y,
-        jacobian=jacobian,
-        seed=seed,
-        x_at=x.ctypes.data,
-        dx_at=dx.ctypes.data,
-        u_at=u.ctypes.data,
-        y_at=y.ctypes.data,
-        jacobian_at=jacobian.ctypes.data,
-        seed_at=seed.ctypes.data,
-        inputs_at=references["inputs"].ctypes.data,
-        outputs_at=references["outputs"].ctypes.data,
-        unknowns_at=references["unknowns"].ctypes.data,
-        knowns_at=references["knowns"].ctypes.data,
-        keep=tuple(references.values()),
+        set_states=fmu.function_address("set_states"),
+        derivatives=fmu.function_address("derivatives"),
+        set_real=fmu.function_address("set"),
+        get_real=fmu.function_address("get"),
+        directional=fmu.function_address("directional"),
+        fmi=int(fmu.version[0]) if fmu.has_directional_derivatives else 0,
+        x=np.zeros(n),
+        dx=np.zeros(n),
+        u=np.zeros(m + q),
+        y=np.zeros(k),
+        jacobian=np.zeros((n + q, n + k)),
+        seed=np.ones(1),
+        inputs=fmu.variables([*inputs, *corrections]).references,
+        outputs=fmu.variables(outputs).references,
+        unknowns=np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
+        knowns=fmu.variables([*fmu.states, *corrections]).references,
     )
 
 
 @inlined
 def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
     """Set `count` inputs from number `first` on to model.u; returns a status."""
-    references, values = model.inputs_at + 4 * first, model.u_at + 8 * first
-    status = model.set_real(model.address, references, count, values, count)
+    references, values = model.inputs[first:], model.u[first:]
+    status = _call(model.set_real, (model.address, references, count, values, count))
     return REFUSED if status > 1 else OK
 
 
@@ -205,7 +176,8 @@ def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
 def set_states(model):  # type: ignore[no-untyped-def]
     """Set the states to model.x; returns a status."""
     n = model.x.size
-    return REFUSED if n and model.set_states(model.address, model.x_at, n) > 1 else OK
+    status = _call(model.set_states, (model.address, model.x, n)) if n else 0
+    return REFUSED if status > 1 else OK
 
 
 @inlined
@@ -217,15 +189,15 @@ def place(model):  # type: ignore[no-untyped-def]
 @inlined
 def evaluate(model):  # type: ignore[no-untyped-def]
     """Derivatives of the states into model.dx; returns a status."""
-    n = model.dx.size
-    return REFUSED if model.derivatives(model.address, model.dx_at, n) > 1 else OK
+    status = _call(model.derivatives, (model.address, model.dx, model.dx.size))
+    return REFUSED if status > 1 else OK
 
 
 @inlined
 def read(model):  # type: ignore[no-untyped-def]
     """Outputs into model.y; returns a status."""
     n = model.y.size
-    status = model.get_real(model.address, model.outputs_at, n, model.y_at, n)
+    status = _call(model.get_real, (model.address, model.outputs, n, model.y, n))
     return REFUSED if status > 1 else OK
 
 
@@ -237,16 +209,13 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
     """
     if model.fmi == 0:
         return _differences(model)
-    known = model.knowns_at + 4 * row
-    out = model.jacobian_at + 8 * model.jacobian.shape[1] * row
+    known, out, seed = model.knowns[row:], model.jacobian[row], model.seed
     if model.fmi == 2:
-        status = model.directional_2(
-            model.address, model.unknowns_at, count, known, 1, model.seed_at, out
-        )
+        words = model.address, model.unknowns, count, known, 1, seed, out
+        status = _call(model.directional, words)
     else:
-        status = model.directional_3(
-            model.address, model.unknowns_at, count, known, 1, model.seed_at, 1, out, count
-        )
+        more = model.address, model.unknowns, count, known, 1, seed, 1, out, count
+        status = _call(model.directional, more)
     return REFUSED if status > 1 else OK
 
 
@@ -294,14 +263,28 @@ def _differences(model):  # type: ignore[no-untyped-def]
     return OK
 
 
+@inlined
+def implicit(model, h, system):  # type: ignore[no-untyped-def]
+    """Write I - h A, of an implicit step, to the first columns; after `linearise`."""
+    n = model.x.size
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = -h * model.jacobian[j, i]
+        system[i, i] += 1.0
+
+
 @compiled
-def solve(a, b):  # type: ignore[no-untyped-def]
-    """Solve a x = b in place: a (n, n) is destroyed, b (n,) or (n, k) becomes x; returns a status.
+def solve(a):  # type: ignore[no-untyped-def]
+    """Solve a linear system in place; returns a status.
 
     Gaussian elimination with partial pivoting; for the few unknowns of an observer it is several
     times faster than a call into LAPACK.
+
+    Parameters
+    ----------
+    a : (n, n + k) the matrix, which is destroyed, and right-hand sides, which become solutions.
     """
-    n = a.shape[0]
+    n, columns = a.shape
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -310,24 +293,20 @@ def solve(a, b):  # type: ignore[no-untyped-def]
         if not abs(a[pivot, k]) > 0.0:
             return SINGULAR
         if pivot != k:
-            for j in range(n):
+            for j in range(columns):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            for j in range(b.shape[1]):
-                b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
         inverse = 1.0 / a[k, k]
         for i in range(k + 1, n):
             factor = a[i, k] * inverse
             if factor != 0.0:
-                for j in range(k + 1, n):
+                for j in range(columns):
                     a[i, j] -= factor * a[k, j]
-                for j in range(b.shape[1]):
-                    b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):
-        for j in range(b.shape[1]):
-            total = b[k, j]
+        for j in range(n, columns):
+            total = a[k, j]
             for i in range(k + 1, n):
-                total -= a[k, i] * b[i, j]
-            b[k, j] = total / a[k, k]
+                total -= a[k, i] * a[i, j]
+            a[k, j] = total / a[k, k]
     return OK
 
 

@@ -27,12 +27,17 @@ model Tanks "Torricelli's law in both tanks; levels in volts of the sensor"
     constrainedby Slots.PartialRim(
     h=level2, surplus=upperOutlet.actual + upperRim.caught - lowerOutlet.actual)
     "Rim of the lower tank";
+  replaceable Slots.Tank lowerTank(
+    nominal=upperOutlet.actual + upperRim.caught - lowerOutlet.actual - lowerRim.leaves, h=level2)
+    constrainedby Slots.PartialTank(
+    nominal=upperOutlet.actual + upperRim.caught - lowerOutlet.actual - lowerRim.leaves, h=level2)
+    "Walls of the lower tank";
   replaceable Common.Signals.Unchanged sensor(u=level2)
     constrainedby Common.Interfaces.Signal(u=level2)
     "Sensor of the lower level";
 equation
   der(level1) = k4*drive.y - upperOutlet.actual - upperRim.leaves;
-  der(level2) = upperOutlet.actual + upperRim.caught - lowerOutlet.actual - lowerRim.leaves;
+  der(level2) = lowerTank.actual;
   annotation (
     experiment(StopTime=4000.0, Tolerance=1e-6),
     Documentation(info="<html>

@@ -34,9 +34,9 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
   output Units.Force Fx "Longitudinal creep force of both wheels";
   output Units.Velocity slip "Slip velocity";
   output Units.Force Fz "Wheel load";
-  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
-  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
-  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
+  output Units.AngularVelocity omegaWReading = speedSensorW.y "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.y "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.y "Reading of forceSensor";
   Units.Length zF(start=0.0, fixed=true, nominal=0.01) "Bounce of the frame, from rest";
   Units.Velocity vF(start=0.0, fixed=true, nominal=0.1) "Bounce velocity of the frame";
   Units.Angle betaB(start=0.0, fixed=true, nominal=0.01) "Pitch of the brake units, pads up, from rest";
@@ -56,12 +56,12 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
-  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
-  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(F=Fx)
-    constrainedby Sensors.PartialForceSensor(F=Fx) "Force sensor of the rig";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(u=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(u=Fx)
+    constrainedby Sensors.PartialForceSensor(u=Fx) "Force sensor of the rig";
 
 protected
   Units.Velocity vSlide "Velocity of the disc relative to the pads, upwards";

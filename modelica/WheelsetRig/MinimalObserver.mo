@@ -23,9 +23,9 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.AngularVelocity omegaR(start=0.0, fixed=true, nominal=50.0) "Angular velocity of the roller";
   output Units.Force Fx "Longitudinal creep force of both wheels";
   output Units.Velocity slip "Slip velocity";
-  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
-  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
-  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
+  output Units.AngularVelocity omegaWReading = speedSensorW.y "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.y "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.y "Reading of forceSensor";
   output Units.Pressure pBRest = cylinder.rest "Measured pressure of an empty cylinder";
 
   replaceable Brakes.DirectCylinder cylinder(pB=pB, restBefore=0.0)
@@ -37,49 +37,49 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Brakes.PartialPadFriction(
     level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW) "Pad friction";
   replaceable Contact.ConstantAdhesion adhesion(
-    level=muWR + dmuWR, w=slip, v=rollerRadius.actual*omegaR, Fx=Fx/2.0)
+    level=muWR + dmuWR, w=slip, v=rollerRadius.y*omegaR, Fx=Fx/2.0)
     constrainedby Contact.PartialAdhesion(
-    level=muWR + dmuWR, w=slip, v=rollerRadius.actual*omegaR, Fx=Fx/2.0) "Contact friction";
+    level=muWR + dmuWR, w=slip, v=rollerRadius.y*omegaR, Fx=Fx/2.0) "Contact friction";
   replaceable Losses.WheelsetLoss wheelsetLoss(omega=omegaW)
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
-  replaceable Quantities.Unchanged wheelRadius(nominal=rW, omega=omegaW)
-    constrainedby Quantities.PartialWheelRadius(nominal=rW, omega=omegaW) "Wheel radius";
-  replaceable Quantities.Unchanged rollerRadius(nominal=rR, omega=omegaR)
-    constrainedby Quantities.PartialRollerRadius(nominal=rR, omega=omegaR) "Roller radius";
-  replaceable Quantities.Unchanged wheelLoad(nominal=Fz, omega=omegaW)
-    constrainedby Quantities.PartialWheelLoad(nominal=Fz, omega=omegaW) "Wheel load";
+  replaceable Quantities.Unchanged wheelRadius(u=rW, omega=omegaW)
+    constrainedby Quantities.PartialWheelRadius(u=rW, omega=omegaW) "Wheel radius";
+  replaceable Quantities.Unchanged rollerRadius(u=rR, omega=omegaR)
+    constrainedby Quantities.PartialRollerRadius(u=rR, omega=omegaR) "Roller radius";
+  replaceable Quantities.Unchanged wheelLoad(u=Fz, omega=omegaW)
+    constrainedby Quantities.PartialWheelLoad(u=Fz, omega=omegaW) "Wheel load";
   replaceable Quantities.Unchanged creepStiffness(
-    nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
+    u=Contact.kalkerStiffness(wheelLoad.y), omega=omegaW)
     constrainedby Quantities.PartialCreepStiffness(
-    nominal=Contact.kalkerStiffness(wheelLoad.actual), omega=omegaW)
+    u=Contact.kalkerStiffness(wheelLoad.y), omega=omegaW)
     "Creep force per creepage at zero slip";
-  replaceable Quantities.Unchanged wheelInertia(nominal=JW, omega=omegaW)
-    constrainedby Quantities.PartialWheelInertia(nominal=JW, omega=omegaW) "Inertia of the wheelset";
-  replaceable Quantities.Unchanged rollerInertia(nominal=JR, omega=omegaR)
-    constrainedby Quantities.PartialRollerInertia(nominal=JR, omega=omegaR) "Inertia of the roller";
-  replaceable Quantities.Unchanged driveTorque(nominal=tauR, omega=omegaW)
-    constrainedby Quantities.PartialDriveTorque(nominal=tauR, omega=omegaW) "Torque of the drive";
-  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
-  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(F=Fx)
-    constrainedby Sensors.PartialForceSensor(F=Fx) "Force sensor of the rig";
+  replaceable Quantities.Unchanged wheelInertia(u=JW, omega=omegaW)
+    constrainedby Quantities.PartialWheelInertia(u=JW, omega=omegaW) "Inertia of the wheelset";
+  replaceable Quantities.Unchanged rollerInertia(u=JR, omega=omegaR)
+    constrainedby Quantities.PartialRollerInertia(u=JR, omega=omegaR) "Inertia of the roller";
+  replaceable Quantities.Unchanged driveTorque(u=tauR, omega=omegaW)
+    constrainedby Quantities.PartialDriveTorque(u=tauR, omega=omegaW) "Torque of the drive";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(u=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(u=Fx)
+    constrainedby Sensors.PartialForceSensor(u=Fx) "Force sensor of the rig";
 
 protected
   Units.Torque tauB "Torque of the pads on the wheelset";
 equation
-  slip = rollerRadius.actual*omegaR - wheelRadius.actual*omegaW;
+  slip = rollerRadius.y*omegaR - wheelRadius.y*omegaW;
   Fx = 2.0*Contact.creepForce(
-    slip, rollerRadius.actual*omegaR, wheelLoad.actual, creepStiffness.actual, adhesion.mu0, polach);
+    slip, rollerRadius.y*omegaR, wheelLoad.y, creepStiffness.y, adhesion.mu0, polach);
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
-  wheelInertia.actual*der(omegaW) =
-    wheelRadius.actual*Fx - tauB - wheelsetLoss.tau + wheelInertia.actual*correctionW;
-  rollerInertia.actual*der(omegaR) =
-    driveTorque.actual - rollerRadius.actual*Fx - rollerLoss.tau
-    + rollerInertia.actual*correctionR;
+  wheelInertia.y*der(omegaW) =
+    wheelRadius.y*Fx - tauB - wheelsetLoss.tau + wheelInertia.y*correctionW;
+  rollerInertia.y*der(omegaR) =
+    driveTorque.y - rollerRadius.y*Fx - rollerLoss.tau
+    + rollerInertia.y*correctionR;
   annotation (
     experiment(StopTime=40.0, Tolerance=1e-6),
     Documentation(info="<html>

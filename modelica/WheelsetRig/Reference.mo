@@ -46,9 +46,9 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
   output Units.Power discPower[3] = {pads[i].lossPower for i in 1:3} "Heat in each brake disc";
   output Units.Power slipPower = contact[1].slipPower + contact[2].slipPower
     "Heat in the contact of both wheels";
-  output Units.AngularVelocity omegaWReading = speedSensorW.reading "Reading of speedSensorW";
-  output Units.AngularVelocity omegaRReading = speedSensorR.reading "Reading of speedSensorR";
-  output Units.Force FxReading = forceSensor.reading "Reading of forceSensor";
+  output Units.AngularVelocity omegaWReading = speedSensorW.y "Reading of speedSensorW";
+  output Units.AngularVelocity omegaRReading = speedSensorR.y "Reading of speedSensorR";
+  output Units.Force FxReading = forceSensor.y "Reading of forceSensor";
 
   replaceable Brakes.LinearActuation actuation(pB=pB)
     constrainedby Brakes.PartialActuation(pB=pB) "Brake actuation";
@@ -68,12 +68,12 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
     constrainedby Losses.PartialLoss(omega=omegaR) "Bearings and windage of the roller";
-  replaceable Sensors.IdealSpeedSensor speedSensorW(omega=omegaW)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaW) "Speed sensor of the wheelset";
-  replaceable Sensors.IdealSpeedSensor speedSensorR(omega=omegaR)
-    constrainedby Sensors.PartialSpeedSensor(omega=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(F=FcellL + FcellR)
-    constrainedby Sensors.PartialForceSensor(F=FcellL + FcellR) "Sum of the load cells";
+  replaceable Sensors.IdealSpeedSensor speedSensorW(u=omegaW)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
+  replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
+    constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
+  replaceable Sensors.IdealForceSensor forceSensor(u=FcellL + FcellR)
+    constrainedby Sensors.PartialForceSensor(u=FcellL + FcellR) "Sum of the load cells";
 
   inner Parts.World world
     annotation (Placement(transformation(extent={{-100,80},{-80,100}})));

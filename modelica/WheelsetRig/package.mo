@@ -1,6 +1,9 @@
 package WheelsetRig "Longitudinal dynamics of a wheelset on a roller rig"
+  import Common = Effects;
+
   annotation (
     version="0.1.0",
+    uses(Effects(version="1.0")),
     Documentation(info="<html>
 <p>Models of a braked wheelset on a roller rig, after C. Schwarz, J. Brembeck, B. Heckmann (2018),
 <em>Dynamics observer for the longitudinal behavior of a wheelset on a roller rig</em>.</p>

@@ -21,7 +21,7 @@ from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
-from workbench.diagnosis.sample_errors import Errors, apart, errors_of, held_out_errors
+from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors, refuse_too_few
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
@@ -73,8 +73,8 @@ def diagnose(
     Parameters
     ----------
     system : whose observer model is diagnosed, or an extension of it: its values are kept.
-    cases : what is only there to judge by is compared if all of them have it. A single one is cut
-        into parts, since a cause is judged on what it was not fitted to.
+    cases : what is only there to judge by is compared if all of them have it. Of a single one,
+        parts are held out, since a cause is judged on what it was not fitted to.
     library : of the system, which holds the effects.
     effects : that are considered.
     out : folder of the extended model.
@@ -89,7 +89,7 @@ def diagnose(
         If there are too few recordings, or one has too little that counts; if the library cannot be
         compiled, or the model is none of this library.
     """
-    cases = apart(cases, system)
+    refuse_too_few(cases, system)
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")
@@ -258,9 +258,7 @@ def _observers(
     report: Reporter,
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Errors of the judged signal, with the gains of the nominal model in both."""
-    system = simulations.system
-    # Observers run on whole recordings: of the parts of one, any of them is the whole.
-    cases = [one for one in simulations.cases if one.counts is None] or simulations.cases[:1]
+    system, cases = simulations.system, simulations.cases
     turning = any(effect.order_locked for effect in diagnosis.best.active)
     judged = all(system.objective.judged in case for case in cases)
     if extension is None or turning or not judged:

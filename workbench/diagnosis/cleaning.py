@@ -29,10 +29,17 @@ def saturated(values: Vector, signal: Signal) -> Mask:
 def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
 
-    A command is what it is, and what is read in steps repeats itself.
+    A command is what it is, and what is read in steps repeats itself. Samples at the limit of a
+    sensor say nothing of the noise of others.
     """
-    if signal.exact:
-        return np.zeros(values.size, np.bool_)
+    within = ~saturated(values, signal)
+    wrong = np.zeros(values.size, np.bool_)
+    if not signal.exact and within.any():
+        wrong[within] = _outliers(values[within], signal, sound)
+    return wrong
+
+
+def _outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     # Odd at the ends: there too, the median of what rises or falls is the middle sample.
     beside = _ABREAST // 2
     extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
@@ -40,7 +47,7 @@ def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     # The wide window knows the noise, the narrow one that a structure rings.
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, deviation_of(values))
-    wrong = away > sound.spike * scale
+    wrong = _out_and_back(values, away > sound.spike * scale, sound.spike * scale)
     same = np.diff(values) == 0.0
     if same.mean() < 0.2 and not signal.resolution:
         for first, end in runs(same):
@@ -51,6 +58,21 @@ def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
             if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
                 wrong |= at
     return wrong
+
+
+def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
+    """Of samples off a running median, those that leave the lines on both sides of them.
+
+    A signal that turns fast is off the median too, but comes or goes along a line.
+    """
+    padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
+    before = (values - (2.0 * padded[1:-3] - padded[:-4])) / jump
+    after = (values - (2.0 * padded[3:-1] - padded[4:])) / jump
+    kept = np.zeros_like(mask)
+    for first, end in runs(mask):
+        sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
+        kept[first:end] = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
+    return kept
 
 
 def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:

@@ -6,20 +6,23 @@ leaves-one-out are made of.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
-from workbench.diagnosis.evidence import Item, Result, Simulations, Variation
+from workbench.diagnosis.evidence import Evidence, Item, Result, Simulations, Variation
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
-from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem
+from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.thresholds import Thresholds, thresholds
-from workbench.diagnosis.unknowns import SENSOR, SINGLE, Unknowns
+from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.fmu import Vector
 
+# A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
+_PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -48,6 +51,31 @@ class Fit:
         self._compare = simulations.system.comparison
         self.decides = decides or thresholds(len(effects), left=self._compare.left)
         self.unknowns = Unknowns(simulations, effects, beside)
+        self._hidden = slice(0)  # blocks that do not count
+
+    def without(self, part: int) -> "Fit":
+        """The same without one part of a single recording."""
+        other = copy(self)
+        other._hidden = self.blocks_of(part)
+        return other
+
+    def blocks_of(self, part: int) -> slice:
+        """Blocks of a part of a single recording."""
+        edges = part_edges(len(self._simulations.recordings[0].blocks), self.parts)
+        return slice(edges[part], edges[part + 1])
+
+    def hide(self, lin: Linearised) -> Linearised:
+        """The same, as if what is hidden from this fit had neither errors nor derivatives."""
+        return replace(lin, evidence=tuple(self._shown(lin.evidence)))
+
+    def _shown(self, evidence: Sequence[Evidence]) -> Sequence[Evidence]:
+        if self._hidden == slice(0):
+            return evidence
+        (one,) = evidence
+        errors, jacobian = one.errors.copy(), one.jacobian.copy()
+        errors[self._hidden] = 0.0
+        jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
+        return (replace(one, errors=errors, jacobian=jacobian),)
 
     @property
     def delays(self) -> tuple[Key, ...]:
@@ -61,7 +89,7 @@ class Fit:
 
     def at(self, point: Point) -> Linearised:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
-        evidence = self._simulations.at(self.unknowns.values(point))
+        evidence = self._shown(self._simulations.at(self.unknowns.values(point)))
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
@@ -93,14 +121,13 @@ class Fit:
         if not missing:
             return lin
         values = self.unknowns.values(lin.point)
-        return lin.extended(
-            missing, self._simulations.derivatives(values, list(missing.values()), lin.evidence)
-        )
+        more = self._simulations.derivatives(values, list(missing.values()), lin.evidence)
+        return self.hide(lin.extended(missing, more))
 
     def _tolerances(self) -> dict[Key, Variation]:
         """Columns of what differs from stop to stop."""
         start = self.unknowns.start()
-        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.differing}
+        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.local}
         return {
             (_LOCAL, name): Variation((name,), 0.5 * self.unknowns.spread(start, name, 0, spread))
             for name, spread in spreads.items()
@@ -133,6 +160,22 @@ class Fit:
         levels = tuple(lin.point.levels)
         return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
 
+    @property
+    def tests(self) -> list[str]:
+        """Names of what is held out in turn: recordings, or parts of a single one."""
+        if self.unknowns.count > 1:
+            return self.unknowns.names
+        return [f"part {k} of {self.parts}" for k in range(1, self.parts + 1)]
+
+    @property
+    def parts(self) -> int:
+        """Of a single recording, each long enough for an error that lasts."""
+        return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
+
+    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """As `quadratics`, in what is held out in turn."""
+        return self.quadratics(lin, extra).apart(self.parts)
+
     def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
         evidence = lin.evidence[k]
@@ -141,7 +184,7 @@ class Fit:
         at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
-            if key in point.levels and key[1] in (SENSOR, SINGLE):
+            if key in point.levels and key[1] == SENSOR:
                 J[:, j] = at[_LOCAL, key[0]]
             elif key in point.levels:
                 if key[1] == self.unknowns.choice(key[0], case):
@@ -163,7 +206,7 @@ class Fit:
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k])
+        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k], m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
@@ -220,8 +263,14 @@ class Fit:
 
     def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
         joint = self.quadratics(replace(lin, inflation=spread))
-        step = joint.solve() if common else np.zeros(len(joint.shared))
-        return self._moved(lin.point, joint, step)
+        if not common:
+            return self._moved(lin.point, joint, np.zeros(len(joint.shared)))
+        point = lin.point
+        at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
+        low, high = np.array([self._reach(point, key) for key in joint.shared]).reshape(-1, 2).T
+        # Of a point that was begun beyond its bounds, the nearest bound.
+        inside = np.clip(at, low, high)
+        return self._moved(point, joint, joint.solve(low - inside, high - inside) + inside - at)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
@@ -230,14 +279,8 @@ class Fit:
     def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, change in zip(joint.shared, step, strict=True):
-            if key in levels:
-                middle, sigma = self.unknowns.expected(key)
-                reach = self.decides.furthest_level * sigma
-                low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
-                least, most = max(low, middle - reach), min(high, middle + reach)
-                levels[key] = float(np.clip(levels[key] + change, least, most))
-            elif key in sizes:
-                sizes[key] = self._bounded(key, sizes[key], sizes[key] + change)
+            kind = levels if key in levels else sizes
+            kind[key] = float(np.clip(kind[key] + change, *self._reach(point, key)))
         locals_ = [system.local(step) for system in joint.systems]
         count = len(self.unknowns.local)
         deviations = point.deviations + np.array([one[:count] for one in locals_])
@@ -250,11 +293,19 @@ class Fit:
             phases[name] = point.phases[name] + np.clip(change, -0.5, 0.5)
         return Point(sizes, levels, deviations, phases)
 
-    def _bounded(self, key: tuple[str, str], old: float, new: float) -> float:
-        """Within the bounds of the Modelica class; a shape changes by half at most in a step."""
-        effect = self.unknowns.effects[key[0]]
+    def _reach(self, point: Point, key: Key) -> tuple[float, float]:
+        """Least and greatest value after a step of a common unknown.
+
+        Within the bounds of its parameter, and not too unlikely; a shape changes by half at most.
+        """
+        if key in point.levels:
+            middle, sigma = self.unknowns.expected(key)
+            reach = self.decides.furthest_level * sigma
+            low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
+            return max(low, middle - reach), min(high, middle + reach)
+        effect, old = self.unknowns.effects[key[0]], point.sizes[key]
         parameter = effect.size if key[1] == "amplitude" else key[1]
         low, high = self.unknowns.bounds(effect, parameter)
-        if parameter not in effect.sizes:
-            low, high = max(low, 0.5 * old), min(high, 2.0 * old)
-        return float(np.clip(new, low, high))
+        if parameter in effect.sizes:
+            return low, high
+        return max(low, 0.5 * old), min(high, 2.0 * old)

@@ -60,14 +60,13 @@ class _Work(NamedTuple):
     ----------
     stiff : (p,) states that are stepped implicitly.
     a : (n, p) columns of the Jacobian by them.
-    inverse : (p, p) of I - gamma h A, for them; step : (1,) that it is for [s].
+    system : (p, 2 p) I - gamma h A for them, and its inverse; step : (1,) that it is for [s].
     """
 
     stiff: NDArray[np.intp]
     a: Matrix
-    inverse: Matrix
-    step: Vector
     system: Matrix
+    step: Vector
     between: Vector
     x: Vector
     k1: Vector
@@ -90,20 +89,20 @@ def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
     for r in range(p):
         for c in range(p):
             work.system[r, c] = -_GAMMA * h * work.a[work.stiff[r], c]
-            work.inverse[r, c] = 1.0 if r == c else 0.0
+            work.system[r, p + c] = 1.0 if r == c else 0.0
         work.system[r, r] += 1.0
     work.step[0] = h
-    return solve(work.system, work.inverse)
+    return solve(work.system)
 
 
 @compiled
 def _solve(work, h, k):  # type: ignore[no-untyped-def]
     """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
-    stiff, picked = work.stiff, work.picked
-    for r in range(stiff.size):
+    stiff, picked, p = work.stiff, work.picked, work.stiff.size
+    for r in range(p):
         picked[r] = 0.0
-        for c in range(stiff.size):
-            picked[r] += work.inverse[r, c] * k[stiff[c]]
+        for c in range(p):
+            picked[r] += work.system[r, p + c] * k[stiff[c]]
     for i in range(k.size):
         for c in range(stiff.size):
             k[i] += _GAMMA * h * work.a[i, c] * picked[c]
@@ -288,10 +287,9 @@ class Predictor:
             if name in (self._system.states or ()) or rates[i] > _SWIFT
         ]
         p = len(stiff)
-        square = np.zeros((p, p))
         return _Work(
             np.array(stiff, np.intp),
-            *(np.zeros((n, p)), square, np.zeros(1), square.copy()),
+            *(np.zeros((n, p)), np.zeros((p, 2 * p)), np.zeros(1)),
             np.zeros(len(self._system.inputs)),
             *(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(p)),
         )

@@ -1,9 +1,11 @@
 """Chi-squared as a quadratic form: sums, minima and covariances of least squares."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
 
@@ -68,6 +70,20 @@ def minimum(total: Quadratic) -> Vector:
     return step
 
 
+def minimum_within(total: Quadratic, low: Vector, high: Vector) -> Vector:
+    """Where chi-squared is least within bounds of the step, (p,) each, which hold zero.
+
+    What would leave them is held there, and the others do their best beside that.
+    """
+    step, free = minimum(total), np.ones(len(low), np.bool_)
+    while (beyond := free & ((step < low) | (step > high))).any():
+        free &= ~beyond
+        step = np.where(free, 0.0, np.clip(step, low, high))
+        N, g = total.N[np.ix_(free, free)], (total.g + total.N @ step)[free]
+        step[free] = minimum(Quadratic(N, g, 0.0, total.rows))
+    return step
+
+
 @dataclass(frozen=True, eq=False)
 class RecordingSystem:
     """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
@@ -75,13 +91,20 @@ class RecordingSystem:
     Attributes
     ----------
     r : (n,); J : (n, p); P : (n, q).
-    deviations : (5,) of the present point, of the first unknowns in l; phases are free.
+    deviations : (d,) of the present point, of the first unknowns in l; phases are free.
+    channels : c; r holds the errors of blocks, each by channel, and last the one of the rest.
     """
 
     r: Vector
     J: Matrix
     P: Matrix
     deviations: Vector
+    channels: int
+
+    def errors(self, z: Vector) -> Matrix:
+        """Whitened errors of the blocks, (b, c), for a step z of the common unknowns."""
+        errors: Matrix = self.r + self.J @ z + self.P @ self.local(z)
+        return errors[:-1].reshape(-1, self.channels)
 
     def _local(self) -> tuple[Matrix, Matrix, Vector]:
         """Normal matrix of l, its coupling to z, its gradient."""
@@ -110,6 +133,25 @@ class RecordingSystem:
         return step
 
 
+def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
+    """First block of each part of a recording, and the end of the last one, (parts + 1,)."""
+    return np.linspace(0, blocks, parts + 1).astype(np.intp)
+
+
+def _cut(one: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
+    """One recording in parts, of blocks that follow each other; the first has the error at rest."""
+    edges = part_edges((one.r.size - 1) // one.channels, parts) * one.channels
+    rest = np.zeros(one.r.size)
+    rest[-1] = 1.0
+    cut = []
+    for first, end in pairwise(edges):
+        rows = np.append(np.arange(first, end), one.r.size - 1)
+        weight = 1.0 - rest[rows] * (first > 0)
+        part = (one.r[rows] * weight, one.J[rows] * weight[:, None], one.P[rows])
+        cut.append(RecordingSystem(*part, one.deviations, one.channels))
+    return tuple(cut)
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """All stops over the common unknowns.
@@ -127,6 +169,31 @@ class Joint:
     systems: tuple[RecordingSystem, ...]
     prior: Quadratic
 
+    def apart(self, parts: int) -> "Joint":
+        """The same in parts of which each can be held out: recordings, or parts of a single one.
+
+        Nothing differs from recording to recording then, and its own unknowns are common ones.
+        """
+        if len(self.systems) > 1:
+            return self
+        (one,) = self.systems
+        own = tuple(("", f"own {j}") for j in range(one.P.shape[1]))
+        known, extra = len(self.known), self.shared[len(self.known) :]
+        J = np.hstack([one.J[:, :known], one.P, one.J[:, known:]])
+        at = slice(known, known + one.deviations.size)  # of the new unknowns that have a prior
+        N, g = np.zeros((J.shape[1],) * 2), np.zeros(J.shape[1])
+        old = np.delete(np.arange(J.shape[1]), range(known, known + len(own)))
+        N[np.ix_(old, old)], g[old] = self.prior.N, self.prior.g
+        N[at, at], g[at] = np.eye(one.deviations.size), one.deviations
+        c = self.prior.c + float(one.deviations @ one.deviations)
+        return Joint(
+            shared=(*self.known, *own, *extra),
+            known=(*self.known, *own),
+            levels=(*self.levels, *own),
+            systems=_cut(replace(one, J=J, P=J[:, :0], deviations=one.deviations[:0]), parts),
+            prior=Quadratic(N, g, c, 0),
+        )
+
     def stops(self) -> list[Quadratic]:
         """Chi-squared of each stop."""
         return [system.eliminated() for system in self.systems]
@@ -135,6 +202,6 @@ class Joint:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
 
-    def solve(self) -> Vector:
-        """Best step of the common unknowns."""
-        return minimum(self.total())
+    def solve(self, low: Vector, high: Vector) -> Vector:
+        """Best step of the common unknowns within bounds, (p,) each."""
+        return minimum_within(self.total(), low, high)

@@ -147,7 +147,7 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
 def _influences(simulations: Simulations, k: int) -> dict[str, Vector]:
     """Each influence at the blocks of one recording."""
     case, one, system = simulations.cases[k], simulations.recordings[k], simulations.system
-    time, h = one.time, np.gradient(one.time)
+    time, h = case.time, np.gradient(case.time)
     measured = dict(zip(one.inputs, one.u.T, strict=True))
     measured |= dict(zip(one.signals, one.y.T, strict=True))
     signals = {BEGINNING: time - time[0]}

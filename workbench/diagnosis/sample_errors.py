@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,6 @@ from workbench.diagnosis.search import ROUNDS, Fitted
 from workbench.errors import InputError
 from workbench.system import System
 
-_PARTS = 4  # of a single recording: three quarters of it fit nearly as well as all of it
-
 
 @dataclass(frozen=True)
 class Errors:
@@ -27,7 +24,7 @@ class Errors:
     Attributes
     ----------
     held_out : whether nothing common to the recordings was fitted to this one.
-    samples : that count.
+    samples : whose errors are told.
     rms, mean_absolute : of these, (before, after) [unit].
     """
 
@@ -40,34 +37,22 @@ class Errors:
     mean_absolute: tuple[float, float]
 
 
-def apart(cases: Sequence[Case], system: System) -> list[Case]:
-    """Recordings that can be held out from each other: of a single one, its parts.
-
-    Each part is simulated from the start of the recording, whose states are no more unknown than
-    they were, and counts from where the one before it ends.
+def refuse_too_few(cases: Sequence[Case], system: System) -> None:
+    """Refuse recordings of which none can be held out.
 
     Raises
     ------
     InputError
-        If there is only one, and it is too short, or begins with something that is applied.
+        If there is only one, and parameters differ from recording to recording.
     """
-    if len(cases) > 1:
-        return list(cases)
     compare = system.comparison
-    lasts = float(cases[0].time[-1] - cases[0].time[0]) if cases else 0.0
-    count = min(_PARTS, int(lasts / (compare.settling + compare.least)))
-    if count < 2 or compare.begins is not None:
+    if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
         raise InputError(
             where="recordings",
             found=str(len(cases)),
             expected="two or more, because a cause is judged on those it was not fitted to",
             remedy="give the folder that holds all recordings of one machine",
         )
-    edges = np.linspace(0, cases[0].time.size, count + 1).astype(int)
-    return [
-        replace(cases[0], name=f"{cases[0].name}, part {k} of {count}", counts=(a, b))
-        for k, (a, b) in enumerate(pairwise(edges.tolist()), start=1)
-    ]
 
 
 def errors_of(
@@ -77,7 +62,7 @@ def errors_of(
     found = []
     for k, one in enumerate(simulations.recordings):
         sizes = [lin.evidence[k].sizes for lin in (before, after)]
-        samples = int((one.blocks[:, 1] - one.blocks[:, 0]).sum())
+        samples = int(one.told.sum())
         for c, channel in enumerate(channels(simulations.system, one.signals)):
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
             found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))

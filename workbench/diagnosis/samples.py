@@ -22,10 +22,10 @@ from workbench.diagnosis.cleaning import (
     first_value,
     noise_in,
     outliers,
-    runs,
     saturated,
     smooth,
 )
+from workbench.diagnosis.counting import applied_at, blocks_of, excluded_by, refuse_too_short
 from workbench.diagnosis.motion import (
     Lead,
     Motion,
@@ -37,9 +37,9 @@ from workbench.diagnosis.motion import (
 from workbench.diagnosis.thresholds import SOUND, Soundness
 from workbench.errors import InputError
 from workbench.recording import Matrix, Vector
-from workbench.system import Channel, Comparison, Exclusion, Mode, System
+from workbench.system import Channel, Comparison, Mode, System
 
-_EARLY, _STARTING = 50, 40  # samples at usual rates: before anything is applied, of a first mean
+_STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
 # Reasons of every system.
 FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"
@@ -56,7 +56,9 @@ class Samples:
     inputs : names of the columns of u.
     u : (n, m) measured inputs, without noise that the model would not feel.
     signals : names of the columns of y: outputs, and what is judged if it was measured.
-    y : (n, c) measured.
+    y, read : (n, c) measured, without and with what is wrong.
+    told : (n,) samples whose errors are told: those that are not wrong and that no reason excludes.
+    limits : (2, c) of what the sensors read.
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
     lead : how all outputs correct the states, or None where one leads alone.
     held : (m,) whether an input is held from a sample to the next; else it goes there.
@@ -75,6 +77,9 @@ class Samples:
     u: Matrix
     signals: tuple[str, ...]
     y: Matrix
+    read: Matrix
+    told: Mask
+    limits: Matrix
     gain: Vector
     lead: Lead | None
     held: NDArray[np.bool_]
@@ -133,10 +138,12 @@ class Samples:
         return read
 
     def sizes(self, errors: Matrix) -> Matrix:
-        """Root mean square and mean absolute error of samples that count, by channel, (2, c)."""
-        first, end = self.blocks.T
-        counts = np.concatenate([np.arange(a, b) for a, b in zip(first, end, strict=True)])
-        by_channel = errors[counts] @ self.slopes.T
+        """Root mean square and mean absolute error of samples that are told, by channel, (2, c).
+
+        Where a sensor saturates, so does what the model says that it reads.
+        """
+        said = np.clip(self.y - errors, *self.limits)
+        by_channel = (self.read - said)[self.told] @ self.slopes.T
         return np.array(
             [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
         )
@@ -192,21 +199,19 @@ def prepare(
     faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}
     wrong = {name: beyond[name] | faulty[name] for name in names}
     clean = {name: bridge(time, case[name], wrong[name]) for name in names}
-    applied = _applied(clean, system, time)
+    applied = applied_at(clean, system, time)
     excluded = {
         FAULTY: np.logical_or.reduce(list(faulty.values())),
         BEYOND: np.logical_or.reduce(list(beyond.values())),
         **{
-            one.reason: _excluded(one, clean, system, time, h, applied)
+            one.reason: excluded_by(one, clean, system, time, h, applied)
             for one in compare.exclusions
         },
         "settling": time < time[0] + compare.settling,
     }
     usable = ~np.logical_or.reduce(list(excluded.values()))
-    first, end = case.counts or (0, time.size)
-    usable[:first] = usable[end:] = False
-    blocks = _blocks(usable, time, compare.block, h)
-    _refuse_too_few(case, system, blocks, excluded)
+    blocks = blocks_of(usable, time, compare.block, h)
+    refuse_too_short(case, system, blocks, excluded)
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
     deviation = {name: noise_in(clean[name], system.signals[name]) for name in names}
@@ -217,12 +222,15 @@ def prepare(
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
         name=case.name,
-        time=time[:end],
+        time=time,
         inputs=case.inputs,
-        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T[:end]),
+        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
         signals=signals,
-        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])[:end]),
-        gain=gain[:end],
+        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
+        read=np.column_stack([case[name] for name in signals]),
+        told=usable | _told(excluded),
+        limits=np.array([system.signals[name].limits for name in signals]).T,
+        gain=gain,
         lead=lead,
         held=np.array([one.held for one in system.inputs]),
         begin=_begin(
@@ -237,10 +245,17 @@ def prepare(
         whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
         modes=modes,
         set_aside={
-            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time[first:end]) / h) - 1))),
-            **{reason: int(mask[first:end].sum()) for reason, mask in excluded.items()},
+            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1))),
+            **{reason: int(mask.sum()) for reason, mask in excluded.items()},
         },
     )
+
+
+def _told(excluded: Mapping[str, Mask]) -> Mask:
+    """Samples at the limit of a sensor that do not count for no other reason."""
+    others = [mask for reason, mask in excluded.items() if reason not in (FAULTY, BEYOND)]
+    told: Mask = excluded[BEYOND] & ~np.logical_or.reduce(others)
+    return told
 
 
 def _led(
@@ -284,70 +299,11 @@ def _at_rest(compare: Comparison, clean: Mapping[str, Vector], applied: int) -> 
     return float(np.mean(rest)), float(np.hypot(spread, compare.rest.zero))
 
 
-def _refuse_too_few(
-    case: Case, system: System, blocks: NDArray[np.int64], excluded: Mapping[str, Mask]
-) -> None:
-    compare = system.comparison
-    if len(blocks) * compare.block < compare.least * (1.0 - 1e-9):
-        lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
-        raise InputError(
-            where=str(case.source),
-            found=f"{compare.block * len(blocks):.3g} s that count; samples set aside: {lost}",
-            expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
-            remedy="leave this recording out, or repair it",
-        )
-
-
 def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
     """What is known of states at the start: as measured, but a follower rolls along."""
     if system.rolling is None or system.rolling.leader not in measured:
         return measured
     return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}
-
-
-def _applied(clean: Mapping[str, Vector], system: System, time: Vector) -> int:
-    """Sample at which the recording begins; before it the machine is as it was left."""
-    early = max(2, int(np.searchsorted(time, time[0] + _EARLY * system.sample_time)))
-    if (begins := system.comparison.begins) is None:
-        return early
-    values = system.signal(begins.signal, clean)
-    rising = values > np.median(values[:early]) + begins.level
-    return max(early, int(np.argmax(rising)) - early if rising.any() else values.size)
-
-
-def _excluded(
-    one: Exclusion, clean: Mapping[str, Vector], system: System, time: Vector, h: float, rest: int
-) -> Mask:
-    """Where samples do not count for one reason."""
-    width = max(1, round(one.smoothed / h))
-    values = np.convolve(system.evaluate(one.formula, clean), np.ones(width) / width, "same")
-    if one.from_rest:
-        values = values - np.median(values[:rest])
-    mask: Mask = (np.abs(values) > one.above) | (np.abs(values) < one.below)
-    if one.only_while is not None:
-        signal = np.abs(system.signal(one.only_while.signal, clean))
-        mask &= signal > one.only_while.level
-    # A mean at an end is one of zeros too.
-    mask[: width + 1] = False
-    if one.to_the_end:
-        mask = np.cumsum(mask) > 0
-    else:
-        mask[time.size - width :] = False
-    if one.within:
-        around = np.ones(max(1, round(2.0 * one.within / h)))
-        mask = np.convolve(mask, around, "same") > 0.5
-    return mask
-
-
-def _blocks(usable: Mask, time: Vector, block: float, h: float) -> NDArray[np.int64]:
-    size = max(1, round(block / h))
-    found = [
-        (k, k + size)
-        for first, end in runs(usable)
-        for k in range(first, end - size + 1, size)
-        if time[k + size - 1] - time[k] < 2.0 * max(block, h)
-    ]
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
 def _whitening(

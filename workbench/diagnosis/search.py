@@ -1,6 +1,6 @@
 """Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,7 +16,7 @@ from workbench.fmu import Vector
 Reporter = Callable[[str], None]
 
 _BEGUN = 3  # rounds after which a rival that is far behind is given up
-_HALVINGS = 2  # of the size that a fit begins with
+_VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
 
 
@@ -91,7 +91,7 @@ def _step(
     rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
     if not rivals:
         return None
-    report(f"fitting {', '.join(rival.effect.name for rival in rivals)}")
+    report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
     fits = _fits(fit, best, rivals)
     if not fits:
         return None
@@ -115,12 +115,9 @@ def beyond(one: Fitted, other: Fitted) -> float:
     return one.linearised.weighed(inflation) - other.linearised.weighed(inflation)
 
 
-def _fits(fit: Fit, best: Fitted, rivals: Sequence[Prospect]) -> list[Fitted]:
+def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    tried = fit.together(partial(_begun, fit, best), rivals)
-    begun = [one for one in tried if _gains(fit, best, one)]
-    if not begun:
-        return []
+    begun = fit.together(partial(_begun, fit, best), rivals)
     misfits = _misfits(begun)
     near = misfits < fit.decides.behind * misfits.min()
 
@@ -129,7 +126,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Prospect]) -> list[Fitted]:
 
     ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
     every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
-    return [every[i] for i in np.argsort(_misfits(every))]
+    return [every[i] for i in np.argsort(_misfits(every)) if _gains(fit, best, every[i])]
 
 
 def _misfits(fits: Sequence[Fitted]) -> Vector:
@@ -138,14 +135,18 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
     return np.array([one.linearised.weighed(inflation) for one in fits])
 
 
-def _begun(fit: Fit, best: Fitted, rival: Prospect) -> Fitted:
-    """First rounds of a fit with one more effect, begun at half the size where it was too much."""
-    for halvings in range(_HALVINGS + 1):
-        # A law bends: half a stiffness is twice the deflection.
-        one = extended(fit, best, replace(rival, size=0.5**halvings * rival.size), _BEGUN)
-        if _gains(fit, best, one):
-            break
-    return one
+def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted:
+    """First rounds of a fit with one more effect, begun elsewhere where that gained nothing.
+
+    A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.
+    """
+    first, tried = variants[0], []
+    halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
+    for start in (*variants[:_VARIANTS], *halves):
+        tried.append(extended(fit, best, start, _BEGUN))
+        if _gains(fit, best, tried[-1]):
+            return tried[-1]
+    return min(tried, key=lambda one: one.linearised.deviance)
 
 
 def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted:
@@ -179,17 +180,22 @@ def pruned(
     fit: Fit,
     catalogue: Sequence[Effect],
     best: Fitted,
-    base: Fitted,
+    known: Mapping[frozenset[Effect], Fitted],
     trial: Trial,
     report: Reporter,
-) -> tuple[Fitted, Trial]:
+) -> tuple[Fitted, Trial, dict[Effect, Fitted]]:
     """Drop effects that, beside the others, do not matter or are not significant.
 
     Parameters
     ----------
-    base : the nominal model, with all derivatives.
+    known : fits by their effects, with all derivatives.
+
+    Returns
+    -------
+    best, trial : of the effects that are left.
+    less : see `lesser`.
     """
-    while best.active:
+    while less := lesser(fit, best, known):
         sigma = np.sqrt(np.diag(trial.covariance()))
         ratios = {}
         for effect in best.active:
@@ -197,7 +203,6 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
             ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
-        less = lesser(fit, best, base)
         if len(less) > 1:
             for effect, one in less.items():
                 ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
@@ -206,21 +211,23 @@ def pruned(
             break
         report(f"dropping {weakest.name}")
         best, trial = examine(fit, less[weakest], catalogue, report)
-    return best, trial
+    return best, trial, less
 
 
-def lesser(fit: Fit, best: Fitted, base: Fitted) -> dict[Effect, Fitted]:
+def lesser(
+    fit: Fit, best: Fitted, known: Mapping[frozenset[Effect], Fitted]
+) -> dict[Effect, Fitted]:
     """The best fit without each of the effects, with all derivatives.
 
     Parameters
     ----------
-    base : the nominal model, with all derivatives.
+    known : fits by their effects, with all derivatives, which need not be made again.
     """
 
     def refitted(effect: Effect) -> Fitted:
         kept = tuple(other for other in best.active if other is not effect)
-        if not kept:
-            return base
+        if frozenset(kept) in known:
+            return known[frozenset(kept)]
         start = fit.at(without(best.point, effect))
         one = fitted(fit, start, kept)
         return replace(one, linearised=fit.linearise(one.linearised, kept))
@@ -261,8 +268,8 @@ def joined(point: Point, rival: Prospect) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> list[Prospect]:
-    """The best variant of each effect that is large, significant and nearly as good as the best.
+def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> list[list[Prospect]]:
+    """Variants, best first, of effects that are large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides.
@@ -270,12 +277,13 @@ def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> li
     clear, needed = decides.significant, decides.fall
     if best.linearised.inflation.max() > decides.wrong:
         clear, needed = decides.hint, 0.0
-    able: dict[str, Prospect] = {}
+    able: dict[str, list[Prospect]] = {}
     for one in scores:
         significant = (
             abs(one.size) > clear * one.sigma and min(one.gain, one.held_out.sum()) > needed
         )
         if significant and abs(one.size) >= one.effect.matters:
-            able.setdefault(one.effect.name, one)
+            able.setdefault(one.effect.name, []).append(one)
     ranked = list(able.values())[: decides.rivals]
-    return [one for one in ranked if one.held_out.sum() > decides.near * ranked[0].held_out.sum()]
+    best_score = ranked[0][0].held_out.sum() if ranked else 0.0
+    return [one for one in ranked if one[0].held_out.sum() > decides.near * best_score]

@@ -53,7 +53,7 @@ def tried(fit: Fit, lin: Linearised, candidates: Sequence[Option]) -> "Trial":
         for effect, shape in candidates
         for parameter in effect.sizes
     ]
-    return Trial(fit, fit.quadratics(lin, extra), candidates)
+    return Trial(fit, fit.apart(lin, extra), candidates)
 
 
 class Trial:

@@ -1,7 +1,7 @@
 """Unknowns of a fit: sizes of effects, levels, and what differs between recordings by nature.
 
 In each recording, parameters may differ from their common value within the tolerances of the
-machine, and states may start elsewhere. The parts of a single recording have all that in common.
+machine, and states may start elsewhere.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,6 @@ from workbench.diagnosis.presence import Presence
 from workbench.diagnosis.quadratic import Key
 
 SENSOR = "sensor"  # in place of a choice, of a sensor's delay
-SINGLE = "this recording"  # in place of a choice, of what its parts have in common
 _ALL = "all"  # in place of a choice, of a level that no condition changes
 
 
@@ -52,7 +51,6 @@ class Unknowns:
         }
         self.presence = Presence(simulations.cases, simulations.recordings, beside)
         self.count = len(simulations.cases)
-        self._single = any(case.counts for case in simulations.cases)
 
     @property
     def names(self) -> list[str]:
@@ -60,17 +58,12 @@ class Unknowns:
         return [case.name for case in self._simulations.cases]
 
     @cached_property
-    def differing(self) -> dict[str, float]:
+    def local(self) -> dict[str, float]:
         """Standard deviation of what differs between recordings, by name.
 
         Relative of a parameter, in its unit of a state at the start.
         """
         return {**self._compare.tolerances, **self._starts}
-
-    @cached_property
-    def local(self) -> dict[str, float]:
-        """What differs between these recordings; see `differing`."""
-        return {} if self._single else self.differing
 
     @cached_property
     def _starts(self) -> dict[str, float]:
@@ -104,9 +97,6 @@ class Unknowns:
         for case in self._simulations.cases:
             for name in self._compare.levels:
                 levels[name, self.choice(name, case)] = self._usual(name, case)
-        if self._single:
-            alone = (name for name in self.differing if name not in self._compare.levels)
-            levels |= {(name, SINGLE): self._beginning(name, 0) for name in alone}
         return Point({}, levels, np.zeros((self.count, len(self.local))), {})
 
     def choice(self, level: str, case: Case) -> str:
@@ -141,7 +131,6 @@ class Unknowns:
         values |= {
             name: point.levels[name, self.choice(name, case)] for name in self._compare.levels
         }
-        values |= {name: value for (name, by), value in point.levels.items() if by == SINGLE}
         for j, (name, spread) in enumerate(self.local.items()):
             values[name] = self._middle(point, name, k) + (
                 self.spread(point, name, k, spread) * point.deviations[k, j]
@@ -169,15 +158,12 @@ class Unknowns:
 
     def _middle(self, point: Point, name: str, k: int) -> float:
         """Value of what differs between recordings, without the deviation of this one."""
+        case = self._simulations.cases[k]
         if name in self._compare.levels:
-            return point.levels[name, self.choice(name, self._simulations.cases[k])]
-        return self._beginning(name, k)
-
-    def _beginning(self, name: str, k: int) -> float:
-        """The same of what is no level: a state at the start as measured, or a parameter."""
+            return point.levels[name, self.choice(name, case)]
         if name in self._starts:
             return self._simulations.begin[k].get(name, self._simulations.nominal.get(name, 0.0))
-        return self._usual(name, self._simulations.cases[k])
+        return self._usual(name, case)
 
     def spread(self, point: Point, name: str, k: int, spread: float) -> float:
         """Standard deviation of a local deviation, in the parameter's or state's unit."""
@@ -185,7 +171,7 @@ class Unknowns:
 
     def shared(self, point: Point, name: str, k: int) -> float:
         """By how much a recording's own value moves with the common level."""
-        if self._single or name not in self._compare.tolerances:
+        if name not in self._compare.tolerances:
             return 1.0
         deviation = point.deviations[k, list(self.local).index(name)]
         return float(1.0 + self._compare.tolerances[name] * deviation)
@@ -195,9 +181,6 @@ class Unknowns:
         name, choice = key
         if choice == SENSOR:
             return 0.0, self.modes[name].late
-        if choice == SINGLE:
-            middle, spread = self._beginning(name, 0), self.differing[name]
-            return middle, spread if name in self._starts else spread * abs(middle)
         spread = self._compare.levels[name].spread
         if not np.isfinite(spread):
             return 0.0, np.inf

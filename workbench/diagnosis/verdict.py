@@ -9,9 +9,8 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from workbench.diagnosis.catalogue import Effect, variant
+from workbench.diagnosis.crossvalidation import CrossValidation
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.linearised import lasting
-from workbench.diagnosis.quadratic import Quadratic, add, minimum
 from workbench.diagnosis.search import (
     Fitted,
     Reporter,
@@ -20,7 +19,6 @@ from workbench.diagnosis.search import (
     examine,
     extended,
     fitted,
-    lesser,
     pruned,
     seek,
 )
@@ -122,14 +120,14 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     nominal = fitted(fit, fit.at(fit.unknowns.start()), ())
     best, steps, trial, interrupted = seek(fit, catalogue, nominal, report)
     base = steps[0].before if steps else best
-    best, trial = pruned(fit, catalogue, best, base, trial, report)
-    less = lesser(fit, best, base)
-    while (idle := _idle(fit, best, less)) is not None:
+    known = {frozenset(one.active): one for one in (base, *(step.before for step in steps))}
+    best, trial, less = pruned(fit, catalogue, best, known, trial, report)
+    validation = CrossValidation(fit)
+    while (idle := _idle(fit, validation, best, less)) is not None:
         report(f"dropping {idle.name}")
         # Beside fewer others, one that mattered may do so no longer.
         best, trial = examine(fit, less[idle], catalogue, report)
-        best, trial = pruned(fit, catalogue, best, base, trial, report)
-        less = lesser(fit, best, base)
+        best, trial, less = pruned(fit, catalogue, best, known, trial, report)
     clean = float(best.linearised.inflation.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
     explained = _share(base, best) > 1.0 - fit.decides.left
@@ -141,9 +139,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     if verdict == "found":
         report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
-        before, after = (held_out(fit, one, fast=fast) for one in (base, best))
-        gain = _gain(fit.unknowns.names, before, after)
-        causes = _causes(fit, best, less, steps, trial, names, cosines)
+        before, after = (validation.squares(one, fast=fast) for one in (base, best))
+        gain = _gain(fit.tests, before, after)
+        causes = _causes(fit, validation, best, less, steps, trial, names, cosines)
     return Diagnosis(
         verdict=verdict,
         interrupted=interrupted,
@@ -162,48 +160,24 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     )
 
 
-def _idle(fit: Fit, best: Fitted, less: Mapping[Effect, Fitted]) -> Effect | None:
+def _idle(
+    fit: Fit, validation: CrossValidation, best: Fitted, less: Mapping[Effect, Fitted]
+) -> Effect | None:
     """A cause that beside others explains next to nothing on held-out stops, if there is one."""
     if len(best.active) < 2:
         return None
     shares = {
-        effect: _explained(fit, one, best, fast=effect.order_locked)[0]
+        effect: validation.explained(one, best, fast=effect.order_locked)[0]
         for effect, one in less.items()
     }
     weakest = min(shares, key=lambda effect: shares[effect])
     return weakest if shares[weakest] < fit.decides.idle else None
 
 
-def _explained(fit: Fit, less: Fitted, best: Fitted, *, fast: bool) -> tuple[float, float]:
-    """Share of the explainable by which two fits differ on held-out stops; error of the first."""
-    before, after = (float(held_out(fit, one, fast=fast).mean()) for one in (less, best))
-    return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
-
-
 def _share(before: Fitted, after: Fitted) -> float:
     """Share of lasting errors, over noise, that is gone; of the channel that fares worst."""
     was, left = before.linearised.inflation - 1.0, after.linearised.inflation - 1.0
     return float(1.0 - left.max() / max(was.max(), 1e-9))
-
-
-def held_out(fit: Fit, one: Fitted, *, fast: bool) -> Vector:
-    """Mean square of errors of each stop, fitted to the others, (K,); noise leaves 1.
-
-    Parameters
-    ----------
-    fast : of blocks instead of means over a lasting time.
-    """
-    joint = fit.quadratics(fit.linearise(one.linearised, one.active))
-    stops = joint.stops()
-    total = add([*stops, joint.prior])
-    result = np.zeros(len(stops))
-    for k, (stop, system) in enumerate(zip(stops, joint.systems, strict=True)):
-        z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-        errors = system.r + system.J @ z + system.P @ system.local(z)
-        shape = one.linearised.evidence[k].errors.shape
-        whitened = errors[:-1].reshape(shape) * np.sqrt(one.linearised.inflation)
-        result[k] = (whitened**2 if fast else lasting(whitened, one.linearised.lasting)).mean()
-    return result
 
 
 def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
@@ -228,6 +202,7 @@ def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
 
 def _causes(
     fit: Fit,
+    validation: CrossValidation,
     best: Fitted,
     less: Mapping[Effect, Fitted],
     steps: Sequence[Step],
@@ -239,7 +214,7 @@ def _causes(
     causes, lacking = [], {}
     for effect in best.active:
         fast = effect.order_locked
-        explained, lacking[effect.name] = _explained(fit, less[effect], best, fast=fast)
+        explained, lacking[effect.name] = validation.explained(less[effect], best, fast=fast)
         parameters = {}
         for key, value in best.point.sizes.items():
             if key[0] != effect.name:

@@ -40,7 +40,6 @@ from workbench.observers.layout import (
     output,
     report,
     stick,
-    width,
 )
 from workbench.observers.operating import (
     LinearModel,
@@ -81,7 +80,8 @@ class Memory(NamedTuple):
     ----------
     z : (q,) deviations of the estimated quantities; integral : (l,) of dy.
     target, drift : (q,) what deviations decay to, and by how much it moved in this step.
-    system, change, others, innovation, gain : work space.
+    system : (s + q, s + q + 1) of the step, with its right-hand side.
+    others, innovation : work space.
     """
 
     z: Vector
@@ -89,7 +89,6 @@ class Memory(NamedTuple):
     target: Vector
     drift: Vector
     system: Matrix
-    change: Matrix
     others: Vector
     innovation: Vector
 
@@ -98,21 +97,22 @@ class Memory(NamedTuple):
 def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of equation (9); other states each by themselves."""
     layout, states, z = settings.layout, settings.states, memory.z
-    system, change, innovation = memory.system, memory.change, memory.innovation
+    system, innovation = memory.system, memory.innovation
     n, s, q, outputs = model.x.size, states.size, z.size, y.size
+    change = system[:, s + q]
     status = measure(model, u)
     if h > 0.0:
         status = status or evaluate(model)
         for i in range(n):
             memory.others[i] = h * model.dx[i]
         for i in range(s):
-            change[i, 0] = h * model.dx[states[i]]
+            change[i] = h * model.dx[states[i]]
         for i in range(q):
             decay = settings.decay[i] * (z[i] - memory.target[i])
-            change[s + i, 0] = h * decay + memory.drift[i]
+            change[s + i] = h * decay + memory.drift[i]
         for j in range(outputs):
             innovation[j] = y[j] - output(model, layout, j)
-        status = status or linearise(model, width(model, layout))
+        status = status or linearise(model, layout.columns)
         fade = fading(layout, y)
         for i in range(s + q):
             share = fade
@@ -131,9 +131,9 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
                 # The integral at the end of the step is part of the implicit equation.
                 direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
                 gain = h * (direct + h * integrated)
-                change[i, 0] += gain * innovation[j] + h * integrated * memory.integral[j]
+                change[i] += gain * innovation[j] + h * integrated * memory.integral[j]
                 add_slope(model, layout, j, gain, settings.places, system[i])
-        status = status or solve(system, change)
+        status = status or solve(system)
         if status:
             return status
         for j in range(outputs):
@@ -144,9 +144,9 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
             if settings.places[i] < 0:
                 model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
         for i in range(s):
-            model.x[states[i]] += change[i, 0]
+            model.x[states[i]] += change[i]
         for i in range(q):
-            z[i] = clip(z[i] + change[s + i, 0], layout.low[i], layout.high[i])
+            z[i] = clip(z[i] + change[s + i], layout.low[i], layout.high[i])
         stick(layout, model.x, before)
     return status or correct(model, z) or report(model, layout, row)
 
@@ -214,8 +214,7 @@ class DisturbanceObserver(Estimator):
             integral=np.zeros(outputs),
             target=np.zeros(q),
             drift=np.zeros(q),
-            system=np.zeros((s + q, s + q)),
-            change=np.zeros((s + q, 1)),
+            system=np.zeros((s + q, s + q + 1)),
             others=np.zeros(len(fmu.states)),
             innovation=np.zeros(outputs),
         )

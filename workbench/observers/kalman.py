@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import compiled, evaluate, inlined, linearise, read, solve
+from workbench.kernel import compiled, evaluate, implicit, inlined, linearise, read, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains, SearchSpace, noise_space
 from workbench.observers.layout import (
@@ -22,7 +22,6 @@ from workbench.observers.layout import (
     measure,
     report,
     stick,
-    width,
 )
 from workbench.observers.operating import walks
 from workbench.system import System
@@ -54,52 +53,65 @@ class FilterMemory(NamedTuple):
 
     z: Vector
     P: Matrix
-    system: Matrix
-    transition: Matrix
-    change: Matrix
-    work: Matrix
-    corrections: Vector
+    system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
+    spread: Matrix  # (n, n + n + q) of the covariance
+    change: Vector
     column: Vector
 
 
 @inlined
-def copy(source, target):  # type: ignore[no-untyped-def]
-    """Copy a matrix."""
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
-
-
-@inlined
-def put(model, memory, z):  # type: ignore[no-untyped-def]
+def put(model, z):  # type: ignore[no-untyped-def]
     """Put the FMU at states and corrections z, (n + q,); returns a status."""
     n = model.x.size
     for i in range(n):
         model.x[i] = z[i]
-    for i in range(memory.corrections.size):
-        memory.corrections[i] = z[n + i]
-    return correct(model, memory.corrections)
+    return correct(model, z[n:])
 
 
 @compiled
 def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
-    """Advance z by one linearly implicit step; leaves I - h*A in memory.system; a status."""
-    n, size = model.x.size, z.size
-    status = put(model, memory, z) or evaluate(model)
-    for i in range(size):
-        memory.change[i, 0] = h * model.dx[i] if i < n else 0.0
+    """Advance z by one linearly implicit step, in which quantities stay; returns a status."""
+    n, system = model.x.size, memory.system
+    status = put(model, z) or evaluate(model)
+    for i in range(n):
+        system[i, n] = h * model.dx[i]
     status = status or linearise(model, n)
-    for i in range(size):
-        for j in range(size):
-            memory.system[j, i] = -h * model.jacobian[i, j] if j < n else 0.0
-        memory.system[i, i] += 1.0
-    copy(memory.system, memory.work)
-    status = status or solve(memory.work, memory.change)
+    implicit(model, h, system)
+    status = status or solve(system)
     before = lag(settings.layout, z)
-    for i in range(size):
-        z[i] += memory.change[i, 0]
+    for i in range(n):
+        z[i] += system[i, n]
     stick(settings.layout, z, before)
     return status
+
+
+@compiled
+def propagate(model, memory, h):  # type: ignore[no-untyped-def]
+    """P <- F P F', F = (I - hA)^-1 of states and quantities, after `predict`; returns a status.
+
+    Quantities stay, so that only rows of states are solved for, with those of quantities on the
+    right-hand side. Each pass gives (F P)', the other half of a symmetric P being left alone.
+    """
+    P, system = memory.P, memory.spread
+    n, size = model.x.size, memory.z.size
+    for _ in range(2):
+        implicit(model, h, system)
+        for i in range(n):
+            for j in range(size):
+                total = P[i, j]
+                for k in range(n, size):
+                    total += h * model.jacobian[k, i] * P[k, j]
+                system[i, n + j] = total
+        status = solve(system)
+        if status:
+            return status
+        for i in range(n):
+            for j in range(size):
+                P[j, i] = system[i, n + j]
+    for i in range(n):
+        for j in range(n, size):
+            P[i, j] = P[j, i]
+    return 0
 
 
 @inlined
@@ -116,7 +128,7 @@ def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
     q, outputs = layout.nominal.size, layout.seen.size
     for i in range(q):
         z[n + i] = clip(z[n + i], layout.low[i], layout.high[i])
-    status = put(model, memory, z) or linearise(model, n + model.y.size)
+    status = put(model, z) or linearise(model, n + model.y.size)
     status = status or report(model, layout, row)
     first = outputs + 2 * q + layout.reported  # of the standard deviations
     for j in range(outputs):
@@ -163,11 +175,11 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
     fade = fading(layout, y)
     row[row.size - 1] = 0.0
     for i in range(size):
-        memory.change[i, 0] = 0.0
+        memory.change[i] = 0.0
     for j in range(y.size):
         at = layout.seen[j]
         if at >= 0:
-            innovation = y[j] - z[at] - memory.change[at, 0]
+            innovation = y[j] - z[at] - memory.change[at]
             for i in range(size):
                 v[i] = P[i, at]
             total = v[at]
@@ -180,7 +192,7 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                     v[i] += P[i, k] * model.jacobian[k, n - 1 - at]
             for i in range(size):
                 total += model.jacobian[i, n - 1 - at] * v[i]
-                innovation -= model.jacobian[i, n - 1 - at] * memory.change[i, 0]
+                innovation -= model.jacobian[i, n - 1 - at] * memory.change[i]
         noise = variance(settings, fade, y, j)
         total += noise
         inverse = 1.0 / total
@@ -188,12 +200,12 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
         for i in range(size):
             gain = v[i] * inverse
-            memory.change[i, 0] += gain * innovation
+            memory.change[i] += gain * innovation
             for k in range(i + 1):
                 P[i, k] -= gain * v[k]
                 P[k, i] = P[i, k]
     for i in range(size):
-        z[i] += memory.change[i, 0]
+        z[i] += memory.change[i]
 
 
 @compiled
@@ -205,19 +217,14 @@ def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-d
         return status or finish(model, settings, memory, row)
     P, size = memory.P, memory.z.size
     status = measure(model, u) or predict(model, settings, memory, memory.z, h)
-    # P <- (I - hA)^-1 (P + hQ) (I - hA)^-T: two solutions with the matrix of the step.
+    # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
     for i in range(size):
         P[i, i] += h * (fade * settings.walk[i]) ** 2
-    copy(memory.system, memory.work)
-    status = status or solve(memory.work, P)
-    copy(P.T, memory.transition)
-    copy(memory.system, memory.work)
-    status = status or solve(memory.work, memory.transition)
-    copy(memory.transition, P)
-    if width(model, layout) > model.x.size:
-        status = status or put(model, memory, memory.z) or read(model)
-        status = status or linearise(model, width(model, layout))
+    status = status or propagate(model, memory, h)
+    if layout.columns > model.x.size:
+        status = status or put(model, memory.z) or read(model)
+        status = status or linearise(model, layout.columns)
     if status:
         return status
     update(model, settings, memory, y, row)
@@ -268,7 +275,7 @@ class ExtendedKalmanFilter(Estimator):
             walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
         )
-        self._memory: Any = FilterMemory(*buffers(n + q), np.zeros(q), np.zeros(n + q))
+        self._memory: Any = FilterMemory(*buffers(n, q), np.zeros(n + q))
 
     def _spreads(self) -> Vector:
         """What is not known of the states at the start, (n,)."""
@@ -324,7 +331,8 @@ def _share(gains: Gains, output: str) -> float:
     return gains[name] if name in gains.names else 0.0
 
 
-def buffers(size: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Matrix]:
-    """Memory and work space of a filter with so many unknowns: z, P, system, ..., work."""
-    P, system, transition, work = (np.zeros((size, size)) for _ in range(4))
-    return np.zeros(size), P, system, transition, np.zeros((size, 1)), work
+def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
+    """Memory and work space of a filter with so many states and quantities: z to change."""
+    size = n + q
+    z, change = np.zeros(size), np.zeros(size)
+    return z, np.zeros((size, size)), np.zeros((n, n + 1)), np.zeros((n, n + size)), change

@@ -24,6 +24,7 @@ class Layout(NamedTuple):
     follower, leader : states of which one rolls along with the other, -1 for none.
     ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
     reported : number of the model's outputs that estimates hold.
+    columns : of the Jacobian that laws need: rates, and all outputs if one that is fed is no state.
     """
 
     seen: NDArray[np.intp]
@@ -38,6 +39,7 @@ class Layout(NamedTuple):
     ratio: float
     lead: float
     reported: int
+    columns: int
 
 
 def layout(fmu: FMU, system: System) -> Layout:
@@ -71,6 +73,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         ratio=rolling_ratio(fmu, system) if rolling else 0.0,
         lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
         reported=len(system.reported),
+        columns=len(states) + (len(system.reported) + unseen if unseen else 0),
     )
 
 
@@ -131,30 +134,15 @@ def add_slope(model, layout, j, factor, places, row):  # type: ignore[no-untyped
 
 @inlined
 def explained(model, layout, j, places, change):  # type: ignore[no-untyped-def]
-    """Change of output j, to first order, by changes of unknowns, (p, 1); see `add_slope`."""
+    """Change of output j, to first order, by changes of unknowns, (p,); see `add_slope`."""
     at = layout.seen[j]
     if at >= 0:
-        return change[places[at], 0]
+        return change[places[at]]
     total = 0.0
     for k in range(places.size):
         if places[k] >= 0:
-            total += model.jacobian[k, model.x.size - 1 - at] * change[places[k], 0]
+            total += model.jacobian[k, model.x.size - 1 - at] * change[places[k]]
     return total
-
-
-@inlined
-def all_states(layout):  # type: ignore[no-untyped-def]
-    """Whether every output is a state, so that none need be read from the model."""
-    for at in layout.seen:  # noqa: SIM110  a compiled loop has no generators
-        if at < 0:
-            return False
-    return True
-
-
-@inlined
-def width(model, layout):  # type: ignore[no-untyped-def]
-    """Columns of the Jacobian that a law needs: rates, and outputs that are no states."""
-    return model.x.size if all_states(layout) else model.x.size + model.y.size
 
 
 @inlined

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import compiled, evaluate, inlined, linearise, set_states, solve
+from workbench.kernel import compiled, evaluate, implicit, inlined, linearise, set_states, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
 from workbench.observers.layout import Layout, measure, report
@@ -13,30 +13,25 @@ from workbench.system import System
 
 
 class _Memory(NamedTuple):
-    system: Matrix
-    change: Matrix
+    system: Matrix  # (n, n + 1) of the step, with its right-hand side
 
 
 @inlined
 def _law(model, layout, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of the model; y is not used."""
-    system, change = memory.system, memory.change
-    n = model.x.size
+    n, system = model.x.size, memory.system
     status = measure(model, u)
     if h > 0.0:
         status = status or evaluate(model)
         for i in range(n):
-            change[i, 0] = h * model.dx[i]
+            system[i, n] = h * model.dx[i]
         status = status or linearise(model, n)
-        for i in range(n):
-            for j in range(n):
-                system[i, j] = -h * model.jacobian[j, i]
-            system[i, i] += 1.0
-        status = status or solve(system, change)
+        implicit(model, h, system)
+        status = status or solve(system)
         if status:
             return status
         for i in range(n):
-            model.x[i] += change[i, 0]
+            model.x[i] += system[i, n]
         status = set_states(model)
     return status or report(model, layout, row)
 
@@ -63,7 +58,7 @@ class OpenLoop(Estimator):
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         n = len(fmu.states)
-        self._memory = _Memory(np.zeros((n, n)), np.zeros((n, 1)))
+        self._memory = _Memory(np.zeros((n, n + 1)))
 
     def _arguments(self) -> tuple[Layout, Any]:
         return self._layout, self._memory

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import compiled, evaluate, linearise, solve
+from workbench.kernel import compiled, evaluate, implicit, linearise, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.disturbance import effects
 from workbench.observers.gains import (
@@ -31,7 +31,6 @@ from workbench.observers.layout import (
     measure,
     output,
     report,
-    width,
 )
 from workbench.observers.operating import linearised, loops
 from workbench.system import FULL, System
@@ -50,8 +49,7 @@ class _Memory(NamedTuple):
     integral: Vector  # of the gains times dy: the slow part of the corrections
     gains: Matrix  # (q, 2 l) with authority
     z: Vector  # corrections
-    system: Matrix
-    change: Matrix
+    system: Matrix  # (n, n + 1) of the step, with its right-hand side
     innovation: Vector
 
 
@@ -59,25 +57,22 @@ class _Memory(NamedTuple):
 def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of model and PI controller together."""
     layout, integral, gains = settings.layout, memory.integral, memory.gains
-    z, system, change, innovation = memory.z, memory.system, memory.change, memory.innovation
+    z, system, innovation = memory.z, memory.system, memory.innovation
     n, q, outputs = model.x.size, z.size, y.size
     status = measure(model, u)
     if h > 0.0:
         status = status or evaluate(model)
         for i in range(n):
-            change[i, 0] = h * model.dx[i]
+            system[i, n] = h * model.dx[i]
         for j in range(outputs):
             innovation[j] = y[j] - output(model, layout, j)
-        status = status or linearise(model, width(model, layout))
+        status = status or linearise(model, layout.columns)
         fade = fading(layout, y)
         for i in range(q):
             share = fade * authority(model, layout, settings.effect, i)
             for j in range(2 * outputs):
                 gains[i, j] = share * settings.L[i, j]
-        for i in range(n):
-            for j in range(n):
-                system[i, j] = -h * model.jacobian[j, i]
-            system[i, i] += 1.0
+        implicit(model, h, system)
         # The controller at the end of the step is part of the implicit equation.
         for k in range(q):
             wanted = integral[k] - z[k]
@@ -88,12 +83,13 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
                     effect = h * model.jacobian[n + k, i] * gain
                     add_slope(model, layout, j, effect, settings.places, system[i])
             for i in range(n):
-                change[i, 0] += h * model.jacobian[n + k, i] * wanted
-        status = status or solve(system, change)
+                system[i, n] += h * model.jacobian[n + k, i] * wanted
+        status = status or solve(system)
         if status:
             return status
+        change = system[:, n]
         for i in range(n):
-            model.x[i] += change[i, 0]
+            model.x[i] += change[i]
         for j in range(outputs):
             innovation[j] -= explained(model, layout, j, settings.places, change)
         for k in range(q):
@@ -151,8 +147,7 @@ class ParameterEstimator(Estimator):
             integral=np.zeros(q),
             gains=np.zeros((q, 2 * outputs)),
             z=np.zeros(q),
-            system=np.zeros((n, n)),
-            change=np.zeros((n, 1)),
+            system=np.zeros((n, n + 1)),
             innovation=np.zeros(outputs),
         )
 

@@ -17,7 +17,7 @@ from workbench.observers.kalman import (
     put,
     variance,
 )
-from workbench.observers.layout import all_states, clip, fading, measure
+from workbench.observers.layout import clip, fading, measure
 from workbench.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -35,10 +35,8 @@ class PointsMemory(NamedTuple):
     z: Vector
     P: Matrix
     system: Matrix
-    transition: Matrix
-    change: Matrix
-    work: Matrix
-    corrections: Vector
+    spread: Matrix
+    change: Vector
     column: Vector
     root: Matrix
     points: Matrix  # (2 size, size)
@@ -115,8 +113,8 @@ def _spread(model, settings, memory, spread, h):  # type: ignore[no-untyped-def]
             for j in range(size - n):
                 point[n + j] = clip(point[n + j], layout.low[j], layout.high[j])
             status = status or predict(model, settings, memory, point, h)
-            if not all_states(layout):
-                status = status or put(model, memory, point) or read(model)
+            if layout.columns > n:
+                status = status or put(model, point) or read(model)
             for j in range(layout.seen.size):
                 at = layout.seen[j]
                 memory.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
@@ -236,8 +234,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(system.outputs)
         self._memory = PointsMemory(
-            *buffers(size),
-            np.zeros(len(system.estimated)),
+            *buffers(len(fmu.states), len(system.estimated)),
             np.zeros(max(size, 2 * outputs)),
             root=np.zeros((size, size)),
             points=np.zeros((2 * size, size)),

@@ -57,11 +57,11 @@ def _read_folders(folder: Path) -> list[Recording]:
 
 
 PUBLISHED = Published(
-    title="Air production unit of a metro train: pressure of the reservoir, valve of the compressor",
+    title="Air production unit of a metro train: pressure of its reservoir, flag of its compressor",
     source="N. Davari, B. Veloso, R. P. Ribeiro, J. Gama, MetroPT-3 Dataset (2023), UCI Machine "
     "Learning Repository 791, https://doi.org/10.24432/C5VW3R",
     licence="CC BY 4.0",
-    recordings="The first 1000 rows, 10 s apart: pressure of the reservoir, and COMP, which is 0 while "
+    recordings="The first 1000 rows, 10 s apart: pressure of the reservoir, and COMP, 0 while "
     "the compressor delivers. They are cut into the five cycles of the compressor. The first three "
     "are to be fitted, the last two are held out.",
     layouts=(

@@ -88,6 +88,18 @@ def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
     rows = [{**one, **{k: json.dumps(one[k]) for k in nested}} for one in summary["candidates"]]
     write_whole(out / "candidates.csv", _csv(pd.DataFrame(rows)))
     write_whole(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
+    errors = [
+        {
+            **{key: one[key] for key in ("recording", "channel", "unit", "held_out", "samples")},
+            **{
+                f"{size}_{when}": one[size][i]
+                for size in ("rms", "mean_absolute")
+                for i, when in enumerate(("before", "after"))
+            },
+        }
+        for one in summary["errors"]
+    ]
+    write_whole(out / "errors.csv", _csv(pd.DataFrame(errors)))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
     write_whole(out / "confusability.csv", _csv(pd.DataFrame(cells)))

@@ -17,6 +17,7 @@ from workbench.report.figures import CaseFigure
 from workbench.report.templates import environment
 from workbench.report.views import called, capital, named
 from workbench.system import System
+from workbench.units import si_factor
 
 _BLOCKS = 900  # of a curve, two points each
 _FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
@@ -52,6 +53,7 @@ def write_diagnosis_page(
             matrix=_matrix(summary),
             pairs=_pairs(summary["confusability"]),
             dots=None if summary["gain"] is None else _dots(summary["gain"]),
+            errors=_errors(system, summary),
             styles={"nominal": NOMINAL, "extended": EXTENDED},
             flagged=_FLAGGED,
             words=_words(system, summary, figures),
@@ -67,6 +69,19 @@ def write_diagnosis_page(
     path = folder / "index.html"
     write_whole(path, text)
     return path
+
+
+def _errors(system: System, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows on the errors of samples, in the units of figures; of both models if there are two."""
+    shown = {one.name: one.shown for one in system.comparison.channels}
+    models = (0, 1) if summary["causes"] or summary["partial"] else (0,)
+    rows = []
+    for one in summary["errors"]:
+        unit = shown[one["channel"]]
+        factor = si_factor(unit, one["unit"], one["channel"])
+        sizes = [one[size][i] / factor for i in models for size in ("rms", "mean_absolute")]
+        rows.append({**one, "unit": unit, "sizes": sizes})
+    return rows
 
 
 def _words(

@@ -1,7 +1,7 @@
 within AirSupply.Effects;
 model StartLoss "a compressor that delivers late at each start"
   extends Common.Interfaces.Signal;
-  parameter Real loss(unit="s", min=-10.0, max=10.0) = 0.0 "Delivery that is missing at a start, as a time";
+  parameter Real loss(unit="s", min=0.0, max=15.0) = 0.0 "Delivery that is missing at a start, as a time";
   final parameter Real tau(unit="s") = 10.0 "Time constant";
   Real begun(unit="1", start=0.0, fixed=true) "1 - exp(-t/tau)";
 protected

@@ -9,7 +9,7 @@ equation
   annotation (
     __Workbench(effect(
       size="spilled", step=0.05, matters=0.2,
-      shapes(rim={9.0}),
+      shapes(rim={8.0, 9.0, 9.8}),
       slots={"lowerRim"},
       separation="a look at the lower rim while the level is high")),
     Documentation(info="<html>

@@ -6,13 +6,13 @@ model ApexOffset "A wheelset that stands beside the apex of the roller"
   parameter Units.Length rW(min=0.1) = 0.46 "Wheel radius";
   parameter Units.Length rR(min=0.1) = 0.70 "Roller radius";
 equation
-  reading = F + 2.0*Q0/(rW + rR)*offset;
+  y = u + 2.0*Q0/(rW + rR)*offset;
   annotation (
     __Workbench(effect(
       size="offset", step=2e-4, matters=1.5e-4, after="FxOffset",
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
-<p><code>reading = F + 2*Q0*offset/(rW + rR)</code>: both wheels lean on a slope, 138 N per mm on
+<p><code>y = u + 2*Q0*offset/(rW + rR)</code>: both wheels lean on a slope, 138 N per mm on
 the load cells, at any speed and in either direction.</p>
 <h4>Limits</h4>
 <p>Small angles. At constant wheel load this is an offset of the load cells.</p>

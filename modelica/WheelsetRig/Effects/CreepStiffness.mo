@@ -1,15 +1,13 @@
 within WheelsetRig.Effects;
 model CreepStiffness "A contact softer or stiffer than Kalker's theory"
   extends Quantities.PartialCreepStiffness;
-  parameter Real gain(unit="1", min=-0.9, max=1.0) = 0.0 "Relative change";
-equation
-  actual = nominal*(1.0 + gain);
+  extends Common.Signals.Gain(gain(min=-0.9, max=1.0));
   annotation (
     __Workbench(effect(
       size="gain", step=0.01, matters=0.02,
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
-<p><code>actual = nominal*(1 + gain)</code>: a layer between wheel and roller. Equal to a gain of
+<p><code>y = u*(1 + gain)</code>: a layer between wheel and roller. Equal to a gain of
 both <code>kA</code> and <code>kS</code> of Polach's law; from its dry to its wet parameters the
 stiffness falls by 71 %.</p>
 <h4>References</h4>

@@ -6,14 +6,14 @@ model OutOfRoundWheel "A wheel that is out of round"
   parameter Real order(unit="1", min=1.0, max=20.0) = 1.0 "Periods per turn";
   Units.Angle phi(start=0.0, fixed=true, nominal=100.0) "Angle of the wheel";
 equation
-  actual = nominal + cosine*cos(order*phi) + sine*sin(order*phi);
+  y = u + cosine*cos(order*phi) + sine*sin(order*phi);
   der(phi) = omega;
   annotation (
     __Workbench(effect(
       size={"cosine", "sine"}, step=2e-5, matters=1e-5,
       separation="order tracking in a slow run-down, with and without brake")),
     Documentation(info="<html>
-<p><code>actual = nominal + cosine*cos(n*phi) + sine*sin(n*phi)</code>, order 1: 0.05 to 0.5 mm, 2
+<p><code>y = u + cosine*cos(n*phi) + sine*sin(n*phi)</code>, order 1: 0.05 to 0.5 mm, 2
 to 20: 5 to 30 um. The wheelset must follow the radius, so the creep force ripples with
 <code>v^2</code>, also without brake.</p>
 <h4>Limits</h4>

@@ -1,16 +1,14 @@
 within WheelsetRig.Effects;
 model WheelInertia "An inertia of the wheelset other than nominal"
   extends Quantities.PartialWheelInertia;
-  parameter Real gain(unit="1", min=-0.5, max=0.5) = 0.0 "Relative change";
-equation
-  actual = nominal*(1.0 + gain);
+  extends Common.Signals.Gain(gain(min=-0.5, max=0.5));
   annotation (
     __Workbench(effect(
       size="gain", step=0.05, matters=0.2,
       hidden="stops without slides show less of it than noise of the torque fakes",
       separation="a lifted spin-down")),
     Documentation(info="<html>
-<p><code>actual = nominal*(1 + gain)</code>. A stop moves by 0.3 % of the brake torque per 10 %; a
+<p><code>y = u*(1 + gain)</code>. A stop moves by 0.3 % of the brake torque per 10 %; a
 slide shows it.</p>
 </html>"));
 end WheelInertia;

@@ -1,15 +1,13 @@
 within WheelsetRig.Effects;
 model WheelLoad "A wheel load other than nominal"
   extends Quantities.PartialWheelLoad;
-  parameter Real gain(unit="1", min=-0.3, max=0.3) = 0.0 "Relative change";
-equation
-  actual = nominal*(1.0 + gain);
+  extends Common.Signals.Gain(gain(min=-0.3, max=0.3));
   annotation (
     __Workbench(effect(
       size="gain", step=0.01, matters=0.02,
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
-<p><code>actual = nominal*(1 + gain)</code>. Changes adhesion in proportion and the stiffness of the
+<p><code>y = u*(1 + gain)</code>. Changes adhesion in proportion and the stiffness of the
 contact with the power 2/3.</p>
 </html>"));
 end WheelLoad;

@@ -37,12 +37,12 @@ equation
   omegaREstimate = plant.omegaR;
   Fx = plant.Fx;
   slip = plant.slip;
-  v = plant.rollerRadius.actual*omegaR;
-  actualWR = 2.0*plant.wheelRadius.actual/plant.wheelInertia.actual*creepForceByFriction(
-    plant.slip, plant.rollerRadius.actual*plant.omegaR, plant.wheelLoad.actual, plant.creepStiffness.actual,
+  v = plant.rollerRadius.y*omegaR;
+  actualWR = 2.0*plant.wheelRadius.y/plant.wheelInertia.y*creepForceByFriction(
+    plant.slip, plant.rollerRadius.y*plant.omegaR, plant.wheelLoad.y, plant.creepStiffness.y,
     plant.adhesion.mu0, plant.polach);
   actualDC = -plant.nDiscs*plant.actuation.Fperp*plant.rB*tanh(plant.omegaW/plant.omega0)
-    /plant.wheelInertia.actual;
+    /plant.wheelInertia.y;
   der(integral) = dy;
   feedback[1] = L11*dy[1] + L12*dy[2] + L13*integral[1] + L14*integral[2];
   feedback[2] = L21*dy[1] + L22*dy[2] + L23*integral[1] + L24*integral[2];

@@ -1,6 +1,5 @@
 within WheelsetRig.Quantities;
 model Unchanged "Null version: the nominal value acts"
   extends PartialQuantity;
-equation
-  actual = nominal;
+  extends Common.Signals.Unchanged;
 end Unchanged;

@@ -1,6 +1,5 @@
 within WheelsetRig.Sensors;
 model IdealForceSensor "Null version: the sensor reads the truth"
   extends PartialForceSensor;
-equation
-  reading = F;
+  extends Common.Signals.Unchanged;
 end IdealForceSensor;

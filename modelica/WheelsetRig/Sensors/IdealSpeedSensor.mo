@@ -1,6 +1,5 @@
 within WheelsetRig.Sensors;
 model IdealSpeedSensor "Null version: the sensor reads the truth"
   extends PartialSpeedSensor;
-equation
-  reading = omega;
+  extends Common.Signals.Unchanged;
 end IdealSpeedSensor;

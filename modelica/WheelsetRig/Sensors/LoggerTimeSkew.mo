@@ -3,9 +3,9 @@ model LoggerTimeSkew "A logger of the speeds whose clock is late"
   extends PartialSpeedSensor;
   parameter Real skew(unit="s", min=-0.05, max=0.05) = 0.0 "Time by which the clock is late";
 protected
-  SpeedSignalDelay late(omega=omega, delay=skew) "The reading is late";
+  SpeedSignalDelay late(u=u, delay=skew) "The reading is late";
 equation
-  reading = late.reading;
+  y = late.y;
   annotation (
     __Workbench(effect(
       size="skew", step=0.001, matters=0.001, slots={"speedSensorW", "speedSensorR"},

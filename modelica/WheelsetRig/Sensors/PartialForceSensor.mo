@@ -1,5 +1,4 @@
 within WheelsetRig.Sensors;
 partial model PartialForceSensor "Slot: what load cells make of a force"
-  input Units.Force F "True force";
-  output Units.Force reading "What the sensor reads";
+  extends Common.Interfaces.Signal(u(unit="N"), y(unit="N"));
 end PartialForceSensor;

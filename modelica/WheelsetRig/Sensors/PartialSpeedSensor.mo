@@ -1,5 +1,4 @@
 within WheelsetRig.Sensors;
 partial model PartialSpeedSensor "Slot: what a speed sensor makes of an angular velocity"
-  input Units.AngularVelocity omega "True angular velocity";
-  output Units.AngularVelocity reading "What the sensor reads";
+  extends Common.Interfaces.Signal(u(unit="rad/s"), y(unit="rad/s"));
 end PartialSpeedSensor;

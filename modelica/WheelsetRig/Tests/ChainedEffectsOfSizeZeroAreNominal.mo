@@ -26,28 +26,28 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
 
   model WheelRadius "Chain of all effects on the wheel radius"
     extends Quantities.PartialWheelRadius;
-    Effects.WheelRadius wear(nominal=nominal, omega=omega);
-    Effects.OutOfRoundWheel shape(nominal=wear.actual, omega=omega);
+    Effects.WheelRadius wear(u=u, omega=omega);
+    Effects.OutOfRoundWheel shape(u=wear.y, omega=omega);
   equation
-    actual = shape.actual;
+    y = shape.y;
   end WheelRadius;
 
   model SpeedSensor "Chain of all errors of a speed sensor"
     extends Sensors.PartialSpeedSensor;
-    Sensors.PoleRingEccentricity ring(omega=omega);
-    Sensors.SpeedSignalDelay late(omega=ring.reading);
-    Sensors.LoggerTimeSkew logger(omega=late.reading);
+    Sensors.PoleRingEccentricity ring(u=u);
+    Sensors.SpeedSignalDelay late(u=ring.y);
+    Sensors.LoggerTimeSkew logger(u=late.y);
   equation
-    reading = logger.reading;
+    y = logger.y;
   end SpeedSensor;
 
   model ForceSensor "Chain of all errors of the load cells"
     extends Sensors.PartialForceSensor;
-    Effects.ApexOffset apex(F=F);
-    Sensors.FxGain gain(F=apex.reading);
-    Sensors.FxOffset zero(F=gain.reading);
+    Effects.ApexOffset apex(u=u);
+    Sensors.FxGain gain(u=apex.y);
+    Sensors.FxOffset zero(u=gain.y);
   equation
-    reading = zero.reading;
+    y = zero.y;
   end ForceSensor;
 
   model AllEffects "Observer model with all effects"

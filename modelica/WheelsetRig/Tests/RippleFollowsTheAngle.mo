@@ -3,15 +3,15 @@ model RippleFollowsTheAngle "Order-locked effects repeat with the angle of the w
   parameter Units.AngularVelocity omega = 50.0 "Angular velocity of the wheelset";
   Effects.DiscThicknessVariation disc(
     level=0.30, Fperp=30000.0, v=0.30*omega, cosine=0.02, sine=-0.01, order=2.0);
-  Effects.OutOfRoundWheel wheel(nominal=0.46, omega=omega, cosine=2e-4, sine=1e-4, order=3.0);
-  Sensors.PoleRingEccentricity ring(omega=-omega, cosine=0.001, sine=0.002);
+  Effects.OutOfRoundWheel wheel(u=0.46, omega=omega, cosine=2e-4, sine=1e-4, order=3.0);
+  Sensors.PoleRingEccentricity ring(u=-omega, cosine=0.001, sine=0.002);
 equation
   // 1e-9: rounding of an angle of 50 rad, which the solver integrates exactly.
   assert(abs(disc.mu - 0.30*(1.0 + 0.02*cos(2.0*omega*time) - 0.01*sin(2.0*omega*time))) < 1e-9,
     "Disc thickness");
-  assert(abs(wheel.actual - 0.46 - 2e-4*cos(3.0*omega*time) - 1e-4*sin(3.0*omega*time)) < 1e-9,
+  assert(abs(wheel.y - 0.46 - 2e-4*cos(3.0*omega*time) - 1e-4*sin(3.0*omega*time)) < 1e-9,
     "Wheel radius");
-  assert(abs(ring.reading + omega*(1.0 + 0.001*cos(omega*time) - 0.002*sin(omega*time))) < 1e-9,
+  assert(abs(ring.y + omega*(1.0 + 0.001*cos(omega*time) - 0.002*sin(omega*time))) < 1e-9,
     "Pole ring, in reverse");
   annotation (experiment(StopTime=1.0, Tolerance=1e-8));
 end RippleFollowsTheAngle;

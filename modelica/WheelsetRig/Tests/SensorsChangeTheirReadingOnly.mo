@@ -4,14 +4,14 @@ model SensorsChangeTheirReadingOnly "Ideal sensors read the truth; a sensor with
     extends Sensors.PartialSpeedSensor;
     parameter Real gain(unit="1") = 1.1;
   equation
-    reading = gain*omega;
+    y = gain*u;
   end SpeedSensorWithGain;
 
   model ForceSensorWithGain "Wrong calibration"
     extends Sensors.PartialForceSensor;
     parameter Real gain(unit="1") = 0.9;
   equation
-    reading = gain*F;
+    y = gain*u;
   end ForceSensorWithGain;
 
   Units.Pressure p = 1.35e5*(1.0 + tanh(4.0*(time - 0.5))) "Brake pressure";

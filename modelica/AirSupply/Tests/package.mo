@@ -1,0 +1,3 @@
+within AirSupply;
+package Tests "Claims that the models must hold"
+end Tests;

@@ -1,0 +1,3 @@
+within CascadedTanks;
+package Tests "Claims that the models must hold"
+end Tests;

@@ -1,0 +1,68 @@
+"""A real air supply: its record is read and cut, and its leak is named."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.__main__ import main
+from workbench.case import Case, read_cases
+from workbench.prepare import write_cases
+from workbench.systems import load_system
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+METRO = Path(__file__).parents[2] / "shared" / "recordings" / "real" / "metro_air_supply"
+pytestmark = pytest.mark.skipif(not METRO.exists(), reason="the recordings are not at hand")
+
+FITTED = ("cycle_1", "cycle_2", "cycle_3")
+LEAKS = {"LaminarLeak", "CompressibleLeak", "OrificeLeak", "SteadyConsumption"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("metro") / "cases"
+    write_cases("air_supply", METRO, out)
+    return out
+
+
+def read(folder: Path) -> dict[str, Case]:
+    return {one.name: one for one in read_cases([folder], load_system("air_supply"))}
+
+
+def test_both_layouts_hold_the_same_recordings(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(METRO / "20200201", tmp_path / "set" / "20200201")
+    write_cases("air_supply", tmp_path / "set", tmp_path / "cases")
+    published, digits = read(folder), read(tmp_path / "cases")
+    assert published.keys() == digits.keys()
+    for name, case in published.items():
+        assert_allclose(case.time, digits[name].time)
+        for signal in ("COMP", "reservoir"):
+            assert_allclose(case[signal], digits[name][signal], rtol=1e-12)
+
+
+def test_each_cycle_begins_with_the_compressor_off_and_has_one_start(folder: Path) -> None:
+    cases = read(folder)
+    assert sum(one.time.size for one in cases.values()) == 1000
+    for case in cases.values():
+        assert case["COMP"][0] == 1.0
+        assert np.sum(np.diff(case["COMP"]) < 0.0) == 1
+
+
+def test_a_leak_or_a_consumption_is_named_with_what_tells_them_apart(
+    folder: Path, tmp_path: Path
+) -> None:
+    options = ["--system", "air_supply", "--out", str(tmp_path), "--workers", "1"]
+    assert main(["diagnose", *(str(folder / name) for name in FITTED), *options]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    first = summary["causes"][0]
+    assert {first["effect"], *first["confusable_with"]} >= LEAKS
+    assert "compressor off" in first["separation"]
+    for one in summary["errors"]:
+        before, after = one["rms"]
+        assert after < 0.1 * before

@@ -1,0 +1,81 @@
+"""Which samples of a recording count, and the blocks that they make."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.case import Case
+from workbench.diagnosis.cleaning import Mask, runs
+from workbench.errors import InputError
+from workbench.recording import Vector
+from workbench.system import Exclusion, System
+
+_EARLY = 50  # samples at usual rates, before anything is applied
+
+
+def refuse_too_short(
+    case: Case, system: System, blocks: NDArray[np.int64], excluded: Mapping[str, Mask]
+) -> None:
+    """Refuse a recording with too little that counts.
+
+    Raises
+    ------
+    InputError
+        With what was set aside, by reason.
+    """
+    compare = system.comparison
+    if len(blocks) * compare.block < compare.least * (1.0 - 1e-9):
+        lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
+        raise InputError(
+            where=str(case.source),
+            found=f"{compare.block * len(blocks):.3g} s that count; samples set aside: {lost}",
+            expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
+            remedy="leave this recording out, or repair it",
+        )
+
+
+def applied_at(clean: Mapping[str, Vector], system: System, time: Vector) -> int:
+    """Sample at which the recording begins; before it the machine is as it was left."""
+    early = max(2, int(np.searchsorted(time, time[0] + _EARLY * system.sample_time)))
+    if (begins := system.comparison.begins) is None:
+        return early
+    values = system.signal(begins.signal, clean)
+    rising = values > np.median(values[:early]) + begins.level
+    return max(early, int(np.argmax(rising)) - early if rising.any() else values.size)
+
+
+def excluded_by(
+    one: Exclusion, clean: Mapping[str, Vector], system: System, time: Vector, h: float, rest: int
+) -> Mask:
+    """Where samples do not count for one reason."""
+    width = max(1, round(one.smoothed / h))
+    values = np.convolve(system.evaluate(one.formula, clean), np.ones(width) / width, "same")
+    if one.from_rest:
+        values = values - np.median(values[:rest])
+    mask: Mask = (np.abs(values) > one.above) | (np.abs(values) < one.below)
+    if one.only_while is not None:
+        signal = np.abs(system.signal(one.only_while.signal, clean))
+        mask &= signal > one.only_while.level
+    # A mean at an end is one of zeros too.
+    mask[: width + 1] = False
+    if one.to_the_end:
+        mask = np.cumsum(mask) > 0
+    else:
+        mask[time.size - width :] = False
+    if one.within:
+        around = np.ones(max(1, round(2.0 * one.within / h)))
+        mask = np.convolve(mask, around, "same") > 0.5
+    return mask
+
+
+def blocks_of(usable: Mask, time: Vector, block: float, h: float) -> NDArray[np.int64]:
+    """First sample and end of each block of samples that count, without a gap, (b, 2)."""
+    size = max(1, round(block / h))
+    found = [
+        (k, k + size)
+        for first, end in runs(usable)
+        for k in range(first, end - size + 1, size)
+        if time[k + size - 1] - time[k] < 2.0 * max(block, h)
+    ]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
