@@ -97,6 +97,7 @@ scale = "10 N"
 correction = "dc"
 unit = "N/m"
 range = ["50 N/m", "200 N/m"]
+acts_on = "F"
 walk = "1 N/m"
 spread = "5 N/m"
 
@@ -322,6 +323,27 @@ def test_a_model_without_anything_to_estimate_is_refused(
     assert main(["simulate", str(folder / "recordings"), *options]) == 2
     assert "expected something to estimate" in capsys.readouterr().err
     assert diagnosed(folder, tmp_path, ["DryFriction"]).diagnosis.verdict == "found"
+
+
+def test_a_correction_has_the_sign_by_which_the_output_shows_it(
+    balance: Path, tmp_path: Path
+) -> None:
+    """Pressed instead of pulled, a stiffer spring gives less force and not more."""
+    folder = written(tmp_path / "pressed", BALANCE, BALANCE_FILE)
+    table = pd.read_csv(balance / "recordings" / "00_pull" / "measured.csv")
+    recorded(
+        folder,
+        "00_press",
+        {name: table[name] for name in ("time [s]",)}
+        | {name: -table[name] for name in ("s [m]", "v [m/s]", "F [N]")},
+    )
+    options = ["--system", str(folder), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["simulate", str(folder / "recordings"), *options]) == 0
+    estimates = pd.read_csv(tmp_path / "00_press.csv")
+    pressed = estimates["measured.F [N]"] < -8.0
+    for name in ("disturbance_observer", "parameter_estimator"):
+        found = estimates[f"{name}.c [N/m]"][pressed].mean()
+        assert found == pytest.approx(STIFFNESS, rel=0.02)
 
 
 # --- without inputs, and few samples ---

@@ -1,5 +1,6 @@
 """One channel of a recording made clean: faulty samples, noise, and where a signal starts."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ from workbench.system import Signal
 ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 _FEW = 6  # samples; three fourth differences have no median to speak of
-_MOVED = 0.5  # of what second differences say: chance makes it 0.9 in a hundred samples of noise
+_MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 
 Mask = NDArray[np.bool_]
 
@@ -117,12 +118,9 @@ def deviation_of(values: Vector) -> float:
     moved = np.abs(np.diff(values))
     quantum = moved[moved > 0.0].min(initial=np.inf)
     rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
-    spread = _scatter(np.diff(values, 2)) / np.sqrt(6.0)
-    if (
-        values.size > _FEW
-        and (finer := _scatter(np.diff(values, 4)) / np.sqrt(70.0)) < _MOVED * spread
-    ):
-        spread = finer
+    spread = _scatter(np.diff(values, 2)) / math.sqrt(6.0)
+    finer = _scatter(np.diff(values, 4)) / math.sqrt(70.0) if values.size > _FEW else spread
+    spread = finer if finer < _MOVED * spread else spread
     return max(spread, float(rounding))
 
 

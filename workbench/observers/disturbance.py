@@ -352,10 +352,9 @@ class DisturbanceObserver(Estimator):
 
 
 def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
-    """Effect of each quantity on the rate that shows it, at the design point, (q,)."""
+    """Effect of each quantity on the rate or output that shows it, at the design point, (q,)."""
+    shown = dict(zip((one.name for one in system.outputs), model.D, strict=True))
+    shown |= dict(zip(model.states, model.B, strict=True))
     return np.array(
-        [
-            model.B[model.states.index(one.acts_on), i] if one.acts_on else 1.0
-            for i, one in enumerate(system.estimated)
-        ]
+        [shown[one.acts_on][i] if one.acts_on else 1.0 for i, one in enumerate(system.estimated)]
     )
