@@ -253,6 +253,11 @@ def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_pa
             "    parameter",
             "extends no slot of the base",
         ),
+        (
+            "    extends PartialGauge;\n    parameter",
+            "    extends PartialGauge;\n    input Real temperature;\n    parameter",
+            "extends no slot of the base",
+        ),
         ('size="share"', 'size="shar"', r"without a parameter 'shar' \(closest: 'share'\)"),
         ("max=0.9) = 0.0", "max=0.9) = 0.1", "share = 0.1; expected '= 0.0'"),
         ("max=0.9) = 0.0", "max=0.9)", "share without a value; expected '= 0.0'"),

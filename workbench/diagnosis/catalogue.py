@@ -271,7 +271,12 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> E
 
 def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> tuple[str, ...]:
     extended = library.ancestors(one.name)
-    fitting = tuple(slot.name for slot in slots if slot.partial in extended)
+    # A class that adds inputs to the partial class of a slot is for one that has them.
+    parts = library.components(one.name).items()
+    asked = {name for name, part in parts if "input" in part.prefixes and not part.modifier.value}
+    fitting = tuple(
+        slot.name for slot in slots if slot.partial in extended and asked <= set(slot.inputs)
+    )
     if not fitting:
         partials = dict.fromkeys(slot.partial for slot in slots)
         raise InputError(
@@ -280,8 +285,8 @@ def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> 
             expected=f"one that extends {' or '.join(partials) or 'a slot, but there is none'}",
             remedy="let it extend the partial class of its slot, or remove its annotation",
         )
-    asked = said.texts("slots") if "slots" in said.content else fitting
-    for name in asked:
+    chosen = said.texts("slots") if "slots" in said.content else fitting
+    for name in chosen:
         if name not in fitting:
             raise InputError(
                 where=said.where,
@@ -289,7 +294,7 @@ def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> 
                 expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
                 remedy="correct the name",
             )
-    return tuple(name for name in fitting if name in asked)
+    return tuple(name for name in fitting if name in chosen)
 
 
 def _where(said: _Said) -> Where | None:

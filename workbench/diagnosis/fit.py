@@ -27,6 +27,7 @@ _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
 _LEVEL_STEP = 0.02  # relative, twice the step of a level that has no tolerance
+_LEAST_STEP = 1e-3  # of the range of a parameter
 
 
 class Fit:
@@ -128,10 +129,14 @@ class Fit:
         """Columns of what differs from stop to stop."""
         start = self.unknowns.start()
         spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.local}
-        return {
-            (_LOCAL, name): Variation((name,), 0.5 * self.unknowns.spread(start, name, 0, spread))
-            for name, spread in spreads.items()
-        }
+        columns = {}
+        for name, spread in spreads.items():
+            low, high = self._simulations.bounds.get(name, (-np.inf, np.inf))
+            # A level that is zero has a step by its range.
+            least = _LEAST_STEP * (high - low if np.isfinite(high - low) else 1.0)
+            step = 0.5 * self.unknowns.spread(start, name, 0, spread)
+            columns[_LOCAL, name] = Variation((name,), step or least)
+        return columns
 
     def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Variation]:
         """Columns of the effects that a point has."""

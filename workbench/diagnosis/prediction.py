@@ -15,25 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.diagnosis.samples import Samples
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import (
-    checked,
-    compiled,
-    differentiate,
-    evaluate,
-    instance,
-    place,
-    read,
-    set_inputs,
-    set_states,
-    solve,
-)
+from workbench.diagnosis.steps import Steps, step, steps
+from workbench.fmu import FMU, Matrix
+from workbench.kernel import checked, compiled, instance, place, read, set_inputs, set_states
 from workbench.system import System
 
 _LONGEST = 1.2  # sample times, of a step: what is stepped explicitly has to be stable
 _SWIFT = 1.0  # rate times step from which on a state is stepped implicitly
-_KEPT = 8  # steps with one Jacobian: in as many samples a machine changes little
-_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class _Led(NamedTuple):
@@ -53,107 +41,6 @@ class _Led(NamedTuple):
     gain: Matrix
 
 
-class _Work(NamedTuple):
-    """What a simulation remembers, and work space.
-
-    Attributes
-    ----------
-    stiff : (p,) states that are stepped implicitly.
-    a : (n, p) columns of the Jacobian by them.
-    system : (p, 2 p) I - gamma h A for them, and its inverse; step : (1,) that it is for [s].
-    """
-
-    stiff: NDArray[np.intp]
-    a: Matrix
-    system: Matrix
-    step: Vector
-    between: Vector
-    x: Vector
-    k1: Vector
-    k2: Vector
-    picked: Vector
-
-
-@compiled
-def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
-    """Make the matrix of a step of h [s], with the Jacobian here or the one that is kept."""
-    n, p = model.x.size, work.stiff.size
-    if anew:
-        for c in range(p):
-            if differentiate(model, work.stiff[c], n):
-                return 1
-            for i in range(n):
-                work.a[i, c] = model.jacobian[work.stiff[c], i]
-    elif work.step[0] == h:
-        return 0
-    for r in range(p):
-        for c in range(p):
-            work.system[r, c] = -_GAMMA * h * work.a[work.stiff[r], c]
-            work.system[r, p + c] = 1.0 if r == c else 0.0
-        work.system[r, r] += 1.0
-    work.step[0] = h
-    return solve(work.system)
-
-
-@compiled
-def _solve(work, h, k):  # type: ignore[no-untyped-def]
-    """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
-    stiff, picked, p = work.stiff, work.picked, work.stiff.size
-    for r in range(p):
-        picked[r] = 0.0
-        for c in range(p):
-            picked[r] += work.system[r, p + c] * k[stiff[c]]
-    for i in range(k.size):
-        for c in range(stiff.size):
-            k[i] += _GAMMA * h * work.a[i, c] * picked[c]
-    for r in range(stiff.size):
-        k[stiff[r]] = picked[r]
-
-
-@compiled
-def _step(model, work, h, renew):  # type: ignore[no-untyped-def]
-    """Advance model.x by h [s] while the inputs go to work.between; returns a status.
-
-    Rosenbrock method of two stages, L-stable, with inputs linear in time: a sampled ramp is met
-    without lag, which linearly implicit Euler would show as half a sample of delay. It is of order
-    2 whatever matrix stands for the Jacobian, so that one serves several steps, and only the states
-    that may be stiff are treated so. What drives them, inputs and all other states, enters by its
-    change over the step.
-    Source: J. G. Verwer et al. (1999), SIAM J. Sci. Comput. 20, 1456-1480.
-    """
-    n, x, k1, k2 = model.x.size, work.x, work.k1, work.k2
-    if evaluate(model):
-        return 1
-    for i in range(n):
-        x[i] = model.x[i]
-        k1[i] = model.dx[i]
-    status = _renew(model, work, h, renew)
-    if status:
-        return status
-    for j in range(work.between.size):
-        model.u[j] = work.between[j]
-    for i in range(n):
-        model.x[i] += h * k1[i]
-    for i in work.stiff:
-        model.x[i] = x[i]
-    if place(model) or evaluate(model):
-        return 1
-    for i in range(n):
-        k2[i] = _GAMMA * (model.dx[i] - k1[i])
-        k1[i] += k2[i]
-    _solve(work, h, k1)
-    for i in range(n):
-        model.x[i] = x[i] + h * k1[i]
-    if set_states(model) or evaluate(model):
-        return 1
-    for i in range(n):
-        k2[i] = model.dx[i] - 2.0 * k1[i] - k2[i]
-    _solve(work, h, k2)
-    for i in range(n):
-        model.x[i] = x[i] + h * (1.5 * k1[i] + 0.5 * k2[i])
-    return set_states(model)
-
-
 @compiled
 def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # type: ignore[no-untyped-def]
     """Fill `errors` (n, c), measured minus predicted; returns a status.
@@ -167,7 +54,7 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # 
         model.u[j] = u[0, j]
     if place(model):
         return 1
-    taken, holds = 0, False
+    holds = False
     for j in range(held.size):
         holds = holds or held[j]
     for k in range(time.size):
@@ -186,13 +73,12 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # 
             if set_states(model):
                 return 1
             interval = time[k] - time[k - 1]
-            steps = max(1, math.ceil(interval / longest - 1e-6))
-            for i in range(1, steps + 1):
+            count = max(1, math.ceil(interval / longest - 1e-6))
+            for i in range(1, count + 1):
                 for j in range(u.shape[1]):
-                    moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / steps
-                    work.between[j] = u[k - 1, j] + moved
-                status = _step(model, work, interval / steps, taken % _KEPT == 0)
-                taken += 1
+                    moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / count
+                    work.to[j] = u[k - 1, j] + moved
+                status = step(model, work, interval / count)
                 if status:
                     return status
             for j in range(u.shape[1]):
@@ -242,7 +128,8 @@ class Predictor:
 
         Returns
         -------
-        errors : (n, c) measured minus predicted.
+        errors : (n, c) measured minus predicted; zero from the second sample on after all that
+            counts.
 
         Raises
         ------
@@ -254,9 +141,10 @@ class Predictor:
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()
+        end = int(samples.blocks[-1, 1]) + 1  # one more, for rates at the last that counts
         status = _predict(
             self._model,
-            samples.time,
+            samples.time[:end],
             samples.u,
             samples.held,
             samples.y,
@@ -265,7 +153,7 @@ class Predictor:
             x0,
             self._longest,
             errors,
-            self._work(),
+            self._steps(),
         )
         checked(status, fmu)
         return errors
@@ -277,19 +165,13 @@ class Predictor:
         places = [self._fmu.states.index(name) for name in lead.states]
         return _Led(*self._leading, np.array(places, np.intp), np.ascontiguousarray(lead.gain))
 
-    def _work(self) -> _Work:
+    def _steps(self) -> Steps:
         """Work space; which states are stiff is judged where the recording begins."""
-        fmu, n = self._fmu, len(self._fmu.states)
+        fmu = self._fmu
         rates = np.abs(fmu.state_jacobian().diagonal()) * self._longest
         stiff = [
             i
             for i, name in enumerate(fmu.states)
             if name in (self._system.states or ()) or rates[i] > _SWIFT
         ]
-        p = len(stiff)
-        return _Work(
-            np.array(stiff, np.intp),
-            *(np.zeros((n, p)), np.zeros((p, 2 * p)), np.zeros(1)),
-            np.zeros(len(self._system.inputs)),
-            *(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(p)),
-        )
+        return steps(fmu, np.array(stiff, np.intp), len(self._system.inputs))

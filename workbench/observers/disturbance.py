@@ -115,24 +115,25 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         status = status or linearise(model, layout.columns)
         fade = fading(layout, y)
         for i in range(s + q):
-            share = fade
+            equation, total, share = system[i], change[i], fade
             if i < s:
                 for k in range(s):
-                    system[i, k] = -h * model.jacobian[states[k], states[i]]
+                    equation[k] = -h * model.jacobian[states[k], states[i]]
                 for k in range(q):
-                    system[i, s + k] = -h * model.jacobian[n + k, states[i]]
-                system[i, i] += 1.0
+                    equation[s + k] = -h * model.jacobian[n + k, states[i]]
+                equation[i] += 1.0
             else:
                 share *= authority(model, layout, settings.effect, i - s)
                 for k in range(s + q):
-                    system[i, k] = 0.0
-                system[i, i] = 1.0 - h * settings.decay[i - s]
+                    equation[k] = 0.0
+                equation[i] = 1.0 - h * settings.decay[i - s]
             for j in range(outputs):
                 # The integral at the end of the step is part of the implicit equation.
                 direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
                 gain = h * (direct + h * integrated)
-                change[i] += gain * innovation[j] + h * integrated * memory.integral[j]
-                add_slope(model, layout, j, gain, settings.places, system[i])
+                total += gain * innovation[j] + h * integrated * memory.integral[j]
+                add_slope(model, layout, j, gain, settings.places, equation)
+            change[i] = total
         status = status or solve(system)
         if status:
             return status

@@ -1,0 +1,3 @@
+within ServoPendulum;
+package Signals "What is wrong between goal, shaft, weight and reading"
+end Signals;

@@ -1,0 +1,94 @@
+"""Steps of the predictor on a body with dry friction, which slides, sticks and breaks away."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from workbench.diagnosis.steps import step, steps
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.kernel import instance
+
+pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench import compiler  # needs the extra
+
+MODEL = """
+within ;
+model Block "A block on a table"
+  parameter Real m(unit = "kg") = 2.0;
+  parameter Real coulomb(unit = "N") = 3.0;
+  parameter Real v0(unit = "m/s") = 1e-5;
+  input Real F(unit = "N");
+  Real x(unit = "m", start = 0.0, fixed = true);
+  Real v(unit = "m/s", start = 1.0, fixed = true);
+equation
+  der(x) = v;
+  m*der(v) = F - coulomb*tanh(v/v0);
+end Block;
+"""
+H = 0.005
+
+
+@pytest.fixture(scope="module")
+def block(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FMU]:
+    folder = tmp_path_factory.mktemp("block")
+    (folder / "Block.mo").write_text(MODEL)
+    path = folder / "Block.fmu"
+    compiler.build(folder / "Block.mo", "Block", path, platforms=[compiler.native()])
+    with FMU(path) as fmu:
+        yield fmu
+
+
+def moved(block: FMU, force: Callable[[float], float], start: float, end: float) -> Matrix:
+    """Positions and velocities in steps of 5 ms, (n, 2), from a velocity at the start."""
+    block.start({"v": start})
+    model, work = instance(block, ["F"], [], []), steps(block, np.array([0, 1]), 1)
+    model.x[:], model.u[0] = block.get_states(), force(0.0)
+    block.set(block.variables(["F"]), model.u)
+    found = [model.x.copy()]
+    for k in range(round(end / H)):
+        work.to[0] = force((k + 1) * H)
+        assert step(model, work, H) == 0
+        found.append(model.x.copy())
+    return np.array(found)
+
+
+def test_a_block_comes_to_rest_where_its_energy_is_spent(block: FMU) -> None:
+    x, v = moved(block, lambda t: 0.0, 1.0, 3.0).T
+    # m v^2/(2 coulomb), after m v/coulomb; half a step of deceleration over a step is 2e-5 m.
+    assert x[-1] == pytest.approx(1.0 / 3.0, abs=4e-5)
+    assert np.abs(v[round(0.68 / H) :]).max() < 1e-9
+    assert x[60] == pytest.approx(0.3 - 0.75 * 0.3**2, abs=1e-6)
+
+
+def test_a_block_sticks_without_chatter_until_it_breaks_away(block: FMU) -> None:
+    x, v = moved(block, lambda t: 2.0 * t, 0.0, 2.5).T
+    stuck = slice(0, round(1.45 / H))
+    # Below 0.97 of the friction it creeps at less than 2.1 v0.
+    assert np.abs(v[stuck]).max() < 2.1e-5
+    assert np.abs(x[stuck]).max() < 3e-5
+    # Then the force grows by 2 N/s above the friction: m v = t^2, for a second.
+    assert v[-1] == pytest.approx(0.5, abs=2e-3)
+    assert x[-1] == pytest.approx(1.0 / 6.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("amplitude", [3.3, 4.0, 8.0])
+def test_stick_and_slip_agree_with_an_error_controlled_integrator(
+    amplitude: float, block: FMU
+) -> None:
+    def force(t: float) -> float:
+        return amplitude * float(np.sin(2.0 * np.pi * t))
+
+    def rates(t: float, state: Vector) -> list[float]:
+        v = state[1]
+        return [v, (force(t) - 3.0 * float(np.tanh(v / 1e-5))) / 2.0]
+
+    found = moved(block, force, 0.0, 2.0)
+    reference = solve_ivp(
+        rates, (0.0, 2.0), [0.0, 0.0], "Radau", np.arange(len(found)) * H, rtol=1e-7, atol=1e-10
+    ).y.T
+    # Which way a step that meets a kink goes there, is known to some thousandths of the motion.
+    assert np.abs(found - reference)[:, 0].max() < 5e-3 * np.abs(reference[:, 0]).max()
