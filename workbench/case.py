@@ -14,8 +14,6 @@ from workbench.system import Condition, System
 from workbench.tables import Table, read_table
 from workbench.units import quantity, si_factor
 
-_MIN_SAMPLES = 20  # fewer say nothing about noise
-
 Value = float | int | str | tuple[Any, ...]
 
 
@@ -55,12 +53,19 @@ class Case:
     @property
     def u(self) -> Matrix:
         """(n, m) measured inputs, SI."""
-        return read_only(np.column_stack([self.signals[name] for name in self.inputs]))
+        return self._table(self.inputs)
 
     @property
     def y(self) -> Matrix:
         """(n, l) measured outputs, SI."""
-        return read_only(np.column_stack([self.signals[name] for name in self.outputs]))
+        return self._table(self.outputs)
+
+    def _table(self, names: Sequence[str]) -> Matrix:
+        """Some signals as columns, also none."""
+        table = np.empty((self.time.size, len(names)))
+        for j, name in enumerate(names):
+            table[:, j] = self.signals[name]
+        return read_only(table)
 
     def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
         """The same case with some signals replaced."""
@@ -194,11 +199,11 @@ def check_recording(time: Vector, system: System, where: str, first_line: int | 
             expected="strictly increasing time",
             remedy="export with more digits, or remove the repeated or misplaced samples",
         )
-    if time.size < _MIN_SAMPLES or time[-1] - time[0] < system.shortest:
+    if time.size < system.fewest or time[-1] - time[0] < system.shortest:
         raise InputError(
             where=where,
             found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
-            expected=f"at least {_MIN_SAMPLES} samples, which tell signal from noise"
+            expected=f"at least {system.fewest} samples, which tell signal from noise"
             + (f", over {system.shortest:g} s" if system.shortest else ""),
             remedy="export the whole recording, from before it begins to its end",
         )

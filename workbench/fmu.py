@@ -240,7 +240,7 @@ class FMU:
         """
         columns = knowns.references.size
         result = np.zeros((columns, unknowns.size))
-        if not self.has_directional_derivatives:
+        if result.size and not self.has_directional_derivatives:
             return self._difference(unknowns, knowns)
         seed = np.ones(1)
         for j in range(columns):

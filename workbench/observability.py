@@ -83,7 +83,8 @@ class LinearTest:
     @property
     def invisible(self) -> tuple[str, ...]:
         """Those of `unobservable` that leave no trace in double precision."""
-        return self._mostly_below(len(self.states) * np.finfo(float).eps * self.information[-1])
+        largest = float(self.information.max(initial=0.0))
+        return self._mostly_below(len(self.states) * np.finfo(float).eps * largest)
 
     def _mostly_below(self, threshold: float) -> tuple[str, ...]:
         share = np.sum(self.directions[:, self.information <= threshold] ** 2, axis=1)

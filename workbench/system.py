@@ -94,10 +94,12 @@ class System:
     export : estimators as FMUs.
     companion : Python package with a virtual rig and more estimators, or a module; empty: none.
     shortest : [s] that a recording must last.
+    fewest : samples that a recording must have.
     settles : [s] in which a model comes to rest at an operating point.
     sample_time : [s] of usual recordings.
     cases : folder of recordings that come with the system, or None.
-    states : of the observer model that the system comes with; observers correct these.
+    states : of the observer model that the system comes with, None before that is known; observers
+        correct these.
     """
 
     name: str
@@ -128,9 +130,10 @@ class System:
     export: Export = field(default_factory=lambda: Export({}, OperatingPoint({}, {}, {})))
     companion: str = ""
     shortest: float = 0.0
+    fewest: int = 20
     settles: float = 10.0
     sample_time: float = 0.005
-    states: tuple[str, ...] = ()
+    states: tuple[str, ...] | None = None
     cases: Path | None = None
 
     @property

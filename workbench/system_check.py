@@ -120,13 +120,14 @@ def _parameters(system: System) -> Iterator[_Reference]:
 def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference]:
     """States and outputs of the model."""
     state, output = "a continuous state of the model", "a variable of the model"
-    states, compared = system.states, system.comparison
+    states, compared = system.states or (), system.comparison
+    shown = (*states, *(one.name for one in system.outputs))
     for name in (*system.walks, *system.spreads):
         yield f"{system.source}, [states.{name}]", name, states, state
     for one in system.estimated:
         if one.acts_on:
             where = f"{system.source}, [estimated] {one.name} acts_on"
-            yield where, one.acts_on, states, state
+            yield where, one.acts_on, shown, f"{state}, or a measured output"
     for signal in system.signals.values():
         if signal.reading != signal.name:
             yield f"{system.source}, {signal.name} reading", signal.reading, variables, output

@@ -42,7 +42,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest sample_time cases"
+        "export shortest fewest sample_time cases"
     )
     return _read(file, path, _models(file, path))
 
@@ -89,7 +89,7 @@ def with_model(system: System, role: str, path: Path | None) -> System:
     return replace(
         changed,
         values={**_values(description), **system.given},
-        states=system.states or description.states,
+        states=description.states if system.states is None else system.states,
     )
 
 
@@ -114,14 +114,13 @@ def _models(file: Table, path: Path) -> dict[str, Model]:
 def _measured(file: Table) -> dict[str, tuple[Signal, ...]]:
     """Measured signals by group."""
     groups = {group: read_measured(file, group) for group in ("inputs", "outputs", "judged")}
-    for group in ("inputs", "outputs"):
-        if not groups[group]:
-            raise InputError(
-                where=file.where,
-                found=f"no [{group}]",
-                expected="measured inputs, which drive the model, and outputs, which correct it",
-                remedy=f"add a table [{group}.NAME] for each",
-            )
+    if not groups["outputs"]:
+        raise InputError(
+            where=file.where,
+            found="no [outputs]",
+            expected="measured outputs, which correct the model",
+            remedy="add a table [outputs.NAME] for each",
+        )
     return groups
 
 
@@ -158,6 +157,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         comparison=Comparison(0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
+        fewest=round(file.number("fewest", "1", 20.0)),
         cases=path.parent / cases if (cases := file.text("cases", "")) else None,
         settles=file.table("points").number("settles", "s", 10.0),
         sample_time=file.number("sample_time", "s"),

@@ -120,7 +120,8 @@ class Estimated:
     spread : standard deviation of what is known of it at the start [unit].
     memory : time in which a deviation is forgotten [s].
     useful : standard deviation from which on an estimate serves [unit].
-    acts_on : state whose rate shows its effect; a correction is in proportion to that. Empty: none.
+    acts_on : state whose rate shows its effect, or output that shows it at once; a correction is in
+        proportion to that. Empty: none.
     claimed : conditions in which it may be claimed, by name; elsewhere it stands in for something
         that the model has not.
     """

@@ -61,7 +61,8 @@ _UNIT = re.compile(
 )
 _REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
 _QUANTITY = re.compile(
-    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?) *(?P<unit>[^0-9., ].*)"
+    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?)"
+    r"(?: *(?=[^0-9., ])| +(?=1/))(?P<unit>.*)"
 )
 
 
@@ -173,6 +174,8 @@ def quantity(text: str, si: str, where: str) -> float:
     --------
     >>> quantity("4.2 bar", "Pa", "case.toml")
     420000.0
+    >>> quantity("0.3 1/s", "1/s", "system.toml")
+    0.3
     """
     match = _QUANTITY.fullmatch(text)
     if match is None:

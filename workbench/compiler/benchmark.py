@@ -70,7 +70,7 @@ def time_sources(description: Description, points: NDArray[np.float64], step: fl
     InputError
         If the FMU has no sources, or they do not compile or run.
     """
-    evaluations = max(100, int(_REPEAT / (50e-9 * len(description.states))))
+    evaluations = max(100, int(_REPEAT / (50e-9 * max(1, len(description.states)))))
     sizes = f"{len(points)} {evaluations} {_REPEATS} {_STEPS} {step}"
     lines = [sizes, *(" ".join(map(repr, point)) for point in points.tolist())]
     with tempfile.TemporaryDirectory() as scratch:

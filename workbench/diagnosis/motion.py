@@ -29,8 +29,8 @@ class Motion:
 
     Attributes
     ----------
-    states : that outputs lead.
-    A, B, C : by states, measured inputs and measured outputs.
+    states : that outputs lead; a model may have none.
+    A, B, C, D : by states, measured inputs and measured outputs.
     nominal : (p,) typical size of the states.
     ratio : of a state that rolls along over the one that leads it, 0 where none does.
     """
@@ -39,6 +39,7 @@ class Motion:
     A: Matrix
     B: Matrix
     C: Matrix
+    D: Matrix
     nominal: Vector
     ratio: float
 
@@ -51,7 +52,8 @@ class Lead:
     ----------
     states : that are corrected.
     gain : (p, l) constant gain.
-    ahead : (l, l) covariance of predicted outputs.
+    ahead : (l, l) covariance of predicted outputs, by what led the states and by inputs that
+        outputs show at once.
     """
 
     states: tuple[str, ...]
@@ -66,8 +68,14 @@ def motion(fmu: FMU, system: System) -> Motion:
     at = [fmu.states.index(name) for name in states]
     inputs = fmu.variables([one.name for one in system.inputs])
     B = fmu.input_jacobian(inputs)[at]
+    outputs = [one.name for one in system.outputs]
+    # A state shows no input at once; not every FMU differentiates it.
+    shown = [name not in fmu.states for name in outputs]
+    D = np.zeros((len(outputs), len(system.inputs)))
+    seen = fmu.variables([name for name, one in zip(outputs, shown, strict=True) if one])
+    D[shown] = fmu.jacobian(seen.references, inputs)
     ratio = rolling_ratio(fmu, system) if system.rolling else 0.0
-    return Motion(states, model.A, B, model.C, model.nominal, ratio)
+    return Motion(states, model.A, B, model.C, D, model.nominal, ratio)
 
 
 def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
@@ -88,14 +96,16 @@ def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
     Phi = transition * scale / scale[:, None]
     C = motion.C * scale / outputs[:, None]
     Q = process / np.outer(scale, scale)
-    nothing = np.zeros((p, len(C)))
+    D = motion.D * inputs / outputs[:, None]
+    R = np.eye(len(C)) + D @ D.T
     try:
-        P = solve_discrete_are(Phi.T, C.T, Q, np.eye(len(C)))
+        P = solve_discrete_are(Phi.T, C.T, Q, R) if p else np.zeros((0, 0))
     except (LinAlgError, ValueError):
-        return Lead(motion.states, nothing, np.zeros((len(C),) * 2))
-    innovation = C @ P @ C.T + np.eye(len(C))
+        # Nothing leads.
+        P, C = np.zeros((p, p)), np.zeros_like(C)
+    innovation = C @ P @ C.T + R
     gain = np.linalg.solve(innovation, C @ P).T * scale[:, None] / outputs
-    ahead: Matrix = (C @ P @ C.T) * np.outer(outputs, outputs)
+    ahead: Matrix = (innovation - np.eye(len(C))) * np.outer(outputs, outputs)
     return Lead(motion.states, gain, ahead)
 
 

@@ -172,6 +172,6 @@ class Predictor:
         stiff = [
             i
             for i, name in enumerate(fmu.states)
-            if name in self._system.states or rates[i] > _SWIFT
+            if name in (self._system.states or ()) or rates[i] > _SWIFT
         ]
         return steps(fmu, np.array(stiff, np.intp), len(self._system.inputs))

@@ -178,6 +178,7 @@ def _influences(simulations: Simulations, k: int) -> dict[str, Vector]:
 
 def _running(values: Vector, h: Vector, system: System) -> Vector:
     width = max(1, round(_RUNNING * system.sample_time / float(np.median(h))))
+    width = min(width, values.size)
     result: Vector = np.convolve(values, np.ones(width) / width, "same")
     return result
 

@@ -224,7 +224,7 @@ def prepare(
         name=case.name,
         time=time,
         inputs=case.inputs,
-        u=np.ascontiguousarray(np.column_stack(driving)),
+        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
         signals=signals,
         y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
         read=np.column_stack([case[name] for name in signals]),

@@ -83,6 +83,8 @@ def _obstacle(question: Finding, description: Description) -> str:
         return "the FMU allows one instance per process; give each worker process one"
     if question in (ROLLBACK_CS, INTERFACES) and simulation is None:
         return "the FMU has no Co-Simulation"
+    if question is INTERFACES and not description.states:
+        return "the FMU has no continuous states, so nothing is integrated"
     if question is INTERFACES and description.event_indicators:
         return "the FMU has events, which only its Co-Simulation treats"
     offered = simulation if question is ROLLBACK_CS and simulation else exchange
@@ -100,9 +102,7 @@ def _start(path: Path, instantiations: int) -> Iterator[Finding]:
         fmu.start({})
         scalar = set(fmu.states) <= set(real_variables(fmu).names)
         rates = fmu.derivatives() if scalar else np.zeros(0)
-    if not fmu.states:
-        reason = "the FMU has no continuous states, so there is nothing to observe"
-    elif not scalar:
+    if not scalar:
         reason = "states are arrays; export the model with scalar variables"
     elif not np.isfinite(rates).all():
         name = fmu.states[int(np.argmin(np.isfinite(rates)))]
@@ -135,6 +135,9 @@ def _reset(path: Path, instantiations: int) -> Iterator[Finding]:
 
 def _inject(path: Path, instantiations: int) -> Iterator[Finding]:
     with FMU(path) as fmu:
+        if not fmu.states:
+            yield replace(INJECTION, passed=True, value=0.0)
+            return
         excitation = excite(fmu)
         before = fmu.derivatives()
         wanted = fmu.get_states() + 0.01 * excitation.nominal

@@ -110,7 +110,7 @@ def walk(fmu: FMU, excitation: Excitation, begin: float) -> tuple[Matrix, float]
             fmu.set(excitation.inputs, excitation.second)
         rates = fmu.derivatives()
         rows.append(fmu.get(everything).copy())
-        pace = float(np.max(np.abs(rates) / excitation.nominal))
+        pace = float(np.max(np.abs(rates) / excitation.nominal, initial=0.0))
         h = min(step_size(fmu), 0.01 / pace if pace > 0.0 else np.inf)
         t += h
         fmu.set_time(t)

@@ -195,7 +195,7 @@ class DisturbanceObserver(Estimator):
         super().__init__(fmu, system, gains)
         names = corrected_states(fmu, system)
         s, q, outputs = len(names), len(system.estimated), len(system.outputs)
-        L = gains.values[:-q].reshape(s + q, 2 * outputs)
+        L = gains.values[: gains.values.size - q].reshape(s + q, 2 * outputs)
         self._settings = Settings(
             layout=self._layout,
             states=np.array([fmu.states.index(name) for name in names], np.intp),
@@ -207,7 +207,7 @@ class DisturbanceObserver(Estimator):
                 np.intp,
             ),
             L=np.ascontiguousarray(L),
-            decay=np.ascontiguousarray(gains.values[-q:]),
+            decay=np.ascontiguousarray(gains.values[gains.values.size - q :]),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
         self._memory = Memory(
@@ -266,11 +266,18 @@ class DisturbanceObserver(Estimator):
         Raises
         ------
         InputError
-            If the outputs do not show a state of the model.
+            If the outputs do not show a state of the model, or there is nothing to estimate.
         """
         names = corrected_states(fmu, system)
         model = linearised(fmu, system).of(names)
         s, q = model.B.shape
+        if s + q == 0:
+            raise InputError(
+                where=f"{system.source}, {cls.name}",
+                found="a model without states, and no [estimated] quantities",
+                expected="something to estimate",
+                remedy="add a table [estimated.NAME], or run the open loop: --estimator open_loop",
+            )
         decay = np.array([-1.0 / one.memory for one in system.estimated])
         extended = np.block([[model.A, model.B], [np.zeros((q, s)), np.diag(decay)]])
         of_states = dict(zip(fmu.states, walks(fmu, system), strict=True))
@@ -314,7 +321,9 @@ class DisturbanceObserver(Estimator):
         orders = np.append(np.hstack([order, order + 1.0]), np.ones(q))
         found = np.append(np.hstack([effect, effect]), np.ones(q))
         space = feedback_space(orders, found, slowest, fastest, gains.values)
-        space.upper[-q:] = 0.0  # a deviation that grows by itself is no disturbance model
+        space.upper[space.upper.size - q :] = (
+            0.0  # a deviation that grows by itself is no disturbance model
+        )
         return space.starting_at(gains.values)
 
     @classmethod
@@ -323,13 +332,18 @@ class DisturbanceObserver(Estimator):
     ) -> tuple[Matrix, Matrix] | None:
         """Errors of states, estimated quantities, integrals of dy, true quantities."""
         (s, q), outputs = B.shape, len(C)
-        L = gains.values[:-q].reshape(s + q, 2 * outputs)
+        L = gains.values[: gains.values.size - q].reshape(s + q, 2 * outputs)
         direct, integrated = L[:, :outputs] @ C, L[:, outputs:]
         square, tall = np.zeros((q, q)), np.zeros((outputs, q))
         dynamics = np.block(
             [
                 [A - direct[:s], -B, -integrated[:s], B],
-                [direct[s:], np.diag(gains.values[-q:]), integrated[s:], square],
+                [
+                    direct[s:],
+                    np.diag(gains.values[gains.values.size - q :]),
+                    integrated[s:],
+                    square,
+                ],
                 [C, tall, np.zeros((outputs, outputs)), tall],
                 [np.zeros((q, s)), square, tall.T, square],
             ]
@@ -339,10 +353,9 @@ class DisturbanceObserver(Estimator):
 
 
 def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
-    """Effect of each quantity on the rate that shows it, at the design point, (q,)."""
+    """Effect of each quantity on the rate or output that shows it, at the design point, (q,)."""
+    shown = dict(zip((one.name for one in system.outputs), model.D, strict=True))
+    shown |= dict(zip(model.states, model.B, strict=True))
     return np.array(
-        [
-            model.B[model.states.index(one.acts_on), i] if one.acts_on else 1.0
-            for i, one in enumerate(system.estimated)
-        ]
+        [shown[one.acts_on][i] if one.acts_on else 1.0 for i, one in enumerate(system.estimated)]
     )

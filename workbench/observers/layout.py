@@ -1,5 +1,6 @@
 """Where laws find the signals of a system in its model, and the steps that all laws are made of."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,8 @@ class Layout(NamedTuple):
     ----------
     seen : (l,) index of the state that is an output, or -1 - index among the model's outputs.
     nominal, low, high : (q,) nominal estimated quantities, and limits of their corrections.
-    acts_on : (q,) state whose rate shows a correction's effect, -1 for none.
+    acts_on : (q,) column of the Jacobian that shows a correction's effect: rate of a state, or an
+        output that is none; -1 for none.
     pace : (l,) coefficients of the outputs in the signal with which feedback fades; half of it is
         left at `half`, 0: it never fades.
     follower, leader : states of which one rolls along with the other, -1 for none.
@@ -52,6 +54,11 @@ def layout(fmu: FMU, system: System) -> Layout:
         else:
             seen.append(-1 - len(system.reported) - unseen)
             unseen += 1
+    shown = {
+        one.name: len(states) - 1 - at
+        for one, at in zip(system.outputs, seen, strict=True)
+        if at < 0
+    }
     nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
     fading, rolling = system.fading, system.rolling
     pace = np.array(system.slopes(fading.signal)) if fading else np.zeros(len(seen))
@@ -63,9 +70,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         nominal=nominal,
         low=np.array([one.low for one in system.estimated]) - nominal,
         high=np.array([one.high for one in system.estimated]) - nominal,
-        acts_on=np.array(
-            [_state(fmu, one.acts_on) if one.acts_on else -1 for one in system.estimated], np.intp
-        ),
+        acts_on=np.array([_column(fmu, one.acts_on, shown) for one in system.estimated], np.intp),
         pace=pace,
         half=fading.half if fading else 0.0,
         follower=follower,
@@ -75,6 +80,11 @@ def layout(fmu: FMU, system: System) -> Layout:
         reported=len(system.reported),
         columns=len(states) + (len(system.reported) + unseen if unseen else 0),
     )
+
+
+def _column(fmu: FMU, name: str, shown: Mapping[str, int]) -> int:
+    """Column of the Jacobian for a state or an output that is none; -1 for no name."""
+    return shown.get(name, -1) if name in shown or not name else _state(fmu, name)
 
 
 def _state(fmu: FMU, name: str) -> int:
@@ -158,7 +168,10 @@ def fading(layout, y):  # type: ignore[no-untyped-def]
 
 @inlined
 def authority(model, layout, effect, i):  # type: ignore[no-untyped-def]
-    """Share of a correction's feedback: its effect over that at the design point, -1 to 1."""
+    """Share of a correction's feedback: its effect over that at the design point, -1 to 1.
+
+    Of outputs, after all columns were linearised.
+    """
     if layout.acts_on[i] < 0:
         return 1.0
     return clip(model.jacobian[model.x.size + i, layout.acts_on[i]] / effect[i], -1.0, 1.0)

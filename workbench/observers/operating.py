@@ -70,7 +70,7 @@ def settle(
     if not extensions:
         A, corrected = fmu.state_jacobian(), corrected_states(fmu, system)
         alone = (A.diagonal() < 0.0) & (np.count_nonzero(A, axis=1) == 1)
-        rests = alone | np.array([name in corrected for name in fmu.states])
+        rests = alone | np.array([name in corrected for name in fmu.states], bool)
     free = [i for i, name in enumerate(fmu.states) if rests[i] and name not in held]
     h = system.settles / _STEPS
     for _ in range(_STEPS if free else 0):
@@ -107,9 +107,11 @@ def linearised(fmu: FMU, system: System) -> LinearModel:
 def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
     """States that observers correct: those of the system's own observer model.
 
-    States that an extension adds, such as a temperature, follow from the model alone.
+    States that an extension adds, such as a temperature, follow from the model alone. A model that
+    names its states otherwise is corrected in all of them.
     """
-    return tuple(name for name in fmu.states if name in system.states) or fmu.states
+    own = fmu.states if system.states is None else system.states
+    return tuple(name for name in fmu.states if name in own) or (fmu.states if own else ())
 
 
 def walks(fmu: FMU, system: System) -> Vector:
@@ -130,11 +132,13 @@ def loops(model: LinearModel) -> tuple[Matrix, Matrix]:
     -------
     orders, effects : (q, l); w^order = effect * gain.
     """
-    values, right = np.linalg.eig(model.A)
-    rates, left = np.linalg.eig(model.A.T)
-    v = right[:, np.argmax(values.real)].real
-    w = left[:, np.argmax(rates.real)].real
-    common = np.outer(v, w @ model.B) / (w @ v) if abs(w @ v) > 0.0 else np.zeros_like(model.B)
+    common = np.zeros_like(model.B)
+    if model.A.size:
+        values, right = np.linalg.eig(model.A)
+        rates, left = np.linalg.eig(model.A.T)
+        v = right[:, np.argmax(values.real)].real
+        w = left[:, np.argmax(rates.real)].real
+        common = np.outer(v, w @ model.B) / (w @ v) if abs(w @ v) > 0.0 else common
     q, outputs = model.B.shape[1], len(model.C)
     orders, effects = np.full((q, outputs), np.nan), np.full((q, outputs), np.nan)
     chain = np.maximum(np.abs(model.B), np.abs(common))

@@ -188,8 +188,8 @@ class ParameterEstimator(Estimator):
         effect = effects(fmu, system, model)
         fastest = 0.1 * np.pi / system.sample_time
         speed, L = fastest, np.zeros((q, 2 * outputs))
-        slack = 1e-9 * np.abs(model.A).max()
-        bearable = max(0.0, float(np.linalg.eigvals(model.A).real.max())) + slack
+        slack = 1e-9 * np.abs(model.A).max(initial=0.0)
+        bearable = float(np.linalg.eigvals(model.A).real.max(initial=0.0)) + slack
         while speed > _SLOWEST * fastest:
             response = model.C @ np.linalg.solve(1j * speed * np.eye(n) - model.A, model.B)
             scaled = (response + model.D) / noise[:, None]

@@ -36,10 +36,10 @@ def draw_observability(one: CaseObservability, path: Path) -> None:
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
         top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
         figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
-        first, unit = system.inputs[0], system.inputs[0].shown
-        values = case[first.name] / per_shown(system, first.name, unit)
-        top.plot(case.time, values, color="#D55E00", label=first.name)
-        top.set_ylabel(f"{first.name} [{unit}]")
+        for first in system.inputs[:1]:
+            values = case[first.name] / per_shown(system, first.name, first.shown)
+            top.plot(case.time, values, color="#D55E00", label=first.name)
+            top.set_ylabel(f"{first.name} [{first.shown}]")
         beside = _beside(system)
         other = top.twinx()
         other.plot(case.time, one.run.signal(beside), color="#0072B2", label=beside)

@@ -1,0 +1,106 @@
+"""Published pressures of closed chambers: read from each layout, and the leaking ones leak."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.api import diagnose
+from workbench.case import read_cases
+from workbench.diagnosis import Outcome
+from workbench.prepare import Recording, write_cases
+from workbench.published.leaking_chamber import PUBLISHED
+from workbench.systems import load_system
+
+CHAMBERS = ("Aluminium", "Formlabs", "Prusa", "Ultimaker_015", "Ultimaker_020")
+
+
+def chamber(number: int, time: np.ndarray) -> np.ndarray:
+    """Pressure [bar]: of the first three chambers it stays, of the others it falls from 5 s on."""
+    leak = 0.0 if number < 3 else 0.1 * number
+    return np.round(7.5 * np.exp(-leak * np.maximum(0.0, time - 4.95)), 3)
+
+
+def folders(folder: Path, time: np.ndarray) -> None:
+    for number, name in enumerate(CHAMBERS):
+        (folder / "chamber" / name).mkdir(parents=True)
+        rows = [f"{t},{p}\n" for t, p in zip(time, chamber(number, time), strict=True)]
+        file = folder / "chamber" / name / "measured.csv"
+        file.write_text("".join(["time [s],pressure [bar]\n", *rows]))
+
+
+def their_files(folder: Path, time: np.ndarray) -> None:
+    """Milliseconds with points between thousands: 3.066.000 are 3066.000 ms."""
+    data = folder / "appendix_compressed-air_chamber" / "data"
+    data.mkdir(parents=True)
+    for number, name in enumerate(CHAMBERS):
+        lines = []
+        for t, p in zip(time, chamber(number, time), strict=True):
+            thousands, rest = divmod(round(1e3 * t), 1000)
+            mark = f"{thousands}.{rest:03d}.000" if thousands else f"{rest}.000"
+            lines.append(f"{mark};{p / 2:.3f};{p}\r\n")
+        (data / f"{name}.csv").write_text("".join(lines))
+
+
+def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
+    time = np.round(0.1 * np.arange(300), 3)
+    their_files(tmp_path / "theirs", time)
+    folders(tmp_path / "ours", time)
+    first = PUBLISHED.layouts[0].read(tmp_path / "theirs")
+    second = PUBLISHED.layouts[1].read(tmp_path / "ours")
+    assert [one.name for one in first] == [one.name for one in second]
+    for one, other in zip(first, second, strict=True):
+        assert one.rows == other.rows
+        for column, values in one.columns.items():
+            assert_allclose(values, other.columns[column], atol=1e-9, err_msg=column)
+
+
+def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path: Path) -> None:
+    time = np.round(0.1 * np.arange(300), 3)
+    folders(tmp_path, time)
+    read = {one.name: one for one in PUBLISHED.layouts[1].read(tmp_path)}
+    held_out = [name for name, one in read.items() if one.held_out]
+    assert held_out == ["Ultimaker_015_below", "Ultimaker_020_below"]
+    assert read["Aluminium_above"].rows == (0, 299)
+    above, below = read["Ultimaker_020_above"], read["Ultimaker_020_below"]
+    assert above.rows[0] == 50
+    assert below.rows == (above.rows[1] + 1, 299)
+    assert pressure(above).min() >= 2.0 > pressure(below).max()
+    assert above.columns["time [s]"][0] == below.columns["time [s]"][0] == 0.0
+
+
+def pressure(one: Recording) -> np.ndarray:
+    return one.columns["p [bar]"]
+
+
+# --- on the recordings, where they are at hand ---
+
+
+@pytest.fixture(scope="module")
+def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    recordings = root.parent / "shared" / "recordings" / "real" / "pneumatic_cylinder"
+    if not recordings.exists():
+        pytest.skip("the recordings are not at hand")
+    folder = tmp_path_factory.mktemp("chambers")
+    write_cases("leaking_chamber", recordings, folder)
+    return folder
+
+
+def diagnosed(cases: Path, name: str, out: Path) -> Outcome:
+    pytest.importorskip("casadi", reason="needs the extra [compiler]")
+    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+    system = load_system("leaking_chamber")
+    above = read_cases([cases / f"{name}_above"], system)
+    return diagnose(system, above, out=out, workers=1, report=lambda line: None)
+
+
+def test_aluminium_is_tight(cases: Path, tmp_path: Path) -> None:
+    assert diagnosed(cases, "Aluminium", tmp_path).diagnosis.verdict == "nothing"
+
+
+@pytest.mark.parametrize("name", ["Prusa", "Ultimaker_015", "Ultimaker_020"])
+def test_a_chamber_that_leaks_does_so_laminarly(cases: Path, tmp_path: Path, name: str) -> None:
+    diagnosis = diagnosed(cases, name, tmp_path).diagnosis
+    assert diagnosis.verdict == "found"
+    assert diagnosis.causes[0].effect.name == "LaminarLeak"

@@ -1,0 +1,91 @@
+"""Published friction of two seals: read from each layout, and its pressure dependence is named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench import published
+from workbench.api import diagnose
+from workbench.case import read_cases
+from workbench.prepare import write_cases
+from workbench.published import seal_friction
+from workbench.systems import load_system
+
+FITTED = (1, 3, 7)  # bar
+
+
+def test_rate_of_a_steady_stroke_is_exact_between_uneven_samples() -> None:
+    time = np.cumsum(np.random.default_rng(1).choice([0.01, 0.011, 0.3], 200, p=[0.6, 0.38, 0.02]))
+    assert_allclose(seal_friction.rate(time, 3.0 - 12.5 * time), -12.5)
+
+
+def test_rate_has_a_tenth_of_the_noise_of_differences() -> None:
+    """Closed form: of n samples h apart, s/h*sqrt(12/(n^3 - n)), as of any line."""
+    time = 0.01 * np.arange(5000)
+    noise = 0.01 * np.random.default_rng(2).standard_normal(time.size)
+    found = np.std(seal_friction.rate(time, noise)[5:-5])
+    assert found == pytest.approx(0.01 / 0.01 * np.sqrt(12.0 / (11**3 - 11)), rel=0.05)
+    assert found < 0.15 * np.std(np.diff(noise) / 0.01)
+
+
+def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
+    """The publisher's are without a header, in ms, with voltages of the sensors in between."""
+    theirs, ours = tmp_path / "theirs", tmp_path / "ours"
+    (theirs / "results_pneumatic-actuator" / "data" / "friction").mkdir(parents=True)
+    t = np.cumsum(np.random.default_rng(3).integers(9, 12, 60))
+    for number, name in enumerate(seal_friction._PUBLISHED):
+        s, p, F = 0.1 * np.arange(60.0), np.full(60, 1.0 + number), 50.0 + np.arange(60.0)
+        lines = [
+            f"{a:.3f}\t3.476\t0.5\t1.07\t{b}\t{c}\t{d}\r\n"
+            for a, b, c, d in zip(t, s, p, F, strict=True)
+        ]
+        file = f"results_pneumatic-actuator/data/friction/{name}.csv"
+        (theirs / file).write_text("".join(lines))
+        (ours / "friction" / name).mkdir(parents=True)
+        rows = [f"{a / 1e3},{b},{c},{d}\n" for a, b, c, d in zip(t, s, p, F, strict=True)]
+        header = "time [s],stroke [mm],pressure [bar],force [N]\n"
+        (ours / "friction" / name / "measured.csv").write_text("".join([header, *rows]))
+    layouts = published.seal_friction.PUBLISHED.layouts
+    first, second = layouts[0].read(theirs), layouts[1].read(ours)
+    assert [one.name for one in first] == [one.name for one in second]
+    assert [one.name for one in first if one.held_out] == ["NAPN_5bar", "O-ring_5bar"]
+    for one, other in zip(first, second, strict=True):
+        assert one.rows == other.rows == (15, 59)
+        for column, values in one.columns.items():
+            assert_allclose(values, other.columns[column], err_msg=column)
+
+
+# --- on the recordings, where they are at hand ---
+
+
+@pytest.fixture(scope="module")
+def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    recordings = root.parent / "shared" / "recordings" / "real" / "pneumatic_cylinder"
+    if not recordings.exists():
+        pytest.skip("the recordings are not at hand")
+    folder = tmp_path_factory.mktemp("seals")
+    write_cases("seal_friction", recordings, folder)
+    return folder
+
+
+@pytest.mark.parametrize(("seal", "before", "after"), [("O-ring", 5.95, 1.0), ("NAPN", 7.9, 1.2)])
+def test_friction_that_grows_with_pressure_is_named(
+    cases: Path, tmp_path: Path, seal: str, before: float, after: float
+) -> None:
+    """What three parameters, fitted by hand, leave of the force: 5.9 and 1.0, 7.9 and 1.2 N."""
+    pytest.importorskip("casadi", reason="needs the extra [compiler]")
+    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+    system = load_system("seal_friction")
+    fitted = read_cases([cases / f"{seal}_{pressure}bar" for pressure in FITTED], system)
+    outcome = diagnose(system, fitted, out=tmp_path, workers=1, report=lambda line: None)
+    assert outcome.diagnosis.verdict == "found"
+    named = {one.effect.name for one in outcome.diagnosis.causes}
+    assert "PressureFriction" in named
+    assert named & {"DryFriction", "PreslidingFriction"}
+    force = np.array([one.rms for one in outcome.errors])
+    count = np.array([one.samples for one in outcome.errors])
+    rms = np.sqrt(count @ force**2 / count.sum())
+    assert rms[0] == pytest.approx(before, rel=0.02)
+    assert rms[1] < after

@@ -1,0 +1,398 @@
+"""Systems without states, without inputs, and with few samples go the way of all others."""
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.__main__ import main
+from workbench.api import diagnose
+from workbench.case import check_recording, read_cases
+from workbench.diagnosis import Outcome
+from workbench.diagnosis.cleaning import deviation_of
+from workbench.diagnosis.motion import led_by, motion
+from workbench.errors import InputError
+from workbench.fitness import check, is_fit
+from workbench.fmu import FMU, CoSimulation
+from workbench.observers.operating import corrected_states
+from workbench.system import System
+from workbench.systems import load_system, open_model
+from workbench.units import quantity
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+BALANCE = """
+package Balance "A spring balance: force by deflection, without a motion of its own"
+  partial model PartialPivot "Slot: friction of the pivot"
+    input Real v(unit="m/s") "Rate of deflection";
+    output Real f(unit="N") "Against it";
+  end PartialPivot;
+
+  model Pivot "Null version"
+    extends PartialPivot;
+  equation
+    f = 0.0;
+  end Pivot;
+
+  model DryFriction "a pivot that rubs"
+    extends PartialPivot;
+    parameter Real fc(unit="N", min=-10.0, max=10.0) = 0.0 "Force";
+  equation
+    f = fc*tanh(v/1e-3);
+    annotation (__Workbench(effect(
+      size="fc", step=0.1, matters=0.05, separation="a slow pull")));
+  end DryFriction;
+
+  model Grease "grease that gives way late"
+    extends PartialPivot;
+    parameter Real d(unit="N.s/m", min=-100.0, max=100.0) = 0.0 "Force per rate";
+    parameter Real tau(unit="s", min=0.05, max=1.0) = 0.2 "Time";
+    Real late(unit="m/s", start=0.0, fixed=true) "Rate that it feels";
+  equation
+    tau*der(late) = v - late;
+    f = d*late;
+    annotation (__Workbench(effect(size="d", step=1.0, matters=1.0, separation="two rates")));
+  end Grease;
+
+  model Observer "The balance that observers run on"
+    parameter Real c(unit="N/m") = 100.0 "Stiffness";
+    input Real s(unit="m") "Deflection";
+    input Real v(unit="m/s") "Its rate";
+    input Real dc(unit="N/m") "Correction of c";
+    output Real F(unit="N") = (c + dc)*s + pivot.f "Force";
+    replaceable Pivot pivot(v=v) constrainedby PartialPivot(v=v) "Pivot";
+  end Observer;
+end Balance;
+"""
+BALANCE_FILE = """
+title = "A spring balance"
+sample_time = "10 ms"
+
+[models]
+observer = { class = "Observer" }
+
+[inputs.s]
+unit = "m"
+noise = "0.1 mm"
+scale = "0.1 m"
+
+[inputs.v]
+unit = "m/s"
+noise = "0.1 mm/s"
+scale = "0.1 m/s"
+
+[outputs.F]
+unit = "N"
+noise = "0.01 N"
+scale = "10 N"
+
+[estimated.c]
+correction = "dc"
+unit = "N/m"
+range = ["50 N/m", "200 N/m"]
+acts_on = "F"
+walk = "1 N/m"
+spread = "5 N/m"
+
+[points.design]
+inputs = { s = "0.05 m" }
+
+[diagnosis.levels]
+c = {}
+"""
+BOTTLE = """
+package Bottle "A closed bottle of gas"
+  partial model PartialLeak "Slot: what leaves"
+    input Real p(unit="Pa") "Pressure over that of the room";
+    output Real rate(unit="Pa/s") "At which it falls";
+  end PartialLeak;
+
+  model Tight "Null version"
+    extends PartialLeak;
+  equation
+    rate = 0.0;
+  end Tight;
+
+  model Pore "a pore that gas leaves by"
+    extends PartialLeak;
+    parameter Real k(unit="1/s", min=0.0, max=1.0) = 0.0 "Rate";
+  equation
+    rate = k*p;
+    annotation (__Workbench(effect(
+      size="k", step=1e-4, matters=1e-5, separation="two pressures")));
+  end Pore;
+
+  model Permeation "gas that passes the wall at a constant rate"
+    extends PartialLeak;
+    parameter Real r(unit="Pa/s", min=-1e4, max=1e4) = 0.0 "Rate";
+  equation
+    rate = r;
+    annotation (__Workbench(effect(size="r", step=10, matters=1, separation="two pressures")));
+  end Permeation;
+
+  model Observer "The bottle that observers run on"
+    parameter Real k(unit="1/s") = 0.0 "Leak";
+    input Real dk(unit="1/s") "Correction of k";
+    output Real p(unit="Pa", start=5e5, fixed=true, nominal=1e5) "Pressure";
+    replaceable Tight leak(p=p) constrainedby PartialLeak(p=p) "Leak";
+  equation
+    der(p) = -(k + dk)*p - leak.rate;
+  end Observer;
+end Bottle;
+"""
+BOTTLE_FILE = """
+title = "A closed bottle"
+sample_time = "1 s"
+
+[models]
+observer = { class = "Observer" }
+
+[outputs.p]
+unit = "Pa"
+shown = "bar"
+noise = "2 mbar"
+scale = "5 bar"
+
+[estimated.k]
+correction = "dk"
+unit = "1/s"
+range = ["0 1/s", "0.3 1/s"]
+walk = "1e-3 1/s"
+acts_on = "p"
+
+[points.design]
+held = { p = "5e5" }
+
+[states.p]
+spread = "10 mbar"
+
+[diagnosis]
+block = "2 s"
+lasting = "10 s"
+least = "20 s"
+"""
+STIFFNESS, FRICTION, LEAK = 103.0, 0.4, 0.01
+
+
+def written(folder: Path, library: str, file: str) -> Path:
+    folder.mkdir()
+    (folder / "package.mo").write_text(library)
+    (folder / "system.toml").write_text(file)
+    return folder
+
+
+def recorded(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
+    case = folder / "recordings" / name
+    case.mkdir(parents=True)
+    (case / "case.toml").write_text(f'title = "{name}"\n[measurement]\nfile = "measured.csv"\n')
+    pd.DataFrame(columns).to_csv(case / "measured.csv", index=False, float_format="%.8g")
+
+
+@pytest.fixture(scope="module")
+def balance(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three pulls, sampled unevenly, with a pivot that rubs."""
+    folder = written(tmp_path_factory.mktemp("small") / "balance", BALANCE, BALANCE_FILE)
+    rng = np.random.default_rng(1)
+    for k in range(3):
+        t = np.cumsum(rng.uniform(0.009, 0.011, 3000))
+        omega = 2.0 * np.pi / (4.0 + k)
+        s, v = 0.05 * (1.0 - np.cos(omega * t)), 0.05 * omega * np.sin(omega * t)
+        F = STIFFNESS * s + FRICTION * np.tanh(v / 1e-3)
+        noise = rng.standard_normal((3, t.size))
+        columns = {"time [s]": t, "s [m]": s + 1e-5 * noise[0], "v [m/s]": v + 1e-4 * noise[1]}
+        recorded(folder, f"{k:02d}_pull", {**columns, "F [N]": F + 0.01 * noise[2]})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bottle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three bottles that leak."""
+    folder = written(tmp_path_factory.mktemp("small") / "bottle", BOTTLE, BOTTLE_FILE)
+    rng = np.random.default_rng(2)
+    for k in range(3):
+        t = np.arange(200.0)
+        p = (5.0 + 0.3 * k) * np.exp(-LEAK * t) + 0.002 * rng.standard_normal(t.size)
+        recorded(folder, f"{k:02d}_leak", {"time [s]": t, "p [bar]": p})
+    return folder
+
+
+def loaded(folder: Path) -> System:
+    return load_system(folder)
+
+
+def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
+    system = loaded(folder)
+    cases = read_cases([folder / "recordings"], system)
+    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
+
+
+def test_a_unit_may_begin_with_one_over() -> None:
+    assert quantity("0.3 1/s", "1/s", "here") == 0.3
+
+
+# --- without states ---
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, fmi: str) -> None:
+    file = tmp_path / "Balance.fmu"
+    build = ["fmu", "build", str(balance / "package.mo"), "Balance.Observer"]
+    assert main([*build, "--fmi", fmi, "--out", str(file)]) == 0
+    findings = check(file, instantiations=10)
+    assert is_fit(findings)
+    (integrated,) = [one for one in findings if "not tried: the FMU has no" in one.reason]
+    assert integrated.name == "Co-Simulation against Model Exchange"
+    for kind in (FMU, CoSimulation):
+        with kind(file) as fmu:
+            fmu.start({})
+            fmu.set(fmu.variables(["s", "dc"]), np.array([0.2, 3.0]))
+            assert fmu.states == ()
+            assert fmu.step(0.01).size == 0
+            assert_allclose(fmu.get(fmu.variables(["F"])), 20.6)
+
+
+def test_estimators_find_the_stiffness_without_a_state(balance: Path, tmp_path: Path) -> None:
+    options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["simulate", str(balance / "recordings" / "00_pull"), *options]) == 0
+    estimates = pd.read_csv(tmp_path / "00_pull.csv")
+    for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf"):
+        # Friction is 5 % of the spring's force there at most, and changes its sign.
+        pulled = estimates["measured.F [N]"] > 8.0
+        found = estimates[f"{name}.c [N/m]"][pulled].mean()
+        assert found == pytest.approx(STIFFNESS, rel=0.02)
+
+
+def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance: Path) -> None:
+    """Closed form: a deviation of 0.1 mm is one of 10 mN, by a stiffness of 100 N/m."""
+    system = loaded(balance)
+    with open_model(system) as fmu:
+        found = motion(fmu, system)
+    lead = led_by(found, np.array([1e-4, 1e-4]), np.array([0.01]), 0.01)
+    assert found.states == ()
+    assert lead.gain.shape == (0, 1)
+    assert_allclose(lead.ahead, [[1e-4]])
+
+
+def test_the_pivot_that_rubs_is_named(balance: Path, tmp_path: Path) -> None:
+    """Beside an effect that brings a state to a model that has none."""
+    outcome = diagnosed(balance, tmp_path)
+    assert outcome.diagnosis.verdict == "found"
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "DryFriction"
+    assert cause.parameters["fc"].low < FRICTION < cause.parameters["fc"].high
+    assert outcome.extension is not None
+    with FMU(outcome.extension.fmu) as extended:
+        assert extended.states == ()
+
+
+def test_states_of_an_extension_are_not_corrected(balance: Path, tmp_path: Path) -> None:
+    """They follow from the model alone, also where it has none of its own."""
+    library = BALANCE.replace("replaceable Pivot pivot(v=v)", "replaceable Grease pivot(v=v)")
+    extended = written(tmp_path / "Balance", library, BALANCE_FILE)
+    file = tmp_path / "Grease.fmu"
+    build = ["fmu", "build", str(extended / "package.mo"), "Balance.Observer"]
+    assert main([*build, "--out", str(file)]) == 0
+    with FMU(file) as fmu:
+        assert fmu.states == ("pivot.late",)
+        assert corrected_states(fmu, loaded(balance)) == ()
+        assert corrected_states(fmu, loaded(extended)) == ("pivot.late",)
+
+
+def test_observability_of_a_quantity_without_a_state(balance: Path, tmp_path: Path) -> None:
+    options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["observability", str(balance / "recordings" / "00_pull"), *options]) == 0
+    windows = pd.read_csv(tmp_path / "00_pull.csv")
+    assert windows["Observer.bound_dc [N/m]"].median() < 0.5
+
+
+def test_a_model_without_anything_to_estimate_is_refused(
+    balance: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """By estimators; the diagnosis asks for none."""
+    known = BALANCE_FILE[: BALANCE_FILE.index("[estimated.c]")] + "[diagnosis.levels]\nc = {}\n"
+    folder = written(tmp_path / "known", BALANCE, known)
+    shutil.copytree(balance / "recordings", folder / "recordings")
+    options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(["simulate", str(folder / "recordings"), *options]) == 2
+    assert "expected something to estimate" in capsys.readouterr().err
+    assert diagnosed(folder, tmp_path, ["DryFriction"]).diagnosis.verdict == "found"
+
+
+def test_a_correction_has_the_sign_by_which_the_output_shows_it(
+    balance: Path, tmp_path: Path
+) -> None:
+    """Pressed instead of pulled, a stiffer spring gives less force and not more."""
+    folder = written(tmp_path / "pressed", BALANCE, BALANCE_FILE)
+    table = pd.read_csv(balance / "recordings" / "00_pull" / "measured.csv")
+    recorded(
+        folder,
+        "00_press",
+        {name: table[name] for name in ("time [s]",)}
+        | {name: -table[name] for name in ("s [m]", "v [m/s]", "F [N]")},
+    )
+    options = ["--system", str(folder), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["simulate", str(folder / "recordings"), *options]) == 0
+    estimates = pd.read_csv(tmp_path / "00_press.csv")
+    pressed = estimates["measured.F [N]"] < -8.0
+    for name in ("disturbance_observer", "parameter_estimator"):
+        found = estimates[f"{name}.c [N/m]"][pressed].mean()
+        assert found == pytest.approx(STIFFNESS, rel=0.02)
+
+
+# --- without inputs, and few samples ---
+
+
+def test_estimators_follow_a_leak_without_an_input(bottle: Path, tmp_path: Path) -> None:
+    options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
+    estimates = pd.read_csv(tmp_path / "00_leak.csv")
+    for name in ("disturbance_observer", "ekf", "ukf"):
+        found = estimates[f"{name}.k [1/s]"].iloc[100:].mean()
+        assert found == pytest.approx(LEAK, rel=0.05)
+
+
+def test_the_pore_is_named_and_not_the_wall(bottle: Path, tmp_path: Path) -> None:
+    diagnosis = diagnosed(bottle, tmp_path).diagnosis
+    assert diagnosis.verdict == "found"
+    (cause,) = diagnosis.causes
+    assert cause.effect.name == "Pore"
+    assert cause.parameters["k"].low < LEAK < cause.parameters["k"].high
+
+
+def test_a_single_recording_will_do(bottle: Path, tmp_path: Path) -> None:
+    system = loaded(bottle)
+    cases = read_cases([bottle / "recordings" / "01_leak"], system)
+    diagnosis = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None).diagnosis
+    (cause,) = diagnosis.causes
+    assert cause.effect.name == "Pore"
+    assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
+
+
+def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:
+    system = loaded(bottle)
+    case = read_cases([bottle / "recordings" / "00_leak"], system)[0].part(slice(12))
+    check_recording(case.time, replace(system, fewest=12), "here, column 'time'")
+    with pytest.raises(InputError, match="12 samples over 11 s; expected at least 20 samples"):
+        check_recording(case.time, system, "here, column 'time'")
+
+
+def test_curvature_of_a_signal_sampled_slowly_is_no_noise() -> None:
+    """A decay of a seventh from sample to sample bends by more than the noise of 3 mbar."""
+    rng = np.random.default_rng(3)
+    noise = 3e2 * rng.standard_normal(40)
+    decay = 7e5 * np.exp(-np.arange(40.0) / 7.0)
+    assert deviation_of(decay + noise) == pytest.approx(3e2, rel=0.4)
+    assert deviation_of(noise) == pytest.approx(3e2, rel=0.4)
+
+
+def test_observability_without_an_input(bottle: Path, tmp_path: Path) -> None:
+    options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
+    assert main(["observability", str(bottle / "recordings" / "00_leak"), *options]) == 0
+    assert (tmp_path / "00_leak.png").is_file()

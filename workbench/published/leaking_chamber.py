@@ -1,0 +1,109 @@
+"""Pressure of closed chambers, most of them printed, that leak."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from workbench.prepare import Layout, Published, Recording
+from workbench.recording import Vector, read_columns
+
+_THEIRS = "appendix_compressed-air_chamber/data"
+_BETWEEN = 2.0  # bar: what is above is fitted, what is below is held out
+_CLOSED = 0.05  # bar from a sample to the next: as long as air comes in, pressure moves by less
+_PUBLISHED = {  # SHA-256: by the publisher, in folders
+    "Aluminium": (
+        "5580b794ef9c83fa8123537de5f9dec87df0f0e4631f8a0f8294ddff2debb667",
+        "31288eecacd270cde69c6c9184c207c0c50869d1de9a7e961788f6a511df1fe0",
+    ),
+    "Formlabs": (
+        "a5314aac7deff4828ee2a3899d159f1f47172dc2ac96cf0354aa5f488a50a6b8",
+        "cafd72e55725d5756d2adf471580837128567e5540064e4333002fa3ab5d4906",
+    ),
+    "Prusa": (
+        "8296b3f1b7b8e80dffb23623be4063322c19e8f61fa955931ef305b56b722e7c",
+        "2914ccd0b4ac5e7fcff2185393c6c2f7ec7676f0cb9d6098a10d403964eb46ae",
+    ),
+    "Ultimaker_015": (
+        "b8991631f490eaa424c655c919f57050aa3c4e8d3cc5f36d6ca20780ba1f27d3",
+        "016eadff37c9ac754094de7c12025d4bbe0432fa9f90b78a6cf624a524b494ad",
+    ),
+    "Ultimaker_020": (
+        "cdcad454a471ed2a098c81e584f9419350ec19343f0b1dc17b4c59d6b5f4e6a5",
+        "9a053a030b8e0674991e6e3aa599f5124e56d370fb13ca26c36dbc8b072d5fb8",
+    ),
+}
+
+
+def _recordings(name: str, time: Vector, pressure: Vector, file: str) -> list[Recording]:
+    """What a chamber shows above and, if it falls so far, below the pressure between."""
+    falls = np.flatnonzero(np.diff(pressure) < -_CLOSED)
+    first = int(falls[0]) + 1 if falls.size else 0
+    low = pressure[first:] < _BETWEEN
+    middle = first + int(np.argmax(low)) if low.any() else pressure.size
+    changed = ["time counts from the first sample that is kept"]
+    if first:
+        changed.append(f"left out: {first} samples, until the supply is closed")
+    parts = {"above": (first, middle), "below": (middle, pressure.size)}
+    return [
+        Recording(
+            f"{name}_{part}",
+            f"Chamber {name}, {part} {_BETWEEN:g} bar",
+            {"time [s]": time[a:b] - time[a], "p [bar]": pressure[a:b]},
+            file,
+            (a, b - 1),
+            tuple(changed),
+            held_out=part == "below",
+        )
+        for part, (a, b) in parts.items()
+        if b > a
+    ]
+
+
+def _read_theirs(folder: Path) -> list[Recording]:
+    found = []
+    for name in _PUBLISHED:
+        file = f"{_THEIRS}/{name}.csv"
+        rows = [line.split(";") for line in (folder / file).read_text().splitlines()]
+        # Time in ms, "3.066.000": all points but the last stand between thousands.
+        time = np.array([float(row[0].replace(".", "")) / 1e6 for row in rows])
+        pressure = np.array([float(row[2]) for row in rows])
+        found += _recordings(name, time, pressure, file)
+    return found
+
+
+def _read_folders(prefix: str, folder: Path) -> list[Recording]:
+    found = []
+    for name in _PUBLISHED:
+        file = f"{prefix}{name}/measured.csv"
+        read = read_columns(folder / file, ("time", "pressure"))
+        found += _recordings(name, read["time"].values, read["pressure"].values, file)
+    return found
+
+
+def _folders(prefix: str) -> Layout:
+    return Layout(
+        "one folder for each chamber, with one sample a second",
+        {f"{prefix}{name}/measured.csv": ours for name, (_, ours) in _PUBLISHED.items()},
+        partial(_read_folders, prefix),
+    )
+
+
+PUBLISHED = Published(
+    title="Pressure of closed chambers: one of aluminium, and printed ones",
+    source="E. Zillen, H. Vallery, G. Smit, 3D printed pneumatic actuator (2021), Delft University "
+    "of Technology, https://github.com/EvaZillen/3D-printed-pneumatic-actuator, commit 6e0bcb46",
+    licence="CC0 1.0",
+    recordings="Five chambers, filled to about 7.5 bar and closed, ten samples a second as "
+    "published. A machine is one chamber: diagnose what it shows above 2 bar, and hold out what it "
+    "shows below; three of them never fall so far.",
+    layouts=(
+        Layout(
+            "the publisher's own files",
+            {f"{_THEIRS}/{name}.csv": theirs for name, (theirs, _) in _PUBLISHED.items()},
+            _read_theirs,
+        ),
+        _folders("chamber/"),
+        _folders(""),
+    ),
+)
