@@ -19,6 +19,7 @@ from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
+from workbench.errors import FMUError
 from workbench.fmu import Vector
 
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
@@ -94,6 +95,13 @@ class Fit:
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
+
+    def tried(self, point: Point) -> Linearised | None:
+        """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""
+        try:
+            return self.at(point)
+        except FMUError:
+            return None
 
     def linearise(
         self,
@@ -253,9 +261,10 @@ class Fit:
         point, halved = self._stepped(best, first, common=common), 0
         worse = self.decides.worse
         for left in reversed(range(rounds)):
-            tried = self.at(point)
-            fall = best.deviance - tried.deviance
-            if better := fall > -worse:
+            tried = self.tried(point)
+            fall = -np.inf if tried is None else best.deviance - tried.deviance
+            better = fall > -worse
+            if tried is not None and better:
                 best, halved = tried, 0
             if left == 0 or abs(fall) < worse or halved == _HALVED:
                 break

@@ -123,7 +123,10 @@ def beyond(one: Fitted, other: Fitted) -> float:
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[Fitted]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    begun = fit.together(partial(_begun, fit, best), rivals)
+    tried = fit.together(partial(_begun, fit, best), rivals)
+    begun = [one for one in tried if one is not None]
+    if not begun:
+        return []
     misfits = _misfits(begun)
     near = misfits < fit.decides.behind * misfits.min()
 
@@ -141,7 +144,7 @@ def _misfits(fits: Sequence[Fitted]) -> Vector:
     return np.array([one.linearised.weighed(inflation) for one in fits])
 
 
-def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted:
+def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | None:
     """First rounds of a fit with one more effect, begun elsewhere where that gained nothing.
 
     A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.
@@ -149,15 +152,19 @@ def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted:
     first, tried = variants[0], []
     halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
     for start in (*variants[:_VARIANTS], *halves):
-        tried.append(extended(fit, best, start, _BEGUN))
-        if _gains(fit, best, tried[-1]):
-            return tried[-1]
-    return min(tried, key=lambda one: one.linearised.deviance)
+        if (one := extended(fit, best, start, _BEGUN)) is None:
+            continue
+        if _gains(fit, best, one):
+            return one
+        tried.append(one)
+    return min(tried, key=lambda one: one.linearised.deviance, default=None)
 
 
-def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted:
-    """Fit with one more effect, begun where it was fitted without."""
-    start, spread = fit.at(joined(before.point, rival)), before.linearised.spread
+def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted | None:
+    """Fit with one more effect, begun where it was fitted without; None: not even begun."""
+    start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
+    if start is None:
+        return None
     return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
 
 
@@ -234,7 +241,9 @@ def lesser(
         kept = tuple(other for other in best.active if other is not effect)
         if frozenset(kept) in known:
             return known[frozenset(kept)]
-        start = fit.at(without(best.point, effect))
+        start = fit.tried(without(best.point, effect))
+        if start is None:  # without it, the others stand for more than the machine can do
+            return known[frozenset()]
         one = fitted(fit, start, kept)
         return replace(one, linearised=fit.linearise(one.linearised, kept))
 

@@ -143,14 +143,16 @@ def _alike(
         if named and set(winner.active) == set(best.active):
             found |= {name: rivals[name] for name in close}
             alike -= set(rivals)
-    alike -= {one.name for one in best.active} | set(found)
+    active = {one.name for one in best.active}
+    found = {name: one for name, one in found.items() if name not in active}
+    alike -= active | set(found)
     others: dict[str, Prospect] = {}
     for score in (score for step in steps for score in step.scores):
         if score.effect.name in alike:
             others.setdefault(score.effect.name, score)
     fits = fit.together(partial(extended, fit, less), list(others.values()))
-    found |= dict(zip(others, fits, strict=True))
-    return {name: one for name, one in found.items() if name not in {e.name for e in best.active}}
+    tried = zip(others, fits, strict=True)
+    return found | {name: one for name, one in tried if one is not None}
 
 
 def _close(fit: Fit, before: Fitted, one: Fitted, best: Fitted) -> bool:
