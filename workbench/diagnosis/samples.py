@@ -214,7 +214,7 @@ def prepare(
     refuse_too_short(case, system, blocks, excluded)
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    deviation = {name: noise_in(clean[name], system.signals[name]) for name in names}
+    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
     gain, lead, ahead = _led(case, system, signals, clean, deviation, wrong, motion)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest, rest_noise = _at_rest(compare, clean, applied)
