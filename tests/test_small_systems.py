@@ -383,6 +383,32 @@ def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:
         check_recording(case.time, system, "here, column 'time'")
 
 
+def test_what_is_before_only_leads_to_what_counts(bottle: Path, tmp_path: Path) -> None:
+    case = tmp_path / "02_leak"
+    shutil.copytree(bottle / "recordings" / "02_leak", case)
+    toml = (case / "case.toml").read_text()
+    (case / "case.toml").write_text(f'{toml}counts_from = "150 s"\n')
+    system = loaded(bottle)
+    fitted = read_cases([bottle / "recordings" / "00_leak"], system)
+    held_out = read_cases([case], system)
+    outcome = diagnose(
+        *(system, fitted),
+        held_out=held_out,
+        effects=["Pore"],
+        out=tmp_path / "out",
+        workers=1,
+        report=lambda line: None,
+    )
+    (error,) = [one for one in outcome.errors if one.held_out]
+    assert error.samples == 50
+    # From the start on: a tight bottle would then stand at 5.6 bar, this one is below 1.3.
+    assert error.rms[0] > 4e5
+    assert error.rms[1] < 300.0
+    (case / "case.toml").write_text(f'{toml}counts_from = "10 min"\n')
+    with pytest.raises(InputError, match=r"counts_from: found '10 min'; expected a time before"):
+        read_cases([case], system)
+
+
 def test_curvature_of_a_signal_sampled_slowly_is_no_noise() -> None:
     """A decay of a seventh from sample to sample bends by more than the noise of 3 mbar."""
     rng = np.random.default_rng(3)

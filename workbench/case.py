@@ -31,6 +31,7 @@ class Case:
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
+    counts_from : s, time before which samples only lead a simulation to those that are compared.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Case:
     outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
+    counts_from: float = -np.inf
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -136,7 +138,7 @@ def read_case(folder: Path, system: System) -> Case:
     conditions = read_conditions(document.table("conditions"), system)
     document.take("measurement", dict)
     measurement = document.table("measurement")
-    measurement.refuse_unknown(("file", "columns"))
+    measurement.refuse_unknown(("file", "columns", "counts_from"))
     source = folder / measurement.take("file", str)
     columns = _column_names(measurement, system)
     time, signals = _read_signals(source, columns, system)
@@ -153,7 +155,19 @@ def read_case(folder: Path, system: System) -> Case:
         outputs=tuple(one.name for one in system.outputs),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
+        counts_from=_counts_from(measurement, time),
     )
+
+
+def _counts_from(measurement: Table, time: Vector) -> float:
+    """Time from which samples are compared with a model [s]."""
+    if "counts_from" not in measurement:
+        return -np.inf
+    begin = measurement.number("counts_from", "s")
+    if begin >= time[-1]:
+        last = f"a time before the last sample, {time[-1]:.9g} s"
+        raise measurement.wrong("counts_from", last)
+    return begin
 
 
 def check_names(names: Mapping[str, Any], where: str, system: System) -> dict[str, str]:

@@ -37,6 +37,7 @@ class Recording:
     changed : what was converted, chosen or cut, for people.
     conditions : of the case, as `case.toml` has them.
     held_out : it is there to judge a fit to the others by.
+    counts_from : time before which samples only lead to those that count [s]; None: all count.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Recording:
     changed: tuple[str, ...] = ()
     conditions: Mapping[str, Any] = field(default_factory=dict)
     held_out: bool = False
+    counts_from: float | None = None
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,10 @@ def _check(path: Path, sha256: str) -> None:
 
 
 def _write_case(folder: Path, one: Recording) -> None:
-    case = {"title": one.title, "measurement": {"file": "measured.csv"}}
+    measurement = {"file": "measured.csv"}
+    if one.counts_from is not None:
+        measurement["counts_from"] = f"{one.counts_from!r} s"
+    case = {"title": one.title, "measurement": measurement}
     conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
     write_whole(folder / "case.toml", tomli_w.dumps(case | conditions))
     rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)

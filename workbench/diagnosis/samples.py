@@ -43,6 +43,7 @@ _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
 # Reasons of every system.
 FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"
+LEADING = "before what counts"
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +208,7 @@ def prepare(
             one.reason: excluded_by(one, clean, system, time, h, applied)
             for one in compare.exclusions
         },
+        LEADING: time < case.counts_from,
         "settling": time < time[0] + compare.settling,
     }
     usable = ~np.logical_or.reduce(list(excluded.values()))

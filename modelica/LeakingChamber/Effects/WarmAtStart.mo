@@ -14,6 +14,7 @@ equation
       separation="the same again some minutes after filling")),
     Documentation(info="<html>
 <p>Filling compresses the air that is there, and warms it by tens of kelvin; the walls take that up
-within seconds, within half a minute where there is no draught.</p>
+within seconds, within half a minute where there is no draught. Ten kelvin
+that are left when the chamber is closed are usual, and no finding.</p>
 </html>"));
 end WarmAtStart;
