@@ -141,7 +141,7 @@ class Predictor:
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()
-        end = int(samples.blocks[-1, 1]) + 1  # one more, for rates at the last that counts
+        end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         status = _predict(
             self._model,
             samples.time[:end],
