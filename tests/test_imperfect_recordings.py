@@ -21,7 +21,7 @@ from workbench import case_from_frame
 from workbench.case import Case
 from workbench.diagnosis import Outcome, diagnose, read_effects
 from workbench.diagnosis.cleaning import outliers
-from workbench.diagnosis.samples import BEYOND
+from workbench.diagnosis.counting import BEYOND
 from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.modelica import read_library

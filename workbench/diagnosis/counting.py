@@ -1,17 +1,95 @@
 """Which samples of a recording count, and the blocks that they make."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.case import Case
-from workbench.diagnosis.cleaning import Mask, runs
+from workbench.diagnosis.cleaning import Mask, bridge, noise_in, outliers, runs, saturated
+from workbench.diagnosis.thresholds import Soundness
 from workbench.errors import InputError
 from workbench.recording import Vector
 from workbench.system import Exclusion, System
 
+# Reasons of every system.
+FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"
+LEADING = "before what counts"
 _EARLY = 50  # samples at usual rates, before anything is applied
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """The signals of a recording made clean, and which samples count.
+
+    Attributes
+    ----------
+    clean : (n,) by signal, bridged where it is wrong; wrong : (n,) where.
+    deviation : standard deviation of the noise of a sample, by signal.
+    excluded : (n,) samples that do not count, by reason.
+    applied : sample at which the recording begins.
+    blocks : (b, 2) first sample and end of each block that counts.
+    missing : number of samples.
+    """
+
+    clean: Mapping[str, Vector]
+    wrong: Mapping[str, Mask]
+    deviation: Mapping[str, float]
+    excluded: Mapping[str, Mask]
+    applied: int
+    blocks: NDArray[np.int64]
+    missing: int
+
+    @property
+    def usable(self) -> Mask:
+        """(n,) samples that count."""
+        usable: Mask = ~np.logical_or.reduce(list(self.excluded.values()))
+        return usable
+
+    @property
+    def told(self) -> Mask:
+        """(n,) samples whose errors are told: those at the limit of a sensor, too."""
+        others = [mask for why, mask in self.excluded.items() if why not in (FAULTY, BEYOND)]
+        told: Mask = self.usable | (self.excluded[BEYOND] & ~np.logical_or.reduce(others))
+        return told
+
+    @property
+    def set_aside(self) -> dict[str, int]:
+        """Number of samples by reason."""
+        counts = {reason: int(mask.sum()) for reason, mask in self.excluded.items()}
+        return {MISSING: self.missing, **counts}
+
+
+def count(case: Case, system: System, names: Sequence[str], sound: Soundness) -> Counted:
+    """Tell which samples of a recording count, by these signals.
+
+    Raises
+    ------
+    InputError
+        If too few do.
+    """
+    compare, time, h = system.comparison, case.time, float(np.median(np.diff(case.time)))
+    beyond = {name: saturated(case[name], system.signals[name]) for name in names}
+    faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}
+    wrong = {name: beyond[name] | faulty[name] for name in names}
+    clean = {name: bridge(time, case[name], wrong[name]) for name in names}
+    applied = applied_at(clean, system, time)
+    own = {
+        one.reason: excluded_by(one, clean, system, time, h, applied) for one in compare.exclusions
+    }
+    excluded = {
+        FAULTY: np.logical_or.reduce(list(faulty.values())),
+        BEYOND: np.logical_or.reduce(list(beyond.values())),
+        **own,
+        LEADING: time < case.counts_from,
+        "settling": time < time[0] + compare.settling,
+    }
+    blocks = blocks_of(~np.logical_or.reduce(list(excluded.values())), time, compare.block, h)
+    refuse_too_short(case, system, blocks, excluded)
+    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
+    missing = int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1)))
+    return Counted(clean, wrong, deviation, excluded, applied, blocks, missing)
 
 
 def refuse_too_short(

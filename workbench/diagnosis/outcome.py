@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
+from workbench.diagnosis.counting import FAULTY, MISSING
 from workbench.diagnosis.residuals import Dependence, Residuals
 from workbench.diagnosis.sample_errors import Errors
-from workbench.diagnosis.samples import FAULTY, MISSING
 from workbench.diagnosis.search import Step
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain

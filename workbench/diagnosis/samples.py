@@ -17,15 +17,11 @@ from scipy.signal import lfilter, lfiltic
 from workbench.case import Case
 from workbench.diagnosis.cleaning import (
     Mask,
-    bridge,
     deviation_of,
     first_value,
-    noise_in,
-    outliers,
-    saturated,
     smooth,
 )
-from workbench.diagnosis.counting import applied_at, blocks_of, excluded_by, refuse_too_short
+from workbench.diagnosis.counting import count
 from workbench.diagnosis.motion import (
     Lead,
     Motion,
@@ -41,9 +37,6 @@ from workbench.system import Channel, Comparison, Mode, System
 
 _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
-# Reasons of every system.
-FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"
-LEADING = "before what counts"
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,33 +187,19 @@ def prepare(
     InputError
         If the recording has too little that counts.
     """
-    compare, time = system.comparison, case.time
-    h, names = float(np.median(np.diff(time))), (*case.inputs, *signals)
-    beyond = {name: saturated(case[name], system.signals[name]) for name in names}
-    faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}
-    wrong = {name: beyond[name] | faulty[name] for name in names}
-    clean = {name: bridge(time, case[name], wrong[name]) for name in names}
-    applied = applied_at(clean, system, time)
-    excluded = {
-        FAULTY: np.logical_or.reduce(list(faulty.values())),
-        BEYOND: np.logical_or.reduce(list(beyond.values())),
-        **{
-            one.reason: excluded_by(one, clean, system, time, h, applied)
-            for one in compare.exclusions
-        },
-        LEADING: time < case.counts_from,
-        "settling": time < time[0] + compare.settling,
-    }
-    usable = ~np.logical_or.reduce(list(excluded.values()))
-    blocks = blocks_of(usable, time, compare.block, h)
-    refuse_too_short(case, system, blocks, excluded)
+    time, h = case.time, float(np.median(np.diff(case.time)))
+    counted = count(case, system, (*case.inputs, *signals), sound)
+    clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
-    gain, lead, ahead = _led(case, system, signals, clean, deviation, wrong, motion)
+    gain, lead, ahead = _led(case, system, signals, clean, deviation, counted.wrong, motion)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
-    rest, rest_noise = _at_rest(compare, clean, applied)
+    rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
+    whitening = _whitening(
+        *(system, clean, deviation, signals, slopes, blocks, counted.usable, ahead)
+    )
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
+    first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
         name=case.name,
@@ -230,34 +209,20 @@ def prepare(
         signals=signals,
         y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
         read=np.column_stack([case[name] for name in signals]),
-        told=usable | _told(excluded),
+        told=counted.told,
         limits=np.array([system.signals[name].limits for name in signals]).T,
         gain=gain,
         lead=lead,
         held=np.array([one.held for one in system.inputs]),
-        begin=_begin(
-            system,
-            {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs},
-            motion,
-        ),
+        begin=_begin(system, first, motion),
         rest=rest,
         rest_noise=rest_noise,
         blocks=blocks,
         slopes=slopes,
-        whitening=_whitening(system, clean, deviation, signals, slopes, blocks, usable, ahead),
+        whitening=whitening,
         modes=modes,
-        set_aside={
-            MISSING: int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1))),
-            **{reason: int(mask.sum()) for reason, mask in excluded.items()},
-        },
+        set_aside=counted.set_aside,
     )
-
-
-def _told(excluded: Mapping[str, Mask]) -> Mask:
-    """Samples at the limit of a sensor that do not count for no other reason."""
-    others = [mask for reason, mask in excluded.items() if reason not in (FAULTY, BEYOND)]
-    told: Mask = excluded[BEYOND] & ~np.logical_or.reduce(others)
-    return told
 
 
 def _led(
