@@ -155,7 +155,7 @@ def _differing(
     with open_model(system) if extension is None else FMU(extension.fmu) as model:
         return {
             recording: {
-                name: value
+                name: float(value)
                 for name, value in values.items()
                 if name in model.defaults and value != model.defaults[name]
             }
