@@ -33,11 +33,11 @@ found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 found.plot().savefig(OUT / "errors.png")
 
 # %%
-# The diagnosis: air is lost, and how much of it is known to some 10 %. By which of five ways,
-# through a gap, a hole or the check valve, or to a consumer, these data cannot tell: the pressure
-# falls by a tenth in each cycle. The summary says so, and what would tell. What remains is above
-# the noise, because the flag is known to 10 s, in which the compressor raises the pressure by 0.2
-# bar.
+# The diagnosis: air is lost, and how much is known to some 13 %. By which of five ways, through a
+# gap, a hole or the check valve, or to a consumer, these data cannot tell, since the pressure
+# falls by less than a fifth in each cycle. The summary says so, and what would tell. What remains
+# is above the noise: the flag is known to 10 s, in which the compressor raises the pressure by
+# 0.2 bar.
 print(found.summary())
 
 # %%
@@ -45,7 +45,8 @@ print(found.summary())
 print(found.extension.modelica.read_text())
 
 # %%
-# The gain, on the cycles to which nothing was fitted but the pressure at their start.
+# The gain, on the cycles to which nothing was fitted but the pressure at their start: to a tenth
+# or less.
 for one in found.errors:
     before, after = (1e-2 * rms for rms in one.rms)  # from Pa
     fate = "held out" if one.held_out else "fitted"

@@ -30,11 +30,11 @@ for seal in ("O-ring", "NAPN"):
     found[seal] = wb.diagnose(system, own, held_out=other, out=OUT / seal)
 
 # %%
-# Where the simulation is wrong: by the same to either side as the stroke turns, the more so the
-# higher the pressure. And the diagnosis: friction of the seal, and that it grows with the
-# pressure. A seal that is sheared before it slides, and what else is small, is named as well,
-# with what these data cannot tell it from. What remains, a tenth of the friction, is grease and
-# rings that are not round.
+# Where the simulation is wrong: with the direction of the stroke. The diagnosis, for both seals:
+# friction, a part of which grows with the pressure, and a seal that is sheared before it slides.
+# The size of each has an interval of 95 %. The load cell or the pressure sensor of the second has
+# a wrong zero, and these data cannot tell which. What remains, about a tenth of the friction, is
+# above the noise: grease, and seals that are not round.
 for seal, one in found.items():
     one.plot().savefig(OUT / f"errors_{seal}.png")
     print(f"\n{seal}\n{one.summary()}")
@@ -44,9 +44,10 @@ for seal, one in found.items():
 print(found["O-ring"].extension.modelica.read_text())
 
 # %%
-# The gain, on the record at 5 bar; and the extended FMU in FMPy, beside the measured force. The
-# start values hold the area of the piston. Between two samples inputs are lines, which FMPy holds
-# over a step: so steps are short.
+# The gain, on the record at 5 bar, to which nothing was fitted: from 6.6 and 9.0 N to 0.9 N. The
+# extended FMU in FMPy shows it, too, beside the measured force. The start values hold the area of
+# the piston. Between two samples inputs are lines, which FMPy holds over a step: so steps are
+# short.
 figure, plots = plt.subplots(2, layout="constrained")
 errors = {}
 for axes, (seal, one) in zip(plots, found.items(), strict=True):
@@ -76,8 +77,9 @@ figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", nco
 figure.savefig(OUT / "fmpy.png")
 
 # %%
-# The chambers, in a few lines: one that was printed leaks as through pores, one of aluminium is
-# tight. What a chamber shows above 2 bar is fitted, what it shows below is held out.
+# The chambers, in a few lines: one that was printed leaks in proportion to its pressure, or by a
+# law that these data cannot tell from that; one of aluminium is tight. What a chamber shows above
+# 2 bar is fitted, what it shows below is held out.
 chamber = wb.load_system("leaking_chamber")
 fitted, held_out = wb.prepare_cases("leaking_chamber", DATA, OUT / "chambers")
 for name in ("Ultimaker_020", "Aluminium"):

@@ -32,10 +32,11 @@ found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 found.plot().savefig(OUT / "errors.png")
 
 # %%
-# The diagnosis: dry or viscous friction, which these motions do not tell apart, friction that
-# grows with the load, and a supply that gives way. Each has an interval of 95 %, and what would
-# tell it from its twins. What remains is above the noise of the encoder: no law of friction is
-# that good.
+# The diagnosis: viscous friction; friction that grows with the load on the gear, the more so
+# close to standstill; and a supply that gives way under current. Each has its size with an
+# interval of 95 %, and its twins if these data have any. A Stribeck curve alone, without the
+# load, is not named. What remains is far above the noise of the encoder: laws of friction are
+# only so good.
 print(found.summary())
 
 # %%
@@ -44,7 +45,8 @@ print(found.summary())
 print(found.extension.modelica.read_text())
 
 # %%
-# The gain, on the gain that nothing was fitted to. The mean absolute error is what is published.
+# The result at the gain that nothing was fitted to, by the mean absolute error: from 128 to 29
+# mrad. The slow motion improves least, because there friction is all that counts.
 for one in found.errors:
     before, after = (1e3 * mean for mean in one.mean_absolute)
     fate = "held out" if one.held_out else "fitted"
