@@ -46,7 +46,8 @@ print(found.summary())
 print(found.extension.modelica.read_text())
 
 # %%
-# The gain, on the record to which nothing was fitted but the levels at its start: a third is left.
+# The gain, on the record to which nothing was fitted but the levels at its start: less than a
+# third is left.
 for one in found.errors:
     fate = "held out" if one.held_out else "fitted"
     print(
