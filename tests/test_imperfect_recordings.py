@@ -7,6 +7,7 @@ recordings are exact solutions of the linear equations, not of the compiled mode
 from collections.abc import Sequence
 from pathlib import Path
 
+import fmpy
 import lxml.html
 import numpy as np
 import pandas as pd
@@ -204,6 +205,31 @@ def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_pa
         # Of normal errors.
         assert one.mean_absolute[1] == pytest.approx(one.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05)
     assert "2 recordings held out" in outcome.summary()
+
+
+def test_another_tool_starts_the_extended_model_as_a_recording_does(
+    heater: System, tmp_path: Path
+) -> None:
+    recordings = cases(heater, [simulated(k, LOSS, 10.0 * k) for k in range(3)])
+    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
+    assert outcome.extension is not None
+    for case in recordings:
+        start = outcome.start_values(case.name)
+        assert start.keys() == {"T", "Tc"}
+        inputs = np.rec.fromarrays([case.time, case["P"], 0.0 * case.time], names="time, P, dGc")
+        result = fmpy.simulate_fmu(
+            str(outcome.extension.fmu),
+            fmi_type="CoSimulation",
+            start_values=start,
+            input=inputs,
+            stop_time=case.time[-1],
+            output_interval=1.0,
+            output=["T"],
+        )
+        # The model has what was planted: noise is left, of which a thousand samples are within 2 %.
+        assert np.std(case["T"] - result["T"]) == pytest.approx(NOISE, rel=0.1)
+    with pytest.raises(InputError, match=r"'03': found no recording of this name"):
+        outcome.start_values("03")
 
 
 def in_steps(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:

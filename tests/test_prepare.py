@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.prepare import PREPARED, write_cases
@@ -64,3 +65,12 @@ def test_what_was_read_and_cut_is_told_to_machines(tmp_path: Path, root: Path) -
     assert told["cases"].keys() == {"estimation", "test"}
     assert told["held_out"] == ["test"]
     assert told["cases"]["test"]["rows"] == [0, 1023]
+
+
+def test_a_script_gets_recordings_to_fit_and_those_held_out(tmp_path: Path, root: Path) -> None:
+    tanks = root.parent / "shared" / "recordings" / "real" / "cascaded_tanks"
+    if not tanks.exists():
+        pytest.skip("the recordings are not at hand")
+    fitted, held_out = wb.prepare_cases("cascaded_tanks", tanks, tmp_path)
+    assert [case.name for case in fitted] == ["estimation"]
+    assert [case.name for case in held_out] == ["test"]

@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
     from workbench.api import observe as observe
+    from workbench.api import prepare_cases as prepare_cases
     from workbench.api import read_cases as read_cases
     from workbench.api import tune as tune
     from workbench.case import Case as Case

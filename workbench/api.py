@@ -27,6 +27,7 @@ from workbench.modelica import read_library
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
 from workbench.observers.gains_file import usual_gains
+from workbench.prepare import write_cases
 from workbench.recording import header
 from workbench.system import OBSERVER, System
 from workbench.systems import load_system, open_model
@@ -50,6 +51,32 @@ def read_cases(path: str | Path | Sequence[str | Path], system: System | None = 
     """
     paths = [path] if isinstance(path, str | Path) else path
     return read_folders([Path(one) for one in paths], system or load_system(usual_system()))
+
+
+def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list[Case], list[Case]]:
+    """Turn a folder of published recordings into case folders, and read them.
+
+    Parameters
+    ----------
+    which : name of a system whose recordings were published.
+    source : folder that holds them.
+    out : a new folder for the cases, or one that was written so before.
+
+    Returns
+    -------
+    fitted, held_out : recordings, those to judge a fit by apart.
+
+    Raises
+    ------
+    InputError
+        If the recordings are not in `source`, or are not those that were published.
+    """
+    held_out = {one.name for one in write_cases(which, Path(source), Path(out)) if one.held_out}
+    cases = read_cases(out, load_system(which))
+    return (
+        [case for case in cases if case.name not in held_out],
+        [case for case in cases if case.name in held_out],
+    )
 
 
 def case_from_frame(

@@ -104,12 +104,15 @@ def diagnose(
             )
             base, best = diagnosis.base, diagnosis.best
             errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
+            starts = fit.unknowns.starts(best.point)
             if held_out:
                 report("errors on recordings that were held out")
                 fitted = (everything, simulations, effects, base, best)
-                errors += held_out_errors(*fitted, held_out, workers)
+                more, their_starts = held_out_errors(*fitted, held_out, workers)
+                errors, starts = errors + more, starts | their_starts
             observers = _observers(simulations, diagnosis, extension, report)
-            return _outcome(simulations, fit, diagnosis, extension, observers, errors)
+            starts = _differing(system, extension, starts)
+            return _outcome(simulations, fit, diagnosis, extension, observers, errors, starts)
 
 
 def _outcome(
@@ -119,6 +122,7 @@ def _outcome(
     extension: Extension | None,
     observers: Mapping[str, Mapping[str, tuple[float, float]]],
     errors: Sequence[Errors],
+    starts: Mapping[str, Mapping[str, float]],
 ) -> Outcome:
     """All that was found, with what shows it."""
     unknowns, point = fit.unknowns, diagnosis.best.point
@@ -140,7 +144,23 @@ def _outcome(
         observers=observers,
         extension=extension,
         errors=tuple(errors),
+        starts=starts,
     )
+
+
+def _differing(
+    system: System, extension: Extension | None, starts: Mapping[str, Mapping[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Of start values by recording, those of the last model that it does not have itself."""
+    with open_model(system) if extension is None else FMU(extension.fmu) as model:
+        return {
+            recording: {
+                name: float(value)
+                for name, value in values.items()
+                if name in model.defaults and value != model.defaults[name]
+            }
+            for recording, values in starts.items()
+        }
 
 
 def build_everything(

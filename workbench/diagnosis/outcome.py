@@ -16,6 +16,7 @@ from workbench.diagnosis.sample_errors import Errors
 from workbench.diagnosis.search import Step
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
+from workbench.errors import InputError, closest
 from workbench.system import Channel, Signal, System
 from workbench.units import si_factor
 
@@ -58,6 +59,7 @@ class Outcome:
         model before and after; empty where nothing was extended or it was not measured, and for
         effects that turn with a shaft, whose phase an observer does not know.
     errors : of the nominal and of the last model, by recording and channel.
+    starts : see `start_values`, by recording.
     """
 
     system: System
@@ -71,6 +73,7 @@ class Outcome:
     observers: Mapping[str, Mapping[str, tuple[float, float]]]
     extension: Extension | None
     errors: tuple[Errors, ...]
+    starts: Mapping[str, Mapping[str, float]]
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -206,6 +209,7 @@ class Outcome:
             "set_aside": {name: dict(counts) for name, counts in self.set_aside.items()},
             "channels": {one.name: one.unit for one in self.channels},
             "errors": [asdict(one) for one in self.errors],
+            "start_values": {name: dict(values) for name, values in self.starts.items()},
             "observers": {
                 name: {
                     recording: {"before": _known(before), "after": _known(after)}
@@ -215,6 +219,32 @@ class Outcome:
             },
             "cases": [case.name for case in self.cases],
         }
+
+    def start_values(self, recording: str) -> dict[str, float]:
+        """What the last model has to start with in order to simulate a recording, in any tool.
+
+        Parameters
+        ----------
+        recording : name of one that was fitted or held out.
+
+        Returns
+        -------
+        values : states at the start, and parameters that differ between recordings, by name of the
+            FMU's variables, in their units (SI); those that its FMU has anyway are left out.
+
+        Raises
+        ------
+        InputError
+            If there is no such recording.
+        """
+        if recording not in self.starts:
+            raise InputError(
+                where=f"recording '{recording}'",
+                found=f"no recording of this name{closest(recording, self.starts)}",
+                expected=f"one of {', '.join(self.starts)}",
+                remedy="correct the name",
+            )
+        return dict(self.starts[recording])
 
     def plot(self, recording: str = "") -> "Figure":
         """Figure of the prediction errors of a recording, before and after.

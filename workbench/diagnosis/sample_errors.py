@@ -77,7 +77,7 @@ def held_out_errors(
     after: Fitted,
     cases: Sequence[Case],
     workers: int,
-) -> list[Errors]:
+) -> tuple[list[Errors], dict[str, dict[str, float]]]:
     """Errors on recordings that no common unknown was fitted to.
 
     Of these recordings, only what differs from one to the other by nature is fitted: states at the
@@ -88,6 +88,11 @@ def held_out_errors(
     everything : FMU with all effects.
     fitted : the other recordings.
     before, after : the nominal and the last model, as fitted to those.
+
+    Returns
+    -------
+    errors : of both models.
+    starts : of the last model, by recording, see `Unknowns.starts`.
     """
     with Simulations(everything, fitted.system, fitted.given, cases, workers) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
@@ -98,4 +103,5 @@ def held_out_errors(
             phases = {name: np.zeros(len(cases)) for name in one.point.phases}
             point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)
             ends.append(fit.refine(fit.at(point), one.active, ROUNDS, common=False))
-        return errors_of(simulations, *ends, held_out=True)
+        starts = fit.unknowns.starts(ends[-1].point)
+        return errors_of(simulations, *ends, held_out=True), starts

@@ -124,6 +124,14 @@ class Unknowns:
         """Values of the FMU's variables, and of delays, in each recording."""
         return [self._values(point, k) for k in range(self.count)]
 
+    def starts(self, point: Point) -> dict[str, dict[str, float]]:
+        """All that a simulation of each recording starts with: states as measured, and `values`."""
+        begins, values = self._simulations.begin, self.values(point)
+        return {
+            name: {**begin, **known}
+            for name, begin, known in zip(self.names, begins, values, strict=True)
+        }
+
     def _values(self, point: Point, k: int) -> dict[str, float]:
         case = self._simulations.cases[k]
         values = {**self._simulations.given, **self._set_by(case)}

@@ -1,0 +1,133 @@
+"""The tutorials: each runs on its recordings, and what it tells is what was found."""
+
+import runpy
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import workbench as wb
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+DATA = {
+    "cascaded_tanks": "cascaded_tanks",
+    "servo_pendulum": "servo_pendulum",
+    "pneumatic_cylinder": "pneumatic_cylinder",
+    "air_supply": "metro_air_supply",
+}
+Names = dict[str, Any]
+
+
+@pytest.fixture
+def run(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Names]:
+    """Runs a tutorial; returns its names."""
+    mpl.use("agg")
+
+    def executed(tutorial: str, data: Path | None = None) -> Names:
+        folder = data or root.parent / "shared" / "recordings" / "real" / DATA[tutorial]
+        if data is None and not folder.exists():
+            pytest.skip("the recordings are not at hand")
+        script = root / "tutorials" / f"{tutorial}.py"
+        monkeypatch.setattr(sys, "argv", [str(script), str(folder), str(tmp_path / "out")])
+        names = runpy.run_path(str(script), run_name="__main__")
+        assert (tmp_path / "out" / "fmpy.png").stat().st_size > 10_000
+        return names
+
+    return executed
+
+
+def causes(found: wb.Outcome) -> list[set[str]]:
+    """Each cause with those that it cannot be told from, strongest first."""
+    return [{one.effect.name, *one.confusable_with} for one in found.diagnosis.causes]
+
+
+def held_out(found: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
+    """Error of all samples that were not fitted, before and after."""
+    told = [one for one in found.errors if one.held_out]
+    power = 2.0 if measure == "rms" else 1.0
+    each = np.array([getattr(one, measure) for one in told]) ** power
+    before, after = np.average(each, axis=0, weights=[one.samples for one in told]) ** (1.0 / power)
+    return float(before), float(after)
+
+
+def own(found: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
+    """Error of the extended model along one recording, as the diagnosis tells it."""
+    (told,) = (one for one in found.errors if one.recording == case.name)
+    pair: tuple[float, float] = getattr(told, measure)
+    return pair[1]
+
+
+@pytest.mark.parametrize("tutorial", DATA)
+def test_a_folder_without_the_recordings_is_refused(
+    tutorial: str, run: Callable[..., Names], tmp_path: Path
+) -> None:
+    with pytest.raises(wb.InputError, match="no such folder"):
+        run(tutorial, tmp_path / "nowhere")
+
+
+def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run: Callable[..., Names]) -> None:
+    names = run("cascaded_tanks")
+    found = names["found"]
+    groups = causes(found)
+    for effect in ("UpperOverflow", "LowerOverflow", "SensorCurvature", "PumpDeadZone"):
+        assert any(effect in group for group in groups)
+    share = next(
+        one.parameters["share"]
+        for one in found.diagnosis.causes
+        if one.effect.name == "UpperOverflow"
+    )
+    assert 0.0 < share.low < share.high < 1.0
+    assert held_out(found) == pytest.approx((0.70, 0.20), abs=0.01)
+    assert found.diagnosis.gain.after > 10.0
+    # Another integrator, and all samples.
+    assert names["error"] == pytest.approx(own(found, names["case"]), rel=0.05)
+
+
+def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names]) -> None:
+    names = run("servo_pendulum")
+    found = names["found"]
+    named = {one.effect.name for one in found.diagnosis.causes}
+    assert {"ViscousFriction", "LoadStribeck", "SupplyResistance"} <= named
+    assert "Stribeck" not in named
+    measure = "mean_absolute"
+    assert held_out(found, measure) == pytest.approx((0.128, 0.029), abs=1e-3)
+    ratios = {
+        one.recording: one.mean_absolute[1] / one.mean_absolute[0]
+        for one in found.errors
+        if one.held_out
+    }
+    assert max(ratios, key=ratios.__getitem__) == "kp200_up_and_down"
+    assert names["error"] == pytest.approx(own(found, names["case"], measure), rel=0.05)
+
+
+def test_friction_of_both_seals_grows_with_pressure(run: Callable[..., Names]) -> None:
+    names = run("pneumatic_cylinder")
+    found = names["found"]
+    for seal, before in (("O-ring", 6.6), ("NAPN", 9.0)):
+        named = {one.effect.name for one in found[seal].diagnosis.causes}
+        assert {"PressureFriction", "PreslidingFriction"} <= named
+        assert held_out(found[seal]) == pytest.approx((before, 0.95), abs=0.05)
+        # The first second, in which the machine starts, is told by FMPy alone.
+        assert names["errors"][seal] == pytest.approx(held_out(found[seal])[1], rel=0.1)
+    assert {"LoadCellOffset", "PressureOffset"} in causes(found["NAPN"])
+    assert "LaminarLeak" in causes(found["Ultimaker_020"])[0]
+    assert held_out(found["Ultimaker_020"]) == pytest.approx((6.16e5, 0.06e5), rel=0.05)
+    assert found["Aluminium"].diagnosis.verdict == "nothing"
+
+
+def test_train_loses_air_in_one_of_five_ways(run: Callable[..., Names]) -> None:
+    names = run("air_supply")
+    found = names["found"]
+    (group,) = causes(found)
+    assert {"LaminarLeak", "OrificeLeak", "CheckValveLeak", "SteadyConsumption"} < group
+    assert len(group) == 5
+    assert held_out(found) == pytest.approx((0.76e5, 0.048e5), rel=0.02)
+    # FMPy holds the flag over a twentieth of a sample.
+    assert names["error"] == pytest.approx(own(found, names["case"]), rel=0.05)
