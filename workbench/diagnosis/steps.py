@@ -1,9 +1,9 @@
-"""Steps of a stiff model, which may have kinks, such as dry friction.
+"""Steps of a stiff model, which may have kinks, such as Coulomb friction.
 
 Where the model is smooth, a step is linearly implicit and its Jacobian serves several. A step that
 meets the model otherwise than its Jacobian says is taken again with a new one; if that does not
-serve either, as where a body comes to rest under dry friction, it is solved for, by Newton's method
-in two halves. A body that sticks then stays where it is, without chatter.
+serve either, as where a body comes to rest under Coulomb friction, it is solved for, by Newton's
+method in two halves. A body that sticks then stays where it is, without chatter.
 """
 
 import math

@@ -120,7 +120,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         before, after = (chosen.validation.squares(one, fast=fast) for one in (base, best))
         gain = _gain(fit.tests, before, after)
         alone = [one.effect for one in chosen.steps[0].scores]  # best first
-        causes = [_cause(fit, chosen, effect) for effect in sorted(best.active, key=alone.index)]
+        # What turns with a shaft is scored by errors of blocks, and leaves none that last.
+        ordered = sorted(best.active, key=lambda one: (one.order_locked, alone.index(one)))
+        causes = [_cause(fit, chosen, effect) for effect in ordered]
     presence = fit.unknowns.presence
     return Diagnosis(
         verdict=verdict,
