@@ -79,7 +79,7 @@ class Diagnosis:
     ----------
     verdict : see `Verdict`.
     interrupted : whether the search was ended before its end, so that there may be more causes.
-    causes : strongest first: that which alone would explain most; empty unless something was found.
+    causes : as found, each explaining most of what those before it leave; empty unless found.
     gain : None when nothing was extended.
     partial : effects that explain a part of what remains unexplained.
     base, best : the nominal model and the last one, fitted.
@@ -119,10 +119,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         fast = any(effect.order_locked for effect in best.active)
         before, after = (chosen.validation.squares(one, fast=fast) for one in (base, best))
         gain = _gain(fit.tests, before, after)
-        alone = [one.effect for one in chosen.steps[0].scores]  # best first
-        # What turns with a shaft is scored by errors of blocks, and leaves none that last.
-        ordered = sorted(best.active, key=lambda one: (one.order_locked, alone.index(one)))
-        causes = [_cause(fit, chosen, effect) for effect in ordered]
+        causes = [_cause(fit, chosen, effect) for effect in best.active]
     presence = fit.unknowns.presence
     return Diagnosis(
         verdict=verdict,
