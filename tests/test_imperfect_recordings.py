@@ -182,6 +182,12 @@ def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -
         diagnosed(differing, cases(differing, [simulated(1, LOSS, 0.0)]), tmp_path)
 
 
+def test_a_single_recording_too_short_for_two_parts_is_refused(tmp_path: Path) -> None:
+    brief = system(tmp_path / "brief", '[diagnosis]\nlasting = "60 s"\nleast = "90 s"')
+    with pytest.raises(InputError, match=r"one recording, 110 s that count.*120 s or more"):
+        diagnosed(brief, cases(brief, [simulated(1, LOSS, 0.0)[:110]]), tmp_path)
+
+
 def test_a_state_that_nobody_measured_starts_where_the_recording_says(
     heater: System, tmp_path: Path
 ) -> None:

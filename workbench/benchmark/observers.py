@@ -8,8 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,10 +116,17 @@ def tuned_names(system: System) -> list[str]:
     return [name for name, kind in choose(system, []).items() if kind.tunable]
 
 
-def time_observers(case: Case, system: System) -> list[ObserverTimes]:
+def time_observers(
+    case: Case, system: System, report: Callable[[str], None]
+) -> list[ObserverTimes]:
     """Time the model alone and all observers on one recording, on the full model too.
 
     What they are measured against is written for FMUs of FMI 2.0 with C sources.
+
+    Parameters
+    ----------
+    report : takes a line on an observer that has no row, since gains by reason need not bear a
+        larger model at the rates that are measured.
     """
     names = tuned_names(system)
     kinds = choose(system, names)
@@ -133,8 +140,10 @@ def time_observers(case: Case, system: System) -> list[ObserverTimes]:
     if FULL in system.models and larger:
         with opened(system, larger, FULL) as estimators:
             for one in estimators:
-                with suppress(FMUError):  # gains by reason need not bear a larger model
+                try:
                     times.append(_time(case, one, None, None))
+                except FMUError as error:
+                    report(f"{one.name} on the {FULL} model is not timed: {error}")
     return times
 
 

@@ -16,12 +16,13 @@ import numpy as np
 from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
+from workbench.diagnosis.counting import refuse_too_few
 from workbench.diagnosis.evidence import Simulated, Simulations, delay, simulating
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
-from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors, refuse_too_few
+from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError

@@ -92,6 +92,24 @@ def count(case: Case, system: System, names: Sequence[str], sound: Soundness) ->
     return Counted(clean, wrong, deviation, excluded, applied, blocks, missing)
 
 
+def refuse_too_few(cases: Sequence[Case], system: System) -> None:
+    """Refuse recordings of which none can be held out.
+
+    Raises
+    ------
+    InputError
+        If there is only one, and parameters differ from recording to recording.
+    """
+    compare = system.comparison
+    if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
+        raise InputError(
+            where="recordings",
+            found=str(len(cases)),
+            expected="two or more, because a cause is judged on those it was not fitted to",
+            remedy="give the folder that holds all recordings of one machine",
+        )
+
+
 def refuse_too_short(
     case: Case, system: System, blocks: NDArray[np.int64], excluded: Mapping[str, Mask]
 ) -> None:

@@ -19,7 +19,7 @@ from workbench.diagnosis.linearised import Linearised, Point, between, slowness
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
-from workbench.errors import FMUError
+from workbench.errors import FMUError, InputError
 from workbench.fmu import Vector
 
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
@@ -40,6 +40,11 @@ class Fit:
     effects : that may be asked for.
     decides : thresholds, those of the usual rate of false alarms if none are given.
     beside : other recordings of the machine, whose conditions say what it has too.
+
+    Raises
+    ------
+    InputError
+        If a single recording is too short for two parts, of which one is held out.
     """
 
     def __init__(
@@ -54,6 +59,15 @@ class Fit:
         self.decides = decides or thresholds(len(effects), left=self._compare.left)
         self.unknowns = Unknowns(simulations, effects, beside)
         self._hidden = slice(0)  # blocks that do not count
+        if self.unknowns.count == 1 and not beside and self.parts < 2:
+            one, compare = simulations.recordings[0], self._compare
+            raise InputError(
+                where=one.name,
+                found=f"one recording, {compare.block * len(one.blocks):.3g} s that count",
+                expected=f"{2 * compare.lasting:g} s or more of one alone, because a cause is "
+                "judged on a part it was not fitted to",
+                remedy="give more recordings of this machine, or a longer one",
+            )
 
     def without(self, part: int) -> "Fit":
         """The same without one part of a single recording."""

@@ -13,8 +13,6 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import ROUNDS, Fitted
-from workbench.errors import InputError
-from workbench.system import System
 
 
 @dataclass(frozen=True)
@@ -35,24 +33,6 @@ class Errors:
     samples: int
     rms: tuple[float, float]
     mean_absolute: tuple[float, float]
-
-
-def refuse_too_few(cases: Sequence[Case], system: System) -> None:
-    """Refuse recordings of which none can be held out.
-
-    Raises
-    ------
-    InputError
-        If there is only one, and parameters differ from recording to recording.
-    """
-    compare = system.comparison
-    if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
-        raise InputError(
-            where="recordings",
-            found=str(len(cases)),
-            expected="two or more, because a cause is judged on those it was not fitted to",
-            remedy="give the folder that holds all recordings of one machine",
-        )
 
 
 def errors_of(
