@@ -4,7 +4,6 @@ A heated block whose casing takes some of the heat; the casing's temperature is 
 recordings are exact solutions of the linear equations, not of the compiled model.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -18,95 +17,16 @@ from scipy.linalg import expm
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import case_from_frame
-from workbench.case import Case
-from workbench.diagnosis import Outcome, diagnose, read_effects
 from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.counting import BEYOND
 from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
-from workbench.modelica import read_library
 from workbench.report.diagnosis import write_diagnosis
 from workbench.system import System
-from workbench.systems import load_system
 
-LIBRARY = """within ;
-package Heater "A heated block in a casing"
-  partial model PartialLoss "Slot: from temperature to heat"
-    input Real T(unit="K") "Above the surroundings";
-    output Real Q(unit="W") "Lost";
-  end PartialLoss;
+from .heater import NOISE, cases, diagnosed, system
 
-  model NoLoss "Null version"
-    extends PartialLoss;
-  equation
-    Q = 0.0;
-  end NoLoss;
-
-  model Draught "a draught that takes heat"
-    extends PartialLoss;
-    parameter Real G(unit="W/K", min=0.0, max=5.0) = 0.0 "Conductance";
-  equation
-    Q = G*T;
-    annotation (__Workbench(effect(
-      size="G", step=1e-3, matters=0.02, separation="the surface in a closed box")));
-  end Draught;
-
-  model Radiation "heat that is radiated"
-    extends PartialLoss;
-    parameter Real s(unit="W/K2", min=0.0, max=0.1) = 0.0 "Quadratic part";
-  equation
-    Q = s*T*abs(T);
-    annotation (__Workbench(effect(
-      size="s", step=1e-5, matters=5e-4, separation="a hotter block")));
-  end Radiation;
-
-  model Observer "Block and casing"
-    parameter Real C(unit="J/K") = 100.0 "Heat capacity of the block";
-    parameter Real Cc(unit="J/K") = 200.0 "Heat capacity of the casing";
-    parameter Real K(unit="W/K") = 2.0 "From block to casing";
-    parameter Real Gc(unit="W/K") = 0.5 "From casing to the surroundings";
-    input Real P(unit="W") "Heating power";
-    input Real dGc(unit="W/K") "Correction of Gc";
-    output Real T(unit="K", start=0.0, fixed=true, nominal=20.0) "Block";
-    Real Tc(unit="K", start=0.0, fixed=true, nominal=20.0) "Casing";
-    replaceable NoLoss loss(T=T) constrainedby PartialLoss(T=T) "From the block";
-  equation
-    C*der(T) = P - K*(T - Tc) - loss.Q;
-    Cc*der(Tc) = K*(T - Tc) - (Gc + dGc)*Tc;
-  end Observer;
-end Heater;
-"""
-SYSTEM = """
-name = "heater"
-title = "A heated block in a casing"
-sample_time = "1 s"
-
-[models]
-observer = {{ class = "Observer" }}
-
-[inputs.P]
-unit = "W"
-noise = "0 W"
-scale = "40 W"
-held = true
-
-[outputs.T]
-unit = "K"
-noise = "0.05 K"
-scale = "20 K"
-{sensor}
-
-[states.Tc]
-spread = "30 K"
-
-[estimated.Gc]
-correction = "dGc"
-unit = "W/K"
-range = ["0.1 W/K", "2 W/K"]
-walk = "0.01 W/K"
-"""
-LOSS, NOISE, SECONDS = 0.2, 0.05, 1200  # [W/K] planted; [K], [s]
+LOSS, SECONDS = 0.2, 1200  # [W/K] planted; [s]
 
 
 def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
@@ -128,25 +48,6 @@ def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
     return pd.DataFrame(
         {"time [s]": np.arange(SECONDS, dtype=float), "P [W]": power, "T [K]": measured}
     )
-
-
-def system(folder: Path, sensor: str = "") -> System:
-    folder.mkdir()
-    (folder / "package.mo").write_text(LIBRARY)
-    (folder / "system.toml").write_text(SYSTEM.format(sensor=sensor))
-    return load_system(folder)
-
-
-def cases(of: System, frames: Sequence[pd.DataFrame]) -> list[Case]:
-    return [case_from_frame(of, frame, name=f"{k:02}") for k, frame in enumerate(frames)]
-
-
-def diagnosed(
-    of: System, fitted: Sequence[Case], out: Path, held_out: Sequence[Case] = ()
-) -> Outcome:
-    library = read_library(of.library)
-    effects = read_effects(library, "Observer")
-    return diagnose(of, fitted, library, effects, out, 1, lambda _: None, held_out=held_out)
 
 
 @pytest.fixture(scope="module")
