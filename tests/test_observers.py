@@ -219,14 +219,16 @@ def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(
     assert np.abs(difference).mean() < 0.5 * sigma.mean()
 
 
-def test_kalman_filters_run_on_the_full_model_too(fmu: FMU, root: Path) -> None:
+@pytest.mark.parametrize("name", ["disturbance_observer", "ekf", "ukf"])
+def test_observers_run_on_the_full_model_too(fmu: FMU, root: Path, name: str) -> None:
+    """Whose suspension and rocker swing without being measured."""
     case, _ = recorded_stop(fmu, muDC=drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
-        for kind in (ExtendedKalmanFilter, UnscentedKalmanFilter):
-            estimator = kind(full, WHEELSET, kind.reasoned(full, WHEELSET))
-            judged = score(case, replay(case, estimator), WHEELSET)
-            assert judged.nrmse is not None
-            assert judged.nrmse < 0.02
+        kind = estimators(WHEELSET)[name]
+        estimator = kind(full, WHEELSET, kind.reasoned(full, WHEELSET))
+        judged = score(case, replay(case, estimator), WHEELSET)
+        assert judged.nrmse is not None
+        assert judged.nrmse < 0.02
 
 
 @pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])

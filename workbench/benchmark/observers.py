@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
@@ -17,7 +17,6 @@ import numpy as np
 from workbench.benchmark.memory import peak_memory
 from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
 from workbench.case import Case
-from workbench.errors import FMUError
 from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimator, choose
 from workbench.observers.open_loop import OpenLoop
@@ -116,17 +115,10 @@ def tuned_names(system: System) -> list[str]:
     return [name for name, kind in choose(system, []).items() if kind.tunable]
 
 
-def time_observers(
-    case: Case, system: System, report: Callable[[str], None]
-) -> list[ObserverTimes]:
+def time_observers(case: Case, system: System) -> list[ObserverTimes]:
     """Time the model alone and all observers on one recording, on the full model too.
 
     What they are measured against is written for FMUs of FMI 2.0 with C sources.
-
-    Parameters
-    ----------
-    report : takes a line on an observer that has no row, since gains by reason need not bear a
-        larger model at the rates that are measured.
     """
     names = tuned_names(system)
     kinds = choose(system, names)
@@ -140,10 +132,7 @@ def time_observers(
     if FULL in system.models and larger:
         with opened(system, larger, FULL) as estimators:
             for one in estimators:
-                try:
-                    times.append(_time(case, one, None, None))
-                except FMUError as error:
-                    report(f"{one.name} on the {FULL} model is not timed: {error}")
+                times.append(_time(case, one, None, None))
     return times
 
 

@@ -22,7 +22,7 @@ def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[s
         time_processes,
     )
 
-    observers = time_observers(case, system, print)
+    observers = time_observers(case, system)
     processes = time_processes(cases, system)
     compilation = time_compilation(system, case)
     print(f"\n{format_observers(observers, processes, compilation)}")

@@ -46,6 +46,7 @@ from workbench.observers.operating import (
     corrected_states,
     linearised,
     loops,
+    swinging_states,
     walks,
 )
 from workbench.system import System
@@ -58,9 +59,10 @@ class Settings(NamedTuple):
     Attributes
     ----------
     layout : see Layout.
-    states : (s,) indices of the corrected states.
+    states : (s,) indices of the states that are stepped together: corrected ones, and those that
+        swing.
     places : (n + q,) index of states and corrections among the unknowns, -1 for other states.
-    L : (s + q, 2 l) gains.
+    L : (s + q, 2 l) gains, zero for states that are not corrected.
     decay : (q,) rates at which deviations decay [1/s], negative.
     effect : (q,) d(rate)/d(quantity) from which on a quantity has full authority.
     """
@@ -169,9 +171,9 @@ class DisturbanceObserver(Estimator):
     no effect, and has the sign of that effect.
 
     The step is linearly implicit in states and quantities, feedback included, so that any gain
-    keeps a stable step. States that an extension adds, such as a temperature, are not
-    corrected and step each by themselves, implicit in their own value. Quantities are kept within
-    their physical range.
+    keeps a stable step; so are states that are not corrected but swing with each other. States
+    that an extension adds, such as a temperature, step each by themselves, implicit in their own
+    value. Quantities are kept within their physical range.
 
     Parameters
     ----------
@@ -193,9 +195,12 @@ class DisturbanceObserver(Estimator):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        names = corrected_states(fmu, system)
+        corrected = corrected_states(fmu, system)
+        names = (*corrected, *swinging_states(fmu, system))
         s, q, outputs = len(names), len(system.estimated), len(system.outputs)
-        L = gains.values[: gains.values.size - q].reshape(s + q, 2 * outputs)
+        L = np.zeros((s + q, 2 * outputs))
+        given = [*range(len(corrected)), *range(s, s + q)]
+        L[given] = gains.values[: gains.values.size - q].reshape(len(given), 2 * outputs)
         self._settings = Settings(
             layout=self._layout,
             states=np.array([fmu.states.index(name) for name in names], np.intp),
@@ -206,7 +211,7 @@ class DisturbanceObserver(Estimator):
                 ],
                 np.intp,
             ),
-            L=np.ascontiguousarray(L),
+            L=L,
             decay=np.ascontiguousarray(gains.values[gains.values.size - q :]),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )

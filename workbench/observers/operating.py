@@ -114,6 +114,18 @@ def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
     return tuple(name for name in fmu.states if name in own) or (fmu.states if own else ())
 
 
+def swinging_states(fmu: FMU, system: System) -> tuple[str, ...]:
+    """States that no observer corrects and that move each other, at the design point.
+
+    Such as a spring and the mass on it; stepped one by one, they would swing ever more.
+    """
+    settle(fmu, system, system.design, extensions=False)
+    A, corrected = fmu.state_jacobian() != 0.0, corrected_states(fmu, system)
+    others = np.array([name not in corrected for name in fmu.states], np.bool_)
+    moves = A & others & others[:, None] & ~np.eye(others.size, dtype=np.bool_)
+    return tuple(fmu.states[i] for i in np.flatnonzero(moves.any(axis=0) | moves.any(axis=1)))
+
+
 def walks(fmu: FMU, system: System) -> Vector:
     """Random walk of the states, (n,) [unit/sqrt(s)]: declared, or a small share of their size.
 
