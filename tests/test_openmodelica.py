@@ -24,7 +24,7 @@ CHECKED = (
 def package(tmp_path: Path) -> Path:
     path = tmp_path / 'a "quoted" folder' / "Rig" / "package.mo"
     path.parent.mkdir(parents=True)
-    path.write_text("package Rig end Rig;")
+    path.write_text("package Rig model M end M; end Rig;")
     return path
 
 

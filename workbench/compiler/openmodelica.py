@@ -16,7 +16,7 @@ from pathlib import Path
 from workbench.compiler.ccode import identifier
 from workbench.errors import InputError
 from workbench.files import write_whole
-from workbench.modelica import packages
+from workbench.modelica import check, packages, read_library
 
 _OPTIONS = ("--fmiFlags=s:cvode", "-d=-disableDirectionalDerivatives")
 _MESSAGE = re.compile(
@@ -61,13 +61,9 @@ def build_with_omc(package: Path, models: Sequence[str], folder: Path) -> list[P
             expected="an installation of OpenModelica",
             remedy="install it from https://openmodelica.org, or leave the option out",
         )
-    if not package.is_file():
-        raise InputError(
-            where=str(package),
-            found="no such file",
-            expected="the package.mo of a Modelica library",
-            remedy="correct the path",
-        )
+    library = read_library(package)
+    for model in models:
+        check(library, model)
     return [_build(omc, package, model, folder) for model in models]
 
 

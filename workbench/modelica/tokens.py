@@ -173,15 +173,25 @@ class Cursor:
     def skip(self, *ends: str) -> str:
         """Pass over what comes before one of some signs, outside of brackets; returns its text."""
         start = self.token.start
-        while self.token.text not in ends:
-            if self.token.text in CLOSING:
-                self.group()
-            elif (
-                self.token.kind == "end"
-                or self.token.text in CLOSING.values()
-                or (self.sees(";") and "]" not in ends)  # which separates rows of a matrix
-            ):
-                raise self.refusal(" or ".join(f"'{end}'" for end in ends))
-            else:
-                self._next += 1
+        while self.before(*ends):
+            self.step()
         return self._text[start : self.token.start].rstrip()
+
+    def step(self) -> None:
+        """Pass over the next word or sign, and all in brackets if it opens some."""
+        if self.token.text in CLOSING:
+            self.group()
+        else:
+            self.advance()
+
+    def before(self, *ends: str) -> bool:
+        """Whether something comes before one of some signs, which must come."""
+        if self.token.text in ends:
+            return False
+        if (
+            self.token.kind == "end"
+            or self.token.text in CLOSING.values()
+            or (self.sees(";") and "]" not in ends)  # which separates rows of a matrix
+        ):
+            raise self.refusal(" or ".join(f"'{end}'" for end in ends))
+        return True

@@ -4,7 +4,7 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
   ChainedEffectsOfSizeZeroAreNominal.AllEffects forward(
     padFriction(
       speed(slope=0.2), force(exponent=0.05), bedding(loss=0.1), thickness(cosine=0.02),
-      film(depth=0.3), single(depth=0.3), heat(fade=4e-4)),
+      film(film=0.3), single(film=0.3), heat(fade=4e-4)),
     cylinder(sensor(offset=1000.0), late(lag=0.05), spring(increase=5000.0), caliper(share=0.05)),
     wheelRadius(wear(delta=-0.001), shape(cosine=2e-4)), rollerRadius(delta=0.001),
     wheelLoad(gain=0.1),
@@ -17,7 +17,7 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
   ChainedEffectsOfSizeZeroAreNominal.AllEffects reverse(
     padFriction(
       speed(slope=0.2), force(exponent=0.05), bedding(loss=0.1), thickness(cosine=0.02),
-      film(depth=0.3), single(depth=0.3), heat(fade=4e-4)),
+      film(film=0.3), single(film=0.3), heat(fade=4e-4)),
     cylinder(sensor(offset=1000.0), late(lag=0.05), spring(increase=5000.0), caliper(share=0.05)),
     wheelRadius(wear(delta=-0.001), shape(cosine=2e-4)), rollerRadius(delta=0.001),
     wheelLoad(gain=0.1),
