@@ -14,6 +14,7 @@ from workbench.modelica.classes import Class, Component, Connection, Extends, Mo
 from workbench.modelica.tokens import (
     CLASS_PREFIXES,
     CLOSING,
+    DEEPEST,
     KINDS,
     OPERATORS,
     PREFIXES,
@@ -71,6 +72,8 @@ class Reader(Cursor):
 
     def _definition(self, enclosing: str, prefixes: frozenset[str]) -> None:
         prefixes |= self.words(CLASS_PREFIXES)
+        if enclosing.count(".") > DEEPEST:
+            raise self.refusal(f"at most {DEEPEST} classes within each other")
         kind = self.one_of(KINDS)
         if kind == "operator" and self.token.text in ("function", "record"):
             kind = self.advance().text
