@@ -5,7 +5,7 @@ RUN := $(VENV)/bin/python
 # Modelica compiler of `make fmus`: workbench, or omc (OpenModelica, writes to build/omc)
 COMPILER ?= workbench
 
-.PHONY: help simulate tune diagnose power cases fmus bench test check clean
+.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test check clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -17,6 +17,8 @@ help:
 	@echo "make fmus       build the FMUs from modelica/ (Modelica compiler, C cross-compiler);"
 	@echo "                COMPILER=omc: with OpenModelica where it is installed, into build/omc"
 	@echo "make bench      time calls into the FMUs against plain C, results in results/bench"
+	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
+	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
 	@echo "make test       format, lint, types, import layers, FMUs against sources, tests"
 	@echo "make clean      remove the environment and results"
 
@@ -59,6 +61,12 @@ test: $(VENV)/dev.stamp
 	$(VENV)/bin/lint-imports
 	$(RUN) -m workbench fmu build --all --check
 	$(RUN) -m pytest --numprocesses logical --maxprocesses 4 --dist worksteal
+
+fuzz: $(VENV)/dev.stamp
+	$(RUN) -m tests.fuzz --count 100000
+
+chaos: $(VENV)/dev.stamp
+	$(RUN) -m tests.chaos --count 200
 
 clean:
 	rm -rf $(VENV) build results

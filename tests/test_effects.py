@@ -1,6 +1,5 @@
 """Effects describe themselves: read from the wheelset's library, and from one of another field."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -118,17 +117,15 @@ def tank(folder: Path, *changes: tuple[str, str]) -> Library:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_every_effect_has_a_claim_that_gives_it_a_size(effect: Effect) -> None:
     """A class with an annotation is an effect, and is found here without being listed."""
-    redeclared = re.compile(rf"\b{effect.name} \w+\([^;]*\b({'|'.join(effect.sizes)})\s*=")
     claims = [
         one.name
         for one in WHEELSET.classes.values()
         if one.name.startswith("WheelsetRig.Tests.")
-        for component in one.components
-        if (
-            WHEELSET.resolve(component.type, one.name) == effect.model
-            and not component.modifier.inner.keys().isdisjoint(effect.sizes)
-        )
-        or any(redeclared.search(key) for key in component.modifier.inner)
+        for declared in one.components
+        for component in [declared, *(m.redeclared for m in declared.modifier.inner.values())]
+        if component is not None
+        and WHEELSET.resolve(component.type, one.name) == effect.model
+        and not component.modifier.inner.keys().isdisjoint(effect.sizes)
     ]
     assert claims
 
@@ -208,8 +205,9 @@ def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
     library = tank(tmp_path)
     effects = read_effects(library, "Base")
     text = source(library, "Tank.Base", "Extended", effects, {}, {"A": 3.0}, "All effects")
+    package = library.file.rename(tmp_path / "package.mo")
     (tmp_path / "Extended.mo").write_text(f"within Tank;\n{text}")
-    flat = flatten(tmp_path / "Extended.mo", "Tank.Extended")
+    flat = flatten(package, "Tank.Extended")
     names = {parameter.name for parameter in flat.parameters}
     assert {variables(effect, effect.size)[0] for effect in effects} <= names
     assert [state.name for state in flat.states] == ["h"]

@@ -52,7 +52,7 @@ def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        ("gains = ", "no TOML"),
+        ("gains = ", "text that is no TOML"),
         ("[gains]", "estimator = None"),
         ('estimator = "ekf"\n[gains]\nmodel = 1', r"no omegaW in \[gains\]"),
         (

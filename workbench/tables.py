@@ -168,7 +168,8 @@ def read_table(path: Path, remedy: str, example: str) -> Table:
     text = read_text(path, remedy)
     try:
         return Table(tomllib.loads(text), str(path))
-    except ValueError as error:  # TOMLDecodeError, or a number too long to convert
+    except (ValueError, RecursionError) as error:
+        # TOMLDecodeError, a number too long to convert, or brackets within brackets without end.
         place = re.search(r"line (\d+)", str(error))
         line = int(place[1]) if place else text.count("\n") + 1
         raise InputError(

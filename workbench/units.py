@@ -56,9 +56,10 @@ percent = 0.01
 """
 # As Modelica and people write them: N.m, kg.m2, m3/s, J/(kg.K), W/m^2.
 _UNIT = re.compile(
-    r"(1/|\()*[A-Za-z\u00b5\u03bc°%]+(\^?-?\d)?"
-    r"([.·*/]\(?[A-Za-z\u00b5\u03bc°]+(\^?-?\d)?\)*)*"
+    r"(1/|\()*[A-Za-z\u00b5\u03bc°%]+(\^?-?[1-9])?"
+    r"([.·*/]\(?[A-Za-z\u00b5\u03bc°]+(\^?-?[1-9])?\)*)*"
 )
+_LONGEST = 60  # characters, twice what any unit has; pint takes the square of them
 _REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
 _QUANTITY = re.compile(
     r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?)"
@@ -146,8 +147,10 @@ def _parsed(unit: str) -> "pint.Unit | None":
     """A unit, or None if it is none."""
     if unit == "1":
         return _units().Unit("")
+    if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
+        return None
     try:
-        return _units().parse_units(_spelled(unit)) if _UNIT.fullmatch(unit) else None
+        return _units().parse_units(_spelled(unit))
     except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
         return None
 

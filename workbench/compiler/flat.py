@@ -19,7 +19,7 @@ import rumoca
 
 from workbench.compiler.expressions import BINARY, Arena, Value, each, lift
 from workbench.errors import InputError
-from workbench.modelica import packages
+from workbench.modelica import check, packages, read_library
 
 SCHEMA = 43
 
@@ -93,6 +93,7 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected="the package.mo of a Modelica library",
             remedy="give the path of the library's package.mo",
         )
+    check(read_library(package), model)
     used = [str(one.parent) for one in packages(package)[1:]]
     try:
         dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")

@@ -13,7 +13,7 @@ from workbench import shelf
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError
-from workbench.modelica import Library, beside, files, packages
+from workbench.modelica import PACKAGE, Library, files, packages
 
 _USED = "Used"  # before the name of another library
 
@@ -186,19 +186,20 @@ def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: 
 
         platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
         with tempfile.TemporaryDirectory() as scratch:
-            copy = Path(scratch) / library.name
-            _copy(library.file, copy)
+            package = Path(scratch) / library.name / PACKAGE
+            _copy(library.file, package)
             for used in packages(library.file)[1:]:
-                _copy(used, beside(copy / library.file.name) / used.parent.name)
-            (copy / f"{name}.mo").write_text(f"within {library.name};\n{text}")
-            whole = f"{library.name}.{name}"
-            compiler.build(copy / library.file.name, whole, path, platforms=platforms)
+                _copy(used, Path(scratch) / used.parent.name / PACKAGE)
+            package.with_name(f"{name}.mo").write_text(f"within {library.name};\n{text}")
+            compiler.build(package, f"{library.name}.{name}", path, platforms=platforms)
 
     shelf.fetch(shelf.key(library.file, name, text, f"{every_platform}"), fmu, make)
 
 
-def _copy(package: Path, folder: Path) -> None:
-    for file in files(package):
-        copy = folder / file.relative_to(package.parent)
+def _copy(library: Path, package: Path) -> None:
+    """Copy a library; one of a single file becomes the `package.mo` of a folder."""
+    for file in files(library):
+        inside = PACKAGE if file == library else file.relative_to(library.parent)
+        copy = package.parent / inside
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)

@@ -3,17 +3,19 @@
 Needs no Modelica compiler.
 """
 
+from workbench.modelica.check import check
 from workbench.modelica.classes import Class, Component, Extends, Modifier
-from workbench.modelica.files import beside, files, packages
+from workbench.modelica.files import PACKAGE, files, packages
 from workbench.modelica.library import Library, read_library
 
 __all__ = [
+    "PACKAGE",
     "Class",
     "Component",
     "Extends",
     "Library",
     "Modifier",
-    "beside",
+    "check",
     "files",
     "packages",
     "read_library",

@@ -9,11 +9,19 @@ from typing import Any
 class Modifier:
     """What follows a name, as in `x(min=0) = 1`: a value, as text, and modifiers by name.
 
-    A redeclaration stands under its own text.
+    Attributes
+    ----------
+    where : file and line; empty for one that nobody wrote.
+    final : whether nothing may modify it further.
+    redeclared : what `redeclare` declares under the name, a component or a class; its owner is the
+        class in which it is written. None where the name is modified only.
     """
 
     value: str = ""
     inner: Mapping[str, "Modifier"] = field(default_factory=dict)
+    where: str = ""
+    final: bool = False
+    redeclared: "Component | None" = None
 
 
 @dataclass(frozen=True)
@@ -22,6 +30,7 @@ class Extends:
 
     name: str
     modifier: Modifier
+    where: str
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,8 @@ class Component:
     ----------
     owner : dotted name of the class that declares it.
     type, constraint : as written there; `constraint` is empty without `constrainedby`.
-    prefixes : such as input, parameter, final, replaceable.
+    prefixes : such as input, parameter, final, replaceable; and protected.
+    constraining : what modifies the constraint.
     """
 
     name: str
@@ -41,7 +51,16 @@ class Component:
     prefixes: frozenset[str]
     modifier: Modifier
     constraint: str
+    constraining: Modifier
     description: str
+    where: str
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Two ends of a `connect`, each as names from component to component."""
+
+    ends: tuple[tuple[str, ...], tuple[str, ...]]
     where: str
 
 
@@ -53,6 +72,8 @@ class Class:
     ----------
     name : dotted, from the library's on.
     kind : model, package, type, ...
+    prefixes : such as partial, expandable, replaceable.
+    constraint : of a replaceable class, named as written there; empty without `constrainedby`.
     imports : (name, what it stands for); the name is "*" for all that a package holds.
     equations : components that stand alone on the left side of an equation.
     vendor : content of `annotation(__Workbench(...))`: numbers, strings, booleans, tuples and, for
@@ -62,11 +83,18 @@ class Class:
 
     name: str
     kind: str
-    partial: bool
+    prefixes: frozenset[str]
+    constraint: str
     description: str
     extends: tuple[Extends, ...]
     imports: tuple[tuple[str, str], ...]
     components: tuple[Component, ...]
     equations: frozenset[str]
+    connections: tuple[Connection, ...]
     vendor: Mapping[str, Any]
     where: str
+
+    @property
+    def partial(self) -> bool:
+        """Whether it lacks something that others are to add."""
+        return "partial" in self.prefixes

@@ -3,7 +3,7 @@
 Source: Modelica Language Specification 3.6, sections 5.3 (lookup of names) and 13.4 (files).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,7 +68,7 @@ class Library:
         if found not in self.classes:
             return ".".join([found or head, *rest])
         for part in rest:
-            if not (inside := self._member(part, found)):
+            if not (inside := self.inside(part, found)):
                 hidden = f"; to mean the library {head}, import it" if head != found else ""
                 raise InputError(
                     where=self.classes[scope].where,
@@ -113,19 +113,51 @@ class Library:
         return tuple(found)
 
     def components(self, name: str) -> dict[str, Component]:
-        """Components of a class, inherited ones first, with the values it gives them."""
+        """Components of a class, inherited ones first, with the types and values it gives them."""
         self.ancestors(name)  # refuses a class that extends itself
         found: dict[str, Component] = {}
         for base, dotted in zip(self.classes[name].extends, self.bases(name), strict=True):
             inherited = self.components(dotted) if dotted in self.classes else {}
-            for key, component in inherited.items():
+            for key, component in self.modified(inherited, base.modifier).items():
                 modifier = component.modifier
                 if key in found:  # a class may be inherited on two ways
                     modifier = _merged(found[key].modifier, modifier)
-                if key in base.modifier.inner:
-                    modifier = _merged(modifier, base.modifier.inner[key])
                 found[key] = replace(component, modifier=modifier)
         return found | {component.name: component for component in self.classes[name].components}
+
+    def modified(
+        self, components: Mapping[str, Component], modifier: Modifier
+    ) -> dict[str, Component]:
+        """Components of a class as a modifier leaves them; what it names and is none is ignored."""
+        found = dict(components)
+        for key, one in modifier.inner.items():
+            new = one.redeclared
+            if key in found and new is None:
+                found[key] = replace(found[key], modifier=_merged(found[key].modifier, one))
+            elif key in found and new is not None:
+                found[key] = self._redeclared(found[key], new)
+            elif new is not None:  # a class, of which components may be
+                for name, old in components.items():
+                    if self.resolve(old.type, old.owner).rpartition(".")[2] == key:
+                        found[name] = replace(found[name], type=self._absolute(new.type, new.owner))
+        return found
+
+    def _redeclared(self, old: Component, new: Component) -> Component:
+        constraint, scope = old.constraint or old.type, old.owner
+        if new.constraint:
+            constraint, scope = new.constraint, new.owner
+        return replace(
+            old,
+            type=self._absolute(new.type, new.owner),
+            prefixes=(old.prefixes - {"replaceable"}) | (new.prefixes - {"redeclare"}),
+            constraint=self._absolute(constraint, scope),
+            modifier=_merged(old.constraining, new.modifier),
+        )
+
+    def _absolute(self, name: str, scope: str) -> str:
+        """A name that means in any scope what `name` means in one."""
+        found = self.resolve(name, scope)
+        return f".{found}" if found in self.classes else name
 
     def unit(self, component: Component) -> str:
         """Unit of a component; where it has none, the name of the type that could have one."""
@@ -142,16 +174,16 @@ class Library:
 
     def _visible(self, name: str, scope: str) -> str:
         """Class of a simple name, by the declarations and imports of one scope; empty if none."""
-        if found := self._member(name, scope):
+        if found := self.inside(name, scope):
             return found
         for alias, target in self.classes[scope].imports if scope else ():
             if alias == name:
                 return target.removeprefix(".")
-            if alias == "*" and (found := self._member(name, target)):
+            if alias == "*" and (found := self.inside(name, target)):
                 return found
         return ""
 
-    def _member(self, name: str, of: str) -> str:
+    def inside(self, name: str, of: str) -> str:
         """Class within another one, or within what that extends; empty if none."""
         holders = (of, *self.ancestors(of)) if of in self.classes else (of,)
         inside = (f"{holder}.{name}".removeprefix(".") for holder in holders)
@@ -204,4 +236,13 @@ def _outward(scope: str) -> list[str]:
 
 
 def _merged(old: Modifier, new: Modifier) -> Modifier:
-    return Modifier(new.value or old.value, {**old.inner, **new.inner})
+    inner = dict(old.inner)
+    for name, one in new.inner.items():
+        inner[name] = _merged(inner[name], one) if name in inner else one
+    return Modifier(
+        value=new.value or old.value,
+        inner=inner,
+        where=new.where or old.where,
+        final=new.final or old.final,
+        redeclared=new.redeclared or old.redeclared,
+    )

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.modelica.classes import Class, Component, Extends, Modifier
+from workbench.modelica.classes import Class, Component, Connection, Extends, Modifier
 from workbench.modelica.tokens import (
     CLASS_PREFIXES,
     CLOSING,
+    DEEPEST,
     KINDS,
     OPERATORS,
     PREFIXES,
@@ -23,6 +24,7 @@ from workbench.modelica.tokens import (
 
 VENDOR = "__Workbench"
 
+_BLOCKS = frozenset({"if", "for", "when", "while"})
 _PROPAGATION = frozenset({"each", "final"})
 
 
@@ -34,6 +36,7 @@ class _Body:
     imports: list[tuple[str, str]] = field(default_factory=list)
     components: list[Component] = field(default_factory=list)
     equations: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
     vendor: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -43,6 +46,7 @@ class Reader(Cursor):
     def __init__(self, file: Path, text: str) -> None:
         super().__init__(file, text)
         self._found: list[Class] = []
+        self._owner = ""  # class that is being read
 
     def file(self, enclosing: str) -> list[Class]:
         """The class of the file and those within it, in order."""
@@ -58,7 +62,7 @@ class Reader(Cursor):
                 remedy="correct it, or move the file to its package",
             )
         self.took("final")
-        self._definition(enclosing)
+        self._definition(enclosing, frozenset())
         self.expect(";")
         if self.token.kind != "end":
             raise self.refusal("one class in a file, and others within it")
@@ -66,14 +70,17 @@ class Reader(Cursor):
 
     # --- classes ---
 
-    def _definition(self, enclosing: str) -> None:
-        prefixes = self.words(CLASS_PREFIXES)
+    def _definition(self, enclosing: str, prefixes: frozenset[str]) -> None:
+        prefixes |= self.words(CLASS_PREFIXES)
+        if enclosing.count(".") > DEEPEST:
+            raise self.refusal(f"at most {DEEPEST} classes within each other")
         kind = self.one_of(KINDS)
         if kind == "operator" and self.token.text in ("function", "record"):
             kind = self.advance().text
         where, place = self.where, len(self._found)
         short = self.identifier()
         name = f"{enclosing}.{short}" if enclosing else short
+        outer, self._owner = self._owner, name
         if self.took("="):
             extends = self._alias()
             description, vendor = self._comment()
@@ -81,15 +88,18 @@ class Reader(Cursor):
         else:
             description, body = self.string(), _Body()
             self._composition(name, body)
+        self._owner = outer
         made = Class(
             name=name,
             kind=kind,
-            partial="partial" in prefixes,
+            prefixes=prefixes,
+            constraint=self._constraint()[0],
             description=description,
             extends=tuple(body.extends),
             imports=tuple(body.imports),
             components=tuple(body.components),
             equations=frozenset(body.equations),
+            connections=tuple(body.connections),
             vendor=body.vendor,
             where=where,
         )
@@ -101,12 +111,15 @@ class Reader(Cursor):
             self.group()
             return []
         self.words(PREFIXES)
-        base = self.name()
+        return [self._extends()]
+
+    def _extends(self) -> Extends:
+        where, base = self.where, self.name()
         self.subscripts()
-        return [Extends(base, Modifier(inner=self._modifiers()))]
+        return Extends(base, Modifier(inner=self._modifiers()), where)
 
     def _composition(self, name: str, body: _Body) -> None:
-        in_equations = False
+        in_equations, access = False, frozenset[str]()
         short = name.rpartition(".")[2]
         while True:
             word = self.token.text
@@ -115,7 +128,7 @@ class Reader(Cursor):
                 self.advance()
                 return
             if word in ("public", "protected"):
-                self.advance()
+                access = frozenset({self.advance().text} - {"public"})
                 in_equations = False
             elif word == "end" and not in_equations:
                 raise self.refusal(f"'end {short}', or more of {short}")
@@ -128,30 +141,52 @@ class Reader(Cursor):
             elif in_equations or word == "external":
                 self._statement(body)
             else:
-                self._element(name, body)
+                self._element(name, body, access)
 
     def _statement(self, body: _Body) -> None:
         left = self.token
         if left.kind == "name" and self.following.text == "=":
             body.equations.append(left.text)
-        self.skip(";")
+        while self.before(";"):
+            where = self.where
+            if self.sees("end") and self.following.text not in _BLOCKS:
+                raise self.refusal("';'")
+            if self.took("connect"):
+                body.connections.append(self._connection(where))
+            else:
+                self.step()
         self.expect(";")
 
-    def _element(self, name: str, body: _Body) -> None:
+    def _connection(self, where: str) -> Connection:
+        self.expect("(")
+        left = self._reference()
+        self.expect(",")
+        right = self._reference()
+        self.expect(")")
+        return Connection((left, right), where)
+
+    def _reference(self) -> tuple[str, ...]:
+        """Names from component to component, without subscripts."""
+        names = [self.identifier()]
+        self.subscripts()
+        while self.took("."):
+            names.append(self.identifier())
+            self.subscripts()
+        return tuple(names)
+
+    def _element(self, name: str, body: _Body, access: frozenset[str]) -> None:
         if self.took("import"):
             body.imports += self._import()
             self._comment()
         elif self.took("extends"):
-            base = self.name()
-            body.extends.append(Extends(base, Modifier(inner=self._modifiers())))
+            body.extends.append(self._extends())
             self._comment()
         else:
-            prefixes = self.words(PREFIXES)
+            prefixes = self.words(PREFIXES) | access
             if self.token.text in KINDS | CLASS_PREFIXES:
-                self._definition(name)
-                self._constraint()
+                self._definition(name, prefixes)
             else:
-                body.components += self._components(name, prefixes)
+                body.components += self._components(prefixes)
         self.expect(";")
 
     def _import(self) -> list[tuple[str, str]]:
@@ -169,59 +204,96 @@ class Reader(Cursor):
             return [(name, f"{target}.{name}") for name in names]
         return [(target.rpartition(".")[2], target)]
 
-    def _components(self, owner: str, prefixes: frozenset[str]) -> list[Component]:
+    def _components(self, prefixes: frozenset[str]) -> list[Component]:
         declared = self.name()
         self.subscripts()
-        found: list[Component] = []
-        while True:
-            where, name = self.where, self.identifier()
-            self.subscripts()
-            modifier = self._modification()
-            if self.took("if"):
-                self._expression()
-            description, _ = self._comment()
-            found.append(
-                Component(name, owner, declared, prefixes, modifier, "", description, where)
-            )
-            if not self.took(","):
-                break
-        constraint, description = self._constraint()
+        found = [self._component(declared, prefixes)]
+        while self.took(","):
+            found.append(self._component(declared, prefixes))
+        return self._constrained(found)
+
+    def _constrained(self, found: list[Component]) -> list[Component]:
+        constraint, constraining, description = self._constraint()
         return [
-            replace(one, constraint=constraint, description=one.description or description)
+            replace(
+                one,
+                constraint=constraint,
+                constraining=constraining,
+                description=one.description or description,
+            )
             for one in found
         ]
 
-    def _constraint(self) -> tuple[str, str]:
-        """Constraining class and description after it, both empty where there is none."""
+    def _component(self, declared: str, prefixes: frozenset[str]) -> Component:
+        where, name = self.where, self.identifier()
+        self.subscripts()
+        modifier = self._modification(where)
+        if self.took("if"):
+            self._expression()
+        description, _ = self._comment()
+        nothing = Modifier()
+        return Component(
+            name, self._owner, declared, prefixes, modifier, "", nothing, description, where
+        )
+
+    def _constraint(self) -> tuple[str, Modifier, str]:
+        """Constraining class, its modifier, and description; empty where there is none."""
         if not self.took("constrainedby"):
-            return "", ""
-        name = self.name()
-        self._modifiers()
-        return name, self._comment()[0]
+            return "", Modifier(), ""
+        where, name = self.where, self.name()
+        modifier = Modifier(inner=self._modifiers(), where=where)
+        return name, modifier, self._comment()[0]
 
     # --- modifiers and values ---
 
-    def _modification(self) -> Modifier:
+    def _modification(self, where: str, final: bool = False) -> Modifier:
         inner = self._modifiers()
         given = self.took("=") or self.took(":=")
-        return Modifier(self._expression() if given else "", inner)
+        return Modifier(self._expression() if given else "", inner, where, final)
 
     def _modifiers(self) -> dict[str, Modifier]:
         inner: dict[str, Modifier] = {}
         if not self.took("(") or self.took(")"):
             return inner
         while True:
-            self.words(_PROPAGATION)
-            if self.token.text in ("redeclare", "replaceable"):
-                redeclaration = self.skip(",", ")")
-                inner[redeclaration] = Modifier()
+            where, prefixes = self.where, self.words(PREFIXES | _PROPAGATION)
+            if prefixes & {"redeclare", "replaceable"}:
+                one = self._redeclaration(prefixes)
+                name, made = one.name, Modifier("", {}, where, "final" in prefixes, one)
             else:
                 name = self.name()
-                inner[name] = self._modification()
+                made = self._modification(where, "final" in prefixes)
                 self.string()
+            if name in inner:
+                raise InputError(
+                    where=where,
+                    found=f"a second modifier of '{name}'",
+                    expected=f"one, which is in {inner[name].where}",
+                    remedy="remove one of the two",
+                )
+            inner[name] = made
             if self.took(")"):
                 return inner
             self.expect(",")
+
+    def _redeclaration(self, prefixes: frozenset[str]) -> Component:
+        """What is redeclared in a modifier; of a class the prefixes tell its kind."""
+        kind = self.words(CLASS_PREFIXES | KINDS)
+        if kind:
+            where, name = self.where, self.identifier()
+            self.expect("=")
+            (base,) = self._alias() or [Extends("", Modifier(), where)]
+            description, _ = self._comment()
+            nothing = Modifier()
+            one = Component(
+                *(name, self._owner, base.name, prefixes | kind, base.modifier),
+                *("", nothing, description, where),
+            )
+        else:
+            declared = self.name()
+            self.subscripts()
+            one = self._component(declared, prefixes)
+        return self._constrained([one])[0]
 
     def _expression(self) -> str:
         """Text up to what cannot be of the same expression."""

@@ -33,6 +33,7 @@ _KEYWORDS = KINDS | CLASS_PREFIXES | PREFIXES | SECTIONS | OPERATORS | {
     "return", "true", "when", "while", "within",
 }
 # fmt: on
+DEEPEST = 100  # brackets or classes within each other; people give up long before
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
@@ -60,7 +61,7 @@ class Cursor:
     def __init__(self, file: Path, text: str) -> None:
         self._file, self._text = file, text
         self._tokens: list[Token] = []
-        self._next, at = 0, 0
+        self._next, at, depth = 0, 0, 0
         while at < len(text):
             match = _TOKEN.match(text, at)
             if match is None:
@@ -68,6 +69,10 @@ class Cursor:
                 raise self.refusal("Modelica; a string or a comment may lack its end")
             if match.lastgroup != "gap":
                 self._tokens.append(Token(str(match.lastgroup), match[0], at, match.end()))
+                depth += (match[0] in CLOSING) - (match[0] in CLOSING.values())
+                if depth > DEEPEST:
+                    self._next = len(self._tokens) - 1
+                    raise self.refusal(f"at most {DEEPEST} brackets within each other")
             at = match.end()
         self._tokens.append(Token("end", "the end of the file", at, at))
 
@@ -173,15 +178,25 @@ class Cursor:
     def skip(self, *ends: str) -> str:
         """Pass over what comes before one of some signs, outside of brackets; returns its text."""
         start = self.token.start
-        while self.token.text not in ends:
-            if self.token.text in CLOSING:
-                self.group()
-            elif (
-                self.token.kind == "end"
-                or self.token.text in CLOSING.values()
-                or (self.sees(";") and "]" not in ends)  # which separates rows of a matrix
-            ):
-                raise self.refusal(" or ".join(f"'{end}'" for end in ends))
-            else:
-                self._next += 1
+        while self.before(*ends):
+            self.step()
         return self._text[start : self.token.start].rstrip()
+
+    def step(self) -> None:
+        """Pass over the next word or sign, and all in brackets if it opens some."""
+        if self.token.text in CLOSING:
+            self.group()
+        else:
+            self.advance()
+
+    def before(self, *ends: str) -> bool:
+        """Whether something comes before one of some signs, which must come."""
+        if self.token.text in ends:
+            return False
+        if (
+            self.token.kind == "end"
+            or self.token.text in CLOSING.values()
+            or (self.sees(";") and "]" not in ends)  # which separates rows of a matrix
+        ):
+            raise self.refusal(" or ".join(f"'{end}'" for end in ends))
+        return True

@@ -1,7 +1,6 @@
 """The file of gains, `gains.toml`: what the tuning writes, and who runs observers reads."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.recording import read_text
 from workbench.system import System
+from workbench.tables import read_table
 
 _AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
 
@@ -87,11 +86,8 @@ def tuned_file(system: System, name: str) -> Path | None:
     return path if path and path.exists() else None
 
 
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_text(path, _AGAIN))
-    except tomllib.TOMLDecodeError as error:
-        raise _wrong(path, f"no TOML ({error})") from None
+def _content(path: Path) -> Mapping[str, Any]:
+    return read_table(path, _AGAIN, 'estimator = "NAME"').content
 
 
 def _table(content: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:

@@ -27,11 +27,12 @@ model DisturbanceObserver "Minimal model, its frictions states that are correcte
 
   MinimalObserver plant(
     pB=pB, tauR=tauR, dmuWR=muWR - plant.muWR, dmuDC=muDC - plant.muDC,
-    correctionW=fade*feedback[1], correctionR=fade*feedback[2]) "Observer model";
+    correctionW=fade*correction[1], correctionR=fade*correction[2]) "Observer model";
 
 protected
   Units.Angle integral[2](each start=0.0, each fixed=true) "Integral of dy";
-  Real feedback[4] "L [dy; integral of dy]";
+  Units.AngularAcceleration correction[2] "Of the speeds: L [dy; integral of dy], rows 1 and 2";
+  Real drift[2](each unit="1/s") "Of the frictions: L [dy; integral of dy], rows 3 and 4";
 equation
   omegaWEstimate = plant.omegaW;
   omegaREstimate = plant.omegaR;
@@ -44,12 +45,12 @@ equation
   actualDC = -plant.nDiscs*plant.actuation.Fperp*plant.rB*tanh(plant.omegaW/plant.omega0)
     /plant.wheelInertia.y;
   der(integral) = dy;
-  feedback[1] = L11*dy[1] + L12*dy[2] + L13*integral[1] + L14*integral[2];
-  feedback[2] = L21*dy[1] + L22*dy[2] + L23*integral[1] + L24*integral[2];
-  feedback[3] = L31*dy[1] + L32*dy[2] + L33*integral[1] + L34*integral[2];
-  feedback[4] = L41*dy[1] + L42*dy[2] + L43*integral[1] + L44*integral[2];
-  der(muWR) = T_muWR*(muWR - plant.muWR) + fade*authorityWR.held*feedback[3];
-  der(muDC) = T_muDC*(muDC - plant.muDC) + fade*authorityDC.held*feedback[4];
+  correction[1] = L11*dy[1] + L12*dy[2] + L13*integral[1] + L14*integral[2];
+  correction[2] = L21*dy[1] + L22*dy[2] + L23*integral[1] + L24*integral[2];
+  drift[1] = L31*dy[1] + L32*dy[2] + L33*integral[1] + L34*integral[2];
+  drift[2] = L41*dy[1] + L42*dy[2] + L43*integral[1] + L44*integral[2];
+  der(muWR) = T_muWR*(muWR - plant.muWR) + fade*authorityWR.held*drift[1];
+  der(muDC) = T_muDC*(muDC - plant.muDC) + fade*authorityDC.held*drift[2];
   annotation (
     experiment(StopTime=40.0, Interval=0.005),
     Documentation(info="<html>

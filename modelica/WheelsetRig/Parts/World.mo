@@ -5,4 +5,7 @@ model World "Gravity, and the origin: the centre of the loaded axle at rest"
 equation
   frame_b.r_0 = zeros(3);
   frame_b.phi = zeros(3);
+  annotation (
+    defaultComponentName="world", defaultComponentPrefixes="inner",
+    missingInnerMessage="Bodies need gravity: declare 'inner Parts.World world' around them");
 end World;

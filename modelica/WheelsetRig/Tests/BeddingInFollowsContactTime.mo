@@ -10,6 +10,7 @@ equation
   assert(time < 1.0 or abs(bedding.mu - expected) < 3e-4, "Deficit after first contact");
   assert(time < 1.0 or abs(light.mu - expected) < 3e-4, "Deficit at low force, in reverse");
   assert(time > 0.9 or abs(bedding.mu - 0.27) < 1e-5, "Bedding in before contact");
-  assert(abs(apart.mu - 0.27) < 1e-12, "Bedding in without contact");
+  // 1e-7: ten times the solver's tolerance.
+  assert(abs(apart.mu - 0.27) < 1e-7, "Bedding in without contact");
   annotation (experiment(StopTime=6.0, Tolerance=1e-8));
 end BeddingInFollowsContactTime;

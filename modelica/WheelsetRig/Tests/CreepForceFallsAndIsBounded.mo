@@ -7,7 +7,7 @@ model CreepForceFallsAndIsBounded "The creep force rises to a peak, falls, and s
   Units.Force K = Contact.kalkerStiffness(Q);
   Units.Force F = Contact.creepForce(w, v, Q, K, 0.55, polach);
   Units.FrictionCoefficient mu = Contact.frictionCoefficient(w, 0.55, polach);
-  Units.Force rate "Change of the force per second";
+  Real rate(unit="N/s") "Change of the force per second";
 equation
   rate = der(F);
   assert(F <= mu*Q, "The creep force exceeds friction");

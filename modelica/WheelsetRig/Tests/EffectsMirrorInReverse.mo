@@ -1,10 +1,13 @@
 within WheelsetRig.Tests;
 model EffectsMirrorInReverse "Effects of usual size do the same in both directions of rotation"
+  constant Real tolerance(unit="1") = 1e-10 "Of the solver, as in the experiment";
+  final parameter Units.Force K = 2.0*Contact.kalkerStiffness(80000.0) "Creep force per creepage";
+  final parameter Units.Force slack = 10.0*tolerance*K "What a solver leaves of two forces";
   Units.Pressure p = 1.35e5*(1.0 + tanh(4.0*(time - 0.5))) "Brake pressure";
   ChainedEffectsOfSizeZeroAreNominal.AllEffects forward(
     padFriction(
       speed(slope=0.2), force(exponent=0.05), bedding(loss=0.1), thickness(cosine=0.02),
-      film(depth=0.3), single(depth=0.3), heat(fade=4e-4)),
+      film(film=0.3), single(film=0.3), heat(fade=4e-4)),
     cylinder(sensor(offset=1000.0), late(lag=0.05), spring(increase=5000.0), caliper(share=0.05)),
     wheelRadius(wear(delta=-0.001), shape(cosine=2e-4)), rollerRadius(delta=0.001),
     wheelLoad(gain=0.1),
@@ -17,7 +20,7 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
   ChainedEffectsOfSizeZeroAreNominal.AllEffects reverse(
     padFriction(
       speed(slope=0.2), force(exponent=0.05), bedding(loss=0.1), thickness(cosine=0.02),
-      film(depth=0.3), single(depth=0.3), heat(fade=4e-4)),
+      film(film=0.3), single(film=0.3), heat(fade=4e-4)),
     cylinder(sensor(offset=1000.0), late(lag=0.05), spring(increase=5000.0), caliper(share=0.05)),
     wheelRadius(wear(delta=-0.001), shape(cosine=2e-4)), rollerRadius(delta=0.001),
     wheelLoad(gain=0.1),
@@ -30,11 +33,11 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
   output Units.Force dFx = forward.Fx + reverse.Fx "Difference of the creep forces";
   output Units.Force dReading = forward.FxReading + reverse.FxReading "Difference of the readings";
 equation
-  // Mirrored equations in one system: rounding, enlarged by the stiff slip, stays below 1e-6.
-  assert(abs(dFx) < 0.01, "Creep forces do not mirror");
-  assert(abs(dReading) < 0.01, "Readings of the force do not mirror");
+  // A speed that is off by the solver's tolerance is a creepage of that size; tenfold adds up.
+  assert(abs(dFx) < slack, "Creep forces do not mirror");
+  assert(abs(dReading) < slack, "Readings of the force do not mirror");
   assert(abs(forward.omegaWReading + reverse.omegaWReading) < 1e-6
     and abs(forward.omegaRReading + reverse.omegaRReading) < 1e-6, "Speeds do not mirror");
   assert(abs(forward.pBRest - reverse.pBRest) < 1e-9, "Pressure at rest differs");
-  annotation (experiment(StopTime=1.5, Tolerance=1e-8));
+  annotation (experiment(StopTime=1.5, Tolerance=1e-10));
 end EffectsMirrorInReverse;

@@ -11,10 +11,13 @@ model EnergyIsConserved "Without dampers, brakes, losses and friction the rig ke
     wheelset(v(start={0.0, 0.05, 0.0}), omegaZ(start=0.05)));
   parameter Units.Energy disturbance = 0.5*rig.mF*(0.05^2 + 0.05^2 + 0.1^2)
     "Kinetic energy of the frame's push at the start";
+  constant Real tolerance(unit="1") = 1e-10 "Of the solver, as in the experiment";
+  constant Units.Energy nominal = 1.0 "Nominal value of gain, to which a solver applies its tolerance";
   output Units.Energy gain(start=0.0, fixed=true) "Energy gained since the start";
 equation
   der(gain) = der(rig.energy);
-  // 1e-9: rounding of the sum of powers; friction of 1e-15 takes 1e-10 of the push.
-  assert(abs(gain) < 1e-9*disturbance, "Energy is not conserved");
-  annotation (experiment(StopTime=1.0, Tolerance=1e-9));
+  // 1e-9: rounding of the sum of powers; friction of 1e-15 takes 1e-10 of the push. A solver may err
+  // by its tolerance in each of some thousand steps.
+  assert(abs(gain) < 1e-9*disturbance + 1000.0*tolerance*nominal, "Energy is not conserved");
+  annotation (experiment(StopTime=1.0, Tolerance=1e-10));
 end EnergyIsConserved;

@@ -14,6 +14,9 @@ model SensorsChangeTheirReadingOnly "Ideal sensors read the truth; a sensor with
     y = gain*u;
   end ForceSensorWithGain;
 
+  constant Real tolerance(unit="1") = 1e-10 "Of the solver, as in the experiment";
+  final parameter Units.Force K = 2.0*Contact.kalkerStiffness(80000.0) "Creep force per creepage";
+  final parameter Units.Force slack = 10.0*tolerance*K "What a solver leaves of two forces";
   Units.Pressure p = 1.35e5*(1.0 + tanh(4.0*(time - 0.5))) "Brake pressure";
   MinimalObserver minimal(
     pB=p, tauR=0.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
@@ -39,13 +42,13 @@ model SensorsChangeTheirReadingOnly "Ideal sensors read the truth; a sensor with
   output Units.Force dFull = fullGain.Fx - full.Fx "Change of FullObserver";
   output Units.Force dReference = referenceGain.Fx - reference.Fx "Change of Reference";
 equation
-  // The same number under another name; 1e-12 is slack, 1e-9 N for the sum of two cells.
+  // The same number under another name: the last digits of 40 rad/s and 20 kN.
   assert(abs(minimal.omegaWReading - minimal.omegaW) < 1e-12
     and abs(minimal.omegaRReading - minimal.omegaR) < 1e-12
-    and abs(minimal.FxReading - minimal.Fx) < 1e-12, "MinimalObserver: ideal sensors");
+    and abs(minimal.FxReading - minimal.Fx) < 1e-9, "MinimalObserver: ideal sensors");
   assert(abs(full.omegaWReading - full.omegaW) < 1e-12
     and abs(full.omegaRReading - full.omegaR) < 1e-12
-    and abs(full.FxReading - full.Fx) < 1e-12, "FullObserver: ideal sensors");
+    and abs(full.FxReading - full.Fx) < 1e-9, "FullObserver: ideal sensors");
   assert(abs(reference.omegaWReading - reference.omegaW) < 1e-12
     and abs(reference.omegaRReading - reference.omegaR) < 1e-12
     and abs(reference.FxReading - reference.FcellL - reference.FcellR) < 1e-9,
@@ -61,9 +64,9 @@ equation
     and abs(referenceGain.omegaRReading - 1.2*referenceGain.omegaR) < 1e-10
     and abs(referenceGain.FxReading - 0.9*(referenceGain.FcellL + referenceGain.FcellR)) < 1e-7,
     "Reference: gains");
-  // Equal equations in one system: rounding, enlarged by the stiff slip, stays below 1e-6.
-  assert(abs(dMinimal) < 0.01, "MinimalObserver changes");
-  assert(abs(dFull) < 0.01, "FullObserver changes");
-  assert(abs(dReference) < 0.01, "Reference changes");
-  annotation (experiment(StopTime=1.0, Tolerance=1e-8));
+  // A speed that is off by the solver's tolerance is a creepage of that size; tenfold adds up.
+  assert(abs(dMinimal) < slack, "MinimalObserver changes");
+  assert(abs(dFull) < slack, "FullObserver changes");
+  assert(abs(dReference) < slack, "Reference changes");
+  annotation (experiment(StopTime=1.0, Tolerance=1e-10));
 end SensorsChangeTheirReadingOnly;

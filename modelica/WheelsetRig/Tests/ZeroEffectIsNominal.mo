@@ -11,6 +11,9 @@ model ZeroEffectIsNominal "A redeclared effect of size zero is the nominal model
     extends MinimalObserver(redeclare SpeedEffect padFriction(gain=0.0));
   end WithEffect;
 
+  constant Real tolerance(unit="1") = 1e-10 "Of the solver, as in the experiment";
+  final parameter Units.Force K = 2.0*Contact.kalkerStiffness(80000.0) "Creep force per creepage";
+  final parameter Units.Force slack = 10.0*tolerance*K "What a solver leaves of two forces";
   Units.Pressure p = 1.35e5*(1.0 + tanh(4.0*(time - 0.5))) "Brake pressure";
   MinimalObserver minimal(
     pB=p, tauR=0.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
@@ -36,11 +39,11 @@ model ZeroEffectIsNominal "A redeclared effect of size zero is the nominal model
   output Units.Force dFull = fullZero.Fx - full.Fx "Change of FullObserver";
   output Units.Force dReference = referenceZero.Fx - reference.Fx "Change of Reference";
 equation
-  // Equal equations in one system: rounding, enlarged by the stiff slip, stays below 1e-6.
-  assert(abs(dMinimal) < 0.01, "MinimalObserver changes");
-  assert(abs(dFull) < 0.01, "FullObserver changes");
-  assert(abs(dReference) < 0.01, "Reference changes");
+  // A speed that is off by the solver's tolerance is a creepage of that size; tenfold adds up.
+  assert(abs(dMinimal) < slack, "MinimalObserver changes");
+  assert(abs(dFull) < slack, "FullObserver changes");
+  assert(abs(dReference) < slack, "Reference changes");
   // The counterexample: +9 % friction at 9 m/s sliding velocity must show.
   assert(time < 0.9 or abs(minimalOne.Fx - minimal.Fx) > 500.0, "The effect has no effect");
-  annotation (experiment(StopTime=1.0, Tolerance=1e-8));
+  annotation (experiment(StopTime=1.0, Tolerance=1e-10));
 end ZeroEffectIsNominal;

@@ -1,0 +1,192 @@
+"""What is fuzzed: every kind of file that a user may give, with the reader that takes it."""
+
+import re
+import zipfile
+from functools import partial
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from tests.case_folders import LINES, TOML
+from tests.fuzz.harness import Target
+from tests.fuzz.mutations import BYTES, Files, mutate, zipped
+from workbench import resources
+from workbench.case import Case, read_case
+from workbench.description import Description, read_description
+from workbench.fmu import FMU
+from workbench.modelica import check, read_library
+from workbench.observers.gains import Gains
+from workbench.observers.gains_file import read_gains
+from workbench.power.journal import Diagnosed, Journal
+from workbench.power.planting import Planting
+from workbench.system import System
+from workbench.system_file import read_system
+from workbench.systems import load_system, open_model
+from workbench.template import write_system
+from workbench.tuning import tunable
+from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
+
+IDENTITY = "of one search"
+DESCRIPTION = "modelDescription.xml"
+# What this machine may load, and what describes it.
+_ENTRIES = rf"{DESCRIPTION}|binaries/(linux64|x86_64-linux)/"
+_NAMES = (
+    *("../out.txt", "/tmp/out.txt", "a\\b", "C:/a", "resources/" + "a" * 300),
+    *("binaries/linux64/", ""),
+)
+
+
+def targets(folder: Path) -> tuple[Target, ...]:
+    """All targets; a folder is for what their originals are written by."""
+    system = load_system("wheelset")
+    tank = {path.name: path.read_bytes() for path in write_system(folder / "tank") if path.suffix}
+    return (
+        _case(system),
+        _gains(system),
+        _checkpoint(folder / "checkpoint.json"),
+        _journal(folder / "sets.jsonl"),
+        _system("system file", tank["system.toml"]),
+        _system("wheelset file", _with_fmus(system)),
+        Target("Modelica", {"Lib.mo": tank["package.mo"]}, _read_modelica),
+        _fmu("FMU of FMI 2.0", resources.fmus() / "fmi2" / "MinimalObserver.fmu"),
+        _fmu("FMU of FMI 3.0", resources.fmus() / "fmi3" / "MinimalObserver.fmu"),
+    )
+
+
+# --- recordings ---
+
+
+def _case(system: System) -> Target:
+    return Target(
+        "case",
+        {"case.toml": TOML.encode(), "measured.csv": "\n".join([*LINES, ""]).encode()},
+        lambda folder: read_case(folder, system),
+        _impossible_case,
+    )
+
+
+def _impossible_case(case: Case) -> str:
+    """What no recording can be, whatever the machine."""
+    if not (np.diff(case.time) > 0.0).all():
+        return "time that does not increase"
+    for name, values in case.signals.items():
+        if values.shape != case.time.shape or not np.isfinite(values).all():
+            return f"{name} of another length, or not finite"
+    numbers = [value for value in case.conditions.values() if isinstance(value, float)]
+    return "" if np.isfinite(numbers).all() else "a condition that is not finite"
+
+
+# --- what the workbench writes and reads again ---
+
+
+def _gains(system: System) -> Target:
+    name = "disturbance_observer"
+    with open_model(system) as model:
+        reasoned = {name: tunable(system, name).reasoned(model, system)}
+    source = Path(__file__).parents[2] / "workbench" / "wheelset" / "gains" / f"{name}.toml"
+
+    def impossible(gains: Gains) -> str:
+        finite = np.isfinite(gains.values).all() and gains.names == reasoned[name].names
+        return "" if finite else "gains that are not finite, or others"
+
+    return Target(
+        "gains",
+        {"gains.toml": source.read_bytes()},
+        lambda folder: read_gains(folder / "gains.toml", reasoned),
+        impossible,
+    )
+
+
+def _checkpoint(path: Path) -> Target:
+    draw = np.random.default_rng(1)
+    population = Population(draw.random((6, 3)), np.sort(draw.random(6)), draw.random((6, 2)))
+    history = tuple(
+        Generation(0.1, "one", "other", 0.2, 6, 100, 200, {"one": 1}, 0, 1.5) for _ in range(3)
+    )
+    save(Checkpoint(IDENTITY, population, False, history), path)
+
+    def impossible(found: Checkpoint | None) -> str:
+        same = found is not None and all(
+            np.array_equal(values, getattr(population, name))
+            for name, values in vars(found.population).items()
+        )
+        return "" if same else "other candidates than were saved"
+
+    return Target(
+        "checkpoint",
+        {"checkpoint.json": path.read_bytes()},
+        lambda folder: load(folder / "checkpoint.json", IDENTITY),
+        impossible,
+    )
+
+
+def _journal(path: Path) -> Target:
+    identity = {"seed": 1, "code": "of one run"}
+    journal = Journal(path, identity, resume=False)
+    for seed in range(4):
+        planting = Planting("single", seed, 2.0, {"fade": 0.1}, ("BrakeFade",))
+        journal.append(Diagnosed(planting, "nothing", (), None, None, 1.5))
+    written = journal.results
+
+    def impossible(found: Journal) -> str:
+        # A run that was killed may have written less, but nothing else.
+        same = found.results == written[: len(found.results)]
+        return "" if same else "other verdicts than were written"
+
+    return Target(
+        "verdicts",
+        {"sets.jsonl": path.read_bytes()},
+        lambda folder: Journal(folder / "sets.jsonl", identity, resume=True),
+        impossible,
+    )
+
+
+# --- machines and models ---
+
+
+def _system(name: str, content: bytes) -> Target:
+    return Target(
+        name, {"system.toml": content}, lambda folder: read_system(folder / "system.toml")
+    )
+
+
+def _with_fmus(system: System) -> bytes:
+    """The file of a system for any folder: its FMUs where they are."""
+    text = system.source.read_text()
+    return text.replace("../../fmus", resources.fmus().as_posix()).encode()
+
+
+def _read_modelica(folder: Path) -> None:
+    check(read_library(folder / "Lib.mo"))
+
+
+def _fmu(name: str, path: Path) -> Target:
+    """An archive; binaries may be damaged, but only sound ones are loaded."""
+    with zipfile.ZipFile(path) as archive:
+        entries = {n: archive.read(n) for n in archive.namelist() if re.match(_ENTRIES, n)}
+    change = partial(_archive, entries=entries)
+    return Target(name, {"model.fmu": zipped(entries)}, _read_fmu, change=change)
+
+
+def _archive(_: Files, random: Random, *, entries: Files) -> tuple[Files, str]:
+    """A mutant of the description, of what entries are named and hold, or of the archive itself."""
+    changed, kind = dict(entries), random.choice(("description", "names", "bytes"))
+    if kind == "description":
+        changed[DESCRIPTION], mutation = mutate(entries[DESCRIPTION], random)
+        return {"model.fmu": zipped(changed)}, f"{kind}: {mutation}"
+    if kind == "names":
+        old, new = random.choice(list(entries)), random.choice(_NAMES)
+        content = changed.pop(old) if random.random() < 0.5 else b"x" * random.choice((0, 9, 10**6))
+        changed[new or old.upper()] = content
+        return {"model.fmu": zipped(changed)}, f"{kind}: {old} is {new}"
+    packed, mutation = mutate(zipped(entries), random, BYTES)
+    return {"model.fmu": packed}, f"{kind}: {mutation}"
+
+
+def _read_fmu(folder: Path) -> Description:
+    """Describe an FMU and load it; what CRC errors let pass is what the project built."""
+    path = folder / "model.fmu"
+    description = read_description(path)
+    with FMU(path):
+        return description

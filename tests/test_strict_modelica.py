@@ -1,0 +1,266 @@
+"""What a library says of others must be so: each wrong one is refused in words, with its line."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from workbench.errors import InputError
+from workbench.modelica import check, read_library
+
+ROOT = Path(__file__).parent.parent
+LIBRARIES = sorted(path.parent for path in (ROOT / "modelica").glob("*/package.mo"))
+
+COMMON = """package Lib
+  connector Flange Real s(unit="m"); flow Real f(unit="N"); end Flange;
+  connector Pin Real v; flow Real i; end Pin;
+  connector Signal = input Real;
+  expandable connector Bus end Bus;
+  type Length = Real(final unit="m");
+  type State = enumeration(open, shut);
+  partial model Slot input Real u; output Real y; end Slot;
+  model Unchanged extends Slot; equation y = u; end Unchanged;
+  model Gain extends Slot; parameter Real gain = 2.0; equation y = gain*u; end Gain;
+  model Other input Real u; output Real z; equation z = u; end Other;
+  model Named extends Slot; output Length label = 1.0; equation y = u; end Named;
+  model Part
+    parameter Real k(min=0.0) = 1.0;
+    final parameter Real n = 3.0;
+    parameter State state = State.open;
+    Length x(start=1.0, fixed=true);
+    Flange a; Pin p;
+    replaceable Unchanged slot(u=x) constrainedby Slot(u=x);
+    Unchanged firm(u=x);
+  protected
+    Real hidden = x;
+    Flange inside;
+  equation
+    a.s = x; p.v = 0.0; inside.s = 0.0;
+    der(x) = -k*x;
+  end Part;
+  model Holder "Of a class that may be exchanged"
+    replaceable model Law = Unchanged constrainedby Slot;
+    model Fixed = Unchanged;
+    Law law(u=1.0);
+  end Holder;
+  model World parameter Real g = 9.81; end World;
+  model Falls outer World world; Real w = world.g; end Falls;
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    file = folder / "Lib" / "package.mo"
+    file.parent.mkdir()
+    file.write_text(f"{COMMON}{text}\nend Lib;\n")
+    return file
+
+
+# Model M, and what is said of it.
+WRONG = {
+    "modifier of a component": (
+        "model M Part part(kk=2.0); end M;",
+        r"modifier of 'kk', but Lib\.Part has no such element \(closest: 'k'\)",
+    ),
+    "modifier where it extends": (
+        "model M extends Part(depth=2.0); end M;",
+        r"modifier of 'depth', but Lib\.Part has no such element",
+    ),
+    "modifier within a modifier": (
+        "model N Part part; end N; model M N n(part(slot(gain=2.0))); end M;",
+        r"modifier of 'gain', but Lib\.Unchanged has no such element",
+    ),
+    "modifier of what is redeclared": (
+        "model M Part part[2](redeclare Gain slot(gane=3.0)); end M;",
+        r"modifier of 'gane', but Lib\.Gain has no such element \(closest: 'gain'\)",
+    ),
+    "modifier after a redeclaration": (
+        "model N = Part(redeclare Gain slot); model M N n(slot(bias=1.0)); end M;",
+        r"modifier of 'bias', but Lib\.Gain has no such element",
+    ),
+    "modifier of a constraint": (
+        "model M replaceable Gain g(u=1.0) constrainedby Slot(gain=1.0); end M;",
+        r"modifier of 'gain', but Lib\.Slot has no such element",
+    ),
+    "attribute": (
+        "model M Part part(k(mni=1.0)); end M;",
+        r"modifier 'mni' \(closest: 'min'\) of Real",
+    ),
+    "attribute of a type": (
+        'type Speed = Real(uint="m/s"); model M Speed v = 1.0; end M;',
+        r"modifier 'uint' \(closest: 'unit'\) of Real",
+    ),
+    "attribute of another type": (
+        'model M parameter Integer n(unit="1") = 1; end M;',
+        "modifier 'unit'.* of Integer",
+    ),
+    "modifier of an attribute": (
+        "model M Real x(start(min=1.0)); equation x = 1.0; end M;",
+        r"modifier 'start\(\.\.\.\)' of Real",
+    ),
+    "attribute that is final": (
+        'model M Part part(x(unit="mm")); end M;',
+        r"modifier 'unit', which is final in Lib\.Length",
+    ),
+    "modifier of what is final": (
+        "model M Part part(n=4.0); end M;",
+        r"modifier of 'n', which is final",
+    ),
+    "modifier of what became final": (
+        "model N extends Part(final k=2.0); end N; model M N n(k=3.0); end M;",
+        r"modifier of 'k', which is final",
+    ),
+    "modifier of what is protected": (
+        "model M Part part(hidden=4.0); end M;",
+        r"modifier of 'hidden', which is protected in Lib\.Part",
+    ),
+    "two modifiers of a name": (
+        "model M Part part(k=1.0, k=2.0); end M;",
+        "second modifier of 'k'",
+    ),
+    "two elements of a name": (
+        "model M Part part; Gain part(u=1.0); end M;",
+        r"second element 'part' of Lib\.M",
+    ),
+    "redeclaration of nothing": (
+        "model M Part part(redeclare Gain solt); end M;",
+        r"modifier of 'solt', but Lib\.Part has no such element \(closest: 'slot'\)",
+    ),
+    "redeclaration of what is not replaceable": (
+        "model M Part part(redeclare Gain firm); end M;",
+        "redeclaration of 'firm', which is not replaceable",
+    ),
+    "second redeclaration": (
+        "model N = Part(redeclare Gain slot); model M N n(redeclare Gain slot); end M;",
+        "redeclaration of 'slot', which is not replaceable",
+    ),
+    "redeclaration by what does not fit": (
+        "model M Part part(redeclare Other slot); end M;",
+        r"Lib\.Other for 'slot', without Real y; expected a class that has all that Lib\.Slot has",
+    ),
+    "redeclaration by what is not there": (
+        "model M Part part(redeclare Gane slot); end M;",
+        r"no class 'Gane' \(closest: 'Gain'\)",
+    ),
+    "redeclaration of a class": (
+        "model M Holder holder(redeclare model Law = Other); end M;",
+        r"Lib\.Other for 'Law', without Real y",
+    ),
+    "redeclaration of a class that is not replaceable": (
+        "model M Holder holder(redeclare model Fixed = Gain); end M;",
+        "redeclaration of 'Fixed', which is not replaceable",
+    ),
+    "default that does not fit": (
+        "model M replaceable Other o(u=1.0) constrainedby Slot; end M;",
+        r"Lib\.Other for 'o', without Real y",
+    ),
+    "class": ("model M Prat part; end M;", r"no class 'Prat' \(closest: 'Part'\)"),
+    "base": ("model M extends Prat; end M;", r"no class 'Prat' \(closest: 'Part'\)"),
+    "class that contains itself": (
+        "model N M m; end N; model M N n; end M;",
+        r"Lib\.M, which has a component of its own class",
+    ),
+    "connector": (
+        "model M Part a; Part b; equation for i in 1:2 loop connect(a.a, b.aa); end for; end M;",
+        r"connect with 'b\.aa', but Lib\.Part has no 'aa'",
+    ),
+    "connector of nothing": (
+        "model M Part a; equation connect(b[1].a, a.a); end M;",
+        r"connect with 'b\.a', but Lib\.M has no 'b'",
+    ),
+    "connector that is protected": (
+        "model M Part a; Part b; equation connect(a.a, b.inside); end M;",
+        r"connect with 'b\.inside', but 'inside' is protected in Lib\.Part",
+    ),
+    "connectors of two kinds": (
+        "model M Part a; Part b; equation connect(a.a, b.p); end M;",
+        r"connection of a\.a and b\.p, which are Lib\.Flange and Lib\.Pin",
+    ),
+    "connection of no connector": (
+        "model M Part a; Part b; equation connect(a, b); end M;",
+        r"connect with 'a', which is a Lib\.Part",
+    ),
+    "outer without inner": (
+        "model N Falls falls[2]; end N; model M N n; end M;",
+        r"'outer world' in Lib\.Falls, which Lib\.M has; expected an 'inner world'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
+def test_what_is_not_so_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message) as refused:
+        check(read_library(write(tmp_path, text)), "Lib.M")
+    assert re.search(r"Lib/package\.mo:\d+$", refused.value.where)
+
+
+RIGHT = {
+    "attributes of every kind": (
+        "model M parameter Integer n(min=1, max=3) = 2; parameter State s(start=State.open);"
+        ' Real x(quantity="Length", unit="m", displayUnit="mm", min=0, max=1, start=0, fixed=true,'
+        " nominal=1, unbounded=false, stateSelect=StateSelect.prefer); parameter Boolean b(start="
+        'true) = true; parameter String t(start="") = "a"; equation der(x) = n; end M;'
+    ),
+    "inherited elements, two classes up": (
+        "model N extends Part(k=2.0); end N; model M extends N(slot(y(min=0.0)), k=3.0); end M;"
+    ),
+    "protected elements of a base": "model M extends Part(hidden(min=0.0)); end M;",
+    "arrays": "model M Part part[2](each k=2.0, x(each start=0.0), slot(u={1.0, 2.0})); end M;",
+    "elements of what is redeclared": (
+        "model N = Part(redeclare replaceable Gain slot); model M N n(slot(gain=2.0)); "
+        "N o(redeclare Named slot(label(min=0.0))); end M;"
+    ),
+    "elements of a redeclared class": (
+        "model M Holder a(redeclare model Law = Gain(gain=3.0), law(gain=4.0)); end M;"
+    ),
+    "a stand-in that extends nothing": (
+        "model Alike input Real u; output Real y; equation y = u; end Alike;"
+        " model M Part part(redeclare Alike slot); end M;"
+    ),
+    "connectors of the same variables": (
+        "connector Alike Real s; flow Real f; end Alike; model N Alike c; equation c.s = 1.0;"
+        " end N; model M Part part[2]; N n; equation for i in 1:2 loop connect(part[i].a, n.c); "
+        "end for; if true then connect(part[1].p, part[2].p); end if; end M;"
+    ),
+    "connectors of a predefined type": (
+        "model N Signal u; end N; model M Signal u; N n; equation connect(u, n.u); end M;"
+    ),
+    "what an expandable connector gets": (
+        "model M Bus bus; Signal u; equation connect(bus.speed, u); end M;"
+    ),
+    "an inner further out": (
+        "model N Falls falls; end N; model M N n; inner World world(g=1.6); end M;"
+    ),
+    "what is wrong in another model": "model M Part part; end M; model N Part part(kk=1.0); end N;",
+}
+
+
+@pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)
+def test_what_is_so_is_accepted(text: str, tmp_path: Path) -> None:
+    check(read_library(write(tmp_path, text)), "Lib.M")
+
+
+@pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
+def test_every_class_that_comes_with_the_workbench_says_what_is_so(library: Path) -> None:
+    check(read_library(library / "package.mo"))
+
+
+def test_either_compiler_refuses_it_before_its_front_end_is_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rumoca")
+    pytest.importorskip("casadi")
+    from workbench.compiler import build, openmodelica  # needs the extra
+
+    package = write(tmp_path, "model M Part part(slot(gain=2.0)); end M;")
+    omc = tmp_path / "bin" / "omc"
+    omc.parent.mkdir()
+    omc.write_text("#!/bin/sh\ntouch called\n")
+    omc.chmod(0o755)
+    monkeypatch.setenv("PATH", str(omc.parent))
+    out = tmp_path / "out"
+    message = r"package\.mo:\d+: found a modifier of 'gain'"
+    with pytest.raises(InputError, match=message):
+        build(package, "Lib.M", out / "M.fmu")
+    with pytest.raises(InputError, match=message):
+        openmodelica.build_with_omc(package, ["Lib.M"], out)
+    assert not out.exists()
