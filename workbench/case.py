@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.plausibility import Origin, doubts
 from workbench.recording import Matrix, Vector, read_columns
 from workbench.system import Condition, System
 from workbench.tables import Table, read_table
@@ -32,6 +33,7 @@ class Case:
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
+    doubts : what is unlikely in the recording, in words.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Case:
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
     counts_from: float = -np.inf
+    doubts: tuple[str, ...] = ()
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -123,7 +126,8 @@ def read_case(folder: Path, system: System) -> Case:
     Raises
     ------
     InputError
-        At the first problem, with the file and the line, column or key.
+        At the first problem, with the file and the line, column or key; also where the recording
+        cannot be what it says it is.
     """
     toml = folder / "case.toml"
     document = read_table(
@@ -142,6 +146,7 @@ def read_case(folder: Path, system: System) -> Case:
     source = folder / measurement.take("file", str)
     columns = _column_names(measurement, system)
     time, signals = _read_signals(source, columns, system)
+    origin = Origin(str(source), 2, columns, f"{toml}, [conditions]")
     model = document.table("model")
     model.refuse_unknown(("names",))
     names = model.table("names")
@@ -156,6 +161,7 @@ def read_case(folder: Path, system: System) -> Case:
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         counts_from=_counts_from(measurement, time),
+        doubts=doubts(time, signals, conditions, system, origin),
     )
 
 

@@ -1,6 +1,7 @@
 """`workbench simulate`: all estimators on recordings."""
 
 import argparse
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,6 +19,7 @@ from workbench.commands.arguments import (
     example_case,
     show_progress,
 )
+from workbench.cosim import Ending
 from workbench.files import write_json
 from workbench.observers import choose
 from workbench.provenance import models, software
@@ -113,7 +115,23 @@ def _simulate(options: argparse.Namespace) -> int:
         print(f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it")
     if window is not None and not interrupted:
         window.wait()
-    return 130 if interrupted else 0
+    if interrupted:
+        return 130
+    idle = _idle(done)
+    for name in idle:
+        print(
+            f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
+        )
+    return 1 if idle else 0
+
+
+def _idle(results: Sequence[CaseResult]) -> list[str]:
+    """Estimators that failed in every case."""
+    return [
+        name
+        for name in results[0].runs
+        if all(one.runs[name].ending is not Ending.OK for one in results)
+    ]
 
 
 def _shown(

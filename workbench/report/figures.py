@@ -322,7 +322,7 @@ def _panel(title: str, curves: Sequence[Curve], height: float) -> Panel:
 
 def _range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
     """Lowest and highest value with a margin on both sides; 0 to 1 where there is none."""
-    values = np.concatenate(signals)
+    values = np.concatenate([*signals, []])  # none, where nothing was estimated
     values = values[np.isfinite(values)]
     if not values.size:
         return 0.0, 1.0
