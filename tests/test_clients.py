@@ -56,8 +56,8 @@ def run_fmpy(path: Path, interface: str) -> np.ndarray:
 def test_model_exchange_under_fmpy_follows_a_ramp_whose_rows_stand_twice(fmi: int) -> None:
     """FMPy sets inputs where its solver has returned, which may have stepped far past that.
 
-    At a time that stands twice it starts anew. Against Co-Simulation with the same inputs, held over
-    each step: the L-stable integrator of the FMU and CVODE owe nothing to each other.
+    At a time that stands twice it starts anew. Against Co-Simulation with the same inputs, held
+    over each step: the L-stable integrator of the FMU and CVODE owe nothing to each other.
     """
     time = np.arange(0.0, 6.0, 0.005)
     pressure = 3.6e5 * np.clip((time - 4.03) / 0.5, 0.0, 1.0)
@@ -77,7 +77,7 @@ def test_model_exchange_under_fmpy_follows_a_ramp_whose_rows_stand_twice(fmi: in
         for interface, rows in (("ModelExchange", np.repeat(table, 2)), ("CoSimulation", table))
     ]
     assert forces[1].max() > 5e3
-    # A relative tolerance of 1e-8 of 46 rad/s is 2e-7 m/s of slip: 0.04 N, in each of many restarts.
+    # A relative tolerance of 1e-8 of 46 rad/s is 2e-7 m/s of slip: 0.04 N, in each of its steps.
     assert abs(forces[0] - forces[1]).max() < 1.0
 
 

@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from workbench.errors import InputError
+from workbench.files import before_last
 from workbench.pool import Pool
 from workbench.tuning import (
     Candidate,
@@ -26,7 +27,7 @@ from workbench.tuning import (
     evaluators,
     search,
 )
-from workbench.tuning.checkpoint import load
+from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.search import identity
 
 SMALL = Plan(generations=4, population=1, seed=3)
@@ -206,5 +207,55 @@ def test_another_search_does_not_go_on_from_a_checkpoint(
     with pytest.raises(InputError, match="another search"):
         run(pool, problem, path, replace(SMALL, seed=4), resume=True)
     path.write_text(path.read_text()[:-100])
+    before_last(path).unlink()
     with pytest.raises(InputError, match="no checkpoint"):
         run(pool, problem, path, SMALL, resume=True)
+
+
+def test_a_damaged_checkpoint_gives_way_to_the_one_before(
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
+) -> None:
+    path = tmp_path / "checkpoint.json"
+    whole = run(pool, problem, path, SMALL)
+    path.write_text(path.read_text().replace('"z":', '"z": ', 1).replace("0.", "0.1", 1))
+    warnings: list[str] = []
+    found = run(pool, problem, path, SMALL, resume=True, warn=warnings.append)
+    assert_array_equal(found.best, whole.best)
+    assert "its checksum is another one" in warnings[0]
+    assert len(found.history) == len(whole.history)
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> tuple[Path, Checkpoint]:
+    rng = np.random.default_rng(1)
+    population = Population(rng.random((6, 3)), rng.random(6), rng.random((6, 2)))
+    generation = Generation(0.1, "a", "b", 0.2, 6, 100, 120, {"a": 1}, 0, 0.5)
+    checkpoint = Checkpoint("mark", population, False, (generation, generation))
+    path = tmp_path / "checkpoint.json"
+    save(checkpoint, path)
+    return path, checkpoint
+
+
+def test_no_damage_of_a_checkpoint_goes_unseen(saved: tuple[Path, Checkpoint]) -> None:
+    """Bytes replaced, cut out, doubled: what is read is what was written, or refused."""
+    path, checkpoint = saved
+    written = path.read_bytes()
+    rng = np.random.default_rng(2)
+    refused = 0
+    for _ in range(2000):
+        first, last = sorted(rng.integers(0, len(written), 2))
+        middle = [b"", bytes(rng.integers(32, 127, 3).tolist()), 2 * written[first:last]]
+        last = min(last, first + 8)
+        path.write_bytes(written[:first] + middle[rng.integers(3)] + written[last:])
+        try:
+            found = load(path, "mark")
+        except InputError:
+            refused += 1
+        else:
+            assert found is not None
+            assert found.history == checkpoint.history
+            for name in ("members", "z", "z_k"):
+                assert_array_equal(
+                    getattr(found.population, name), getattr(checkpoint.population, name)
+                )
+    assert refused > 1900

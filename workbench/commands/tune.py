@@ -25,7 +25,7 @@ from workbench.commands.arguments import (
     positive,
 )
 from workbench.errors import InputError
-from workbench.files import write_whole
+from workbench.files import claimed, write_whole
 from workbench.pool import Pool
 from workbench.report.tuning import format_tuned, write_tuning_page
 from workbench.system_file import with_model
@@ -36,6 +36,7 @@ from workbench.tuning import (
     Generation,
     Job,
     Plan,
+    Problem,
     Progress,
     Tuned,
     draw_cases,
@@ -176,10 +177,15 @@ def _tune(options: argparse.Namespace) -> int:
         share = options.scale_error / 100.0
         errors = {one.name: share for one in system.outputs if one.scale_error and share}
     problem = pose(system, options.estimator, cases, errors)
+    with claimed(out):
+        return _run(options, problem, len(cases), out)
+
+
+def _run(options: argparse.Namespace, problem: Problem, cases: int, out: Path) -> int:
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     print(
-        f"{options.estimator}: {size} gains, {len(cases)} cases, at most {plan.generations} "
+        f"{options.estimator}: {size} gains, {cases} cases, at most {plan.generations} "
         f"generations of {plan.population * size} candidates",
         flush=True,
     )

@@ -105,14 +105,14 @@ def search(
     checkpoint : file that is written after every generation.
     resume : go on from it, if it is there.
     report : called with the history after every generation.
-    warn : called where a checkpoint cannot be written; the search goes on.
+    warn : called where a checkpoint cannot be written, or is damaged and the one before is read.
 
     Returns
     -------
     Search, or None if it was interrupted before there was anything to return.
     """
     mark = identity(job, space, cases, plan)
-    state = load(checkpoint, mark) if resume else None
+    state = load(checkpoint, mark, warn) if resume else None
     interrupted = False
     try:
         while state is None or not (state.converged or len(state.history) > plan.generations):
