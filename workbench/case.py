@@ -12,7 +12,7 @@ from workbench.errors import InputError
 from workbench.plausibility import Origin, doubts
 from workbench.recording import Matrix, Vector, read_columns
 from workbench.system import Condition, System
-from workbench.tables import Table, read_table
+from workbench.tables import Table, read_table, shown
 from workbench.units import quantity, si_factor
 
 Value = float | int | str | tuple[Any, ...]
@@ -278,7 +278,7 @@ def _choice(one: Condition, value: object, where: str) -> str | int:
         if type(value) is type(choice) and value == choice:
             return choice
     raise InputError(
-        where=where, found=repr(value), expected=_either(one), remedy="write one of them"
+        where=where, found=shown(value), expected=_either(one), remedy="write one of them"
     )
 
 
@@ -287,6 +287,18 @@ def _either(one: Condition) -> str:
 
 
 def _case_folders(path: Path) -> list[Path]:
+    try:
+        return _found_folders(path)
+    except OSError as error:
+        raise InputError(
+            where=str(path),
+            found=f"a folder that cannot be read ({error.strerror})",
+            expected="a case folder or a folder of case folders",
+            remedy="correct the path, or the permissions of the folder",
+        ) from None
+
+
+def _found_folders(path: Path) -> list[Path]:
     if not path.is_dir():
         raise InputError(
             where=str(path),

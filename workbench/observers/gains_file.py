@@ -1,7 +1,5 @@
 """The file of gains, `gains.toml`: what the tuning writes, and who runs observers reads."""
 
-import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +12,8 @@ from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.recording import read_text
 from workbench.system import System
+from workbench.tables import LARGEST, read_table, shown
 
 _AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
 
@@ -35,7 +33,7 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     content = _content(path)
     estimator = content.get("estimator")
     if not isinstance(estimator, str) or estimator not in reasoned:
-        raise _wrong(path, f"estimator = {estimator!r}", f"one of {', '.join(reasoned)}")
+        raise _wrong(path, f"estimator = {shown(estimator)}", f"one of {', '.join(reasoned)}")
     blank = reasoned[estimator]
     given = _table(content, "gains", path)
     if missing := [name for name in blank.names if name not in given]:
@@ -88,16 +86,13 @@ def tuned_file(system: System, name: str) -> Path | None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_text(path, _AGAIN))
-    except tomllib.TOMLDecodeError as error:
-        raise _wrong(path, f"no TOML ({error})") from None
+    return dict(read_table(path, _AGAIN, "L11 = 0.5").content)
 
 
 def _table(content: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:
     table = content.get(name, {})
     if not isinstance(table, dict):
-        raise _wrong(path, f"{name} = {table!r}", f"a table [{name}]")
+        raise _wrong(path, f"{name} = {shown(table)}", f"a table [{name}]")
     return table
 
 
@@ -107,14 +102,14 @@ def _constants(given: object, name: str, count: int, path: Path) -> Vector:
         values = np.array([_number(value, name, path) for value in given])
         if values.all():
             return values
-    raise _wrong(path, f"{name} = {given!r} in [design]", f"{count} numbers other than zero")
+    raise _wrong(path, f"{name} = {shown(given)} in [design]", f"{count} numbers other than zero")
 
 
 def _number(value: object, name: str, path: Path) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _wrong(path, f"{name} = {value!r}", "a number")
-    if not math.isfinite(value):
-        raise _wrong(path, f"{name} = {value!r}", "a finite number")
+        raise _wrong(path, f"{name} = {shown(value)}", "a number")
+    if not abs(value) < LARGEST:  # refuses NaN, too
+        raise _wrong(path, f"{name} = {shown(value)}", "a finite number")
     return float(value)
 
 
