@@ -109,6 +109,13 @@ def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
     folders: dict[str, Path] = {}
     for folder in (folder for path in paths for folder in _case_folders(path)):
         name = folder.resolve().name
+        if any("\ud800" <= character <= "\udfff" for character in name):
+            raise InputError(  # as Python reads bytes of a name that are none of a character
+                where=ascii(str(folder)),
+                found="a name that is no UTF-8",
+                expected="one that files and pages can hold",
+                remedy="rename the folder",
+            )
         if name in folders:
             raise InputError(
                 where=str(folder),

@@ -53,9 +53,10 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
 def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:
     """The text of a file of gains; numbers have all their digits."""
     values = map(float, gains.values)
+    comment = "".join(f"# {line}\n" for line in meaning.splitlines())
     parts = [
         tomli_w.dumps({"estimator": gains.estimator}),
-        f"# {meaning}\n" + tomli_w.dumps({"gains": dict(zip(gains.names, values, strict=True))}),
+        comment + tomli_w.dumps({"gains": dict(zip(gains.names, values, strict=True))}),
     ]
     if gains.design:
         design = {name: constants.tolist() for name, constants in gains.design.items()}
