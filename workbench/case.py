@@ -111,7 +111,7 @@ def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
         name = folder.resolve().name
         if any("\ud800" <= character <= "\udfff" for character in name):
             raise InputError(  # as Python reads bytes of a name that are none of a character
-                where=ascii(str(folder)),
+                where=str(folder),
                 found="a name that is no UTF-8",
                 expected="one that files and pages can hold",
                 remedy="rename the folder",
