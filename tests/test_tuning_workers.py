@@ -1,10 +1,16 @@
 """A search ends at the same gains with less work, other workers, after deaths and interruptions."""
 
 import errno
+import json
 import os
+import shutil
 import signal
-from collections.abc import Callable, Sequence
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +18,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+import workbench
 from workbench.errors import InputError
 from workbench.files import before_last
 from workbench.pool import Pool
@@ -19,6 +26,7 @@ from workbench.tuning import (
     Candidate,
     Evaluation,
     Evaluator,
+    NoWorkersError,
     Plan,
     Problem,
     Search,
@@ -103,6 +111,143 @@ def test_a_cluster_finds_the_same_gains(
         finally:
             remote.close()
     assert_array_equal(found.best, alone.best)
+
+
+BLOCK = """import sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == "workbench":
+            raise ModuleNotFoundError(f"No module named {name!r}")
+sys.meta_path.insert(0, Block())
+"""
+
+
+@contextmanager
+def dask(*arguments: str, path: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
+    """A scheduler or a worker in a process of its own, which finds modules in `path` first."""
+    here = path or Path(__file__).parent.parent
+    environment = {**os.environ, "PYTHONPATH": str(here)}
+    command = [sys.executable, "-m", f"distributed.cli.dask_{arguments[0]}", *arguments[1:]]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([*command, "--no-dashboard"], env=environment, cwd=here, **quiet)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def worker(
+    address: str, path: Path | None = None
+) -> AbstractContextManager[subprocess.Popen[bytes]]:
+    return dask("worker", address, "--no-nanny", "--nthreads", "1", path=path)
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Address and process of a scheduler."""
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    with dask("scheduler", "--scheduler-file", str(file), "--port", "0") as process:
+        deadline = time.monotonic() + 60.0
+        while not (file.exists() and file.read_text()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], process
+
+
+def test_a_cluster_without_workers_is_refused_in_words(
+    scheduler: tuple[str, object], problem: Problem
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    with pytest.raises(InputError, match=r"found no workers; .* start workers with 'dask worker"):
+        DaskPool(scheduler[0], Evaluator, problem.job, 60.0, patience=1.0)
+
+
+def test_only_workers_with_the_same_code_get_work(
+    scheduler: tuple[str, object], problem: Problem, pool: Pool[Evaluator], tmp_path: Path
+) -> None:
+    """One lacks the project, one has a constant of its objective otherwise."""
+    distributed = pytest.importorskip("distributed")
+    from workbench.tuning.cluster import DaskPool
+
+    address, _ = scheduler
+    lacking, other = tmp_path / "lacking", tmp_path / "other"
+    lacking.mkdir()
+    (lacking / "sitecustomize.py").write_text(BLOCK)
+    shutil.copytree(Path(workbench.__file__).parent, other / "workbench")
+    changed = other / "workbench" / "objective.py"
+    changed.write_text(changed.read_text() + "\nBETTER = 2.0\n")
+    warnings: list[str] = []
+    with worker(address, lacking), worker(address, other):
+        with distributed.Client(address) as client:
+            client.wait_for_workers(2, timeout=60)
+        with pytest.raises(InputError, match="code of workbench none, here"):
+            DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
+        assert len(warnings) == 2
+        warnings.clear()
+        with worker(address), distributed.Client(address) as client:
+            client.wait_for_workers(3, timeout=60)
+            remote = DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
+            try:
+                found = run(remote, problem, tmp_path / "remote.json", SMALL)
+            finally:
+                remote.close()
+    assert len(warnings) == 2
+    assert all("it gets no work" in one for one in warnings)
+    assert_array_equal(found.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
+
+
+def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    problem: Problem,
+    pool: Pool[Evaluator],
+    tmp_path: Path,
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    address, process = scheduler
+    warnings: list[str] = []
+
+    def die_in_time(history: Sequence[object]) -> None:
+        if len(history) == 2:
+            process.kill()
+
+    path = tmp_path / "checkpoint.json"
+    with worker(address):
+        remote = DaskPool(address, Evaluator, problem.job, 60.0)
+        try:
+            part = run(remote, problem, path, SMALL, report=die_in_time, warn=warnings.append)
+            with pytest.raises(NoWorkersError, match="does not answer"):
+                remote.submit(pid).result()
+        finally:
+            remote.close()
+    assert part.interrupted
+    assert len(part.history) >= 2
+    assert "--resume goes on from there" in warnings[0]
+    whole = run(pool, problem, tmp_path / "whole.json", SMALL)
+    rest = run(pool, problem, path, SMALL, resume=True)
+    assert_array_equal(rest.best, whole.best)
+
+
+def test_a_cluster_whose_workers_are_gone_says_so(
+    scheduler: tuple[str, object], problem: Problem, tmp_path: Path
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    address, _ = scheduler
+    with worker(address) as process:
+        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=60.0)
+        remote._patience = 2.0
+        process.kill()
+        try:
+            with pytest.raises(NoWorkersError, match=r"all workers of the cluster .* are gone"):
+                remote.submit(pid).result(timeout=60)
+            # Another joins too late for this pool.
+            with pytest.raises(NoWorkersError):
+                remote.submit(pid).result(timeout=60)
+        finally:
+            remote.close()
 
 
 def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(

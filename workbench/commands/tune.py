@@ -35,6 +35,7 @@ from workbench.tuning import (
     Evaluator,
     Generation,
     Job,
+    NoWorkersError,
     Plan,
     Problem,
     Progress,
@@ -190,13 +191,17 @@ def _run(options: argparse.Namespace, problem: Problem, cases: int, out: Path) -
         flush=True,
     )
     progress = _Printed(plan, options.folds, out, live=options.live)
-    with _one_interruption(), closing(_pool(options, problem.job)) as pool:
-        tuned = tune(
-            *(pool, problem, plan, out),
-            folds=options.folds,
-            resume=options.resume,
-            progress=progress,
-        )
+    try:
+        with _one_interruption(), closing(_pool(options, problem.job)) as pool:
+            tuned = tune(
+                *(pool, problem, plan, out),
+                folds=options.folds,
+                resume=options.resume,
+                progress=progress,
+            )
+    except NoWorkersError as error:
+        print(f"error: {error}; nothing was evaluated", file=sys.stderr)
+        return 1
     if tuned is None:
         print("interrupted before the first generation was evaluated; nothing is written")
         return 130
@@ -257,7 +262,12 @@ def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[
     from workbench.tuning.cluster import DaskPool
 
     try:
-        return DaskPool(options.cluster, Evaluator, job, options.timeout)
+        companion = [job.system.companion] if job.system.companion else []
+        return DaskPool(
+            *(options.cluster, Evaluator, job, options.timeout), modules=companion, warn=_warn
+        )
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(
             where=f"command line, --cluster {options.cluster}",
@@ -265,6 +275,10 @@ def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[
             expected="the address of a running one, such as tcp://10.0.0.1:8786",
             remedy="start one with 'dask scheduler', and workers with 'dask worker ADDRESS'",
         ) from None
+
+
+def _warn(message: str) -> None:
+    print(f"warning: {message}", file=sys.stderr, flush=True)
 
 
 class _Printed(Progress):
@@ -311,7 +325,7 @@ class _Printed(Progress):
 
     def warn(self, message: str) -> None:
         """See Progress."""
-        print(f"warning: {message}", file=sys.stderr, flush=True)
+        _warn(message)
 
 
 def _written(path: Path, text: str) -> bool:

@@ -22,7 +22,7 @@ from workbench.fmu import Matrix, Vector
 from workbench.observers import SearchSpace
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.cost import Candidate, Evaluation, Job
-from workbench.tuning.workers import Workers, evaluate_all
+from workbench.tuning.workers import NoWorkersError, Workers, evaluate_all
 
 SPREAD = 0.1  # of the first candidates about the reasoned gains, as a share of the search space
 TOLERANCE = 1e-3  # spread of z in the population below which more generations gain nothing
@@ -129,6 +129,9 @@ def search(
             report(history)
     except KeyboardInterrupt:
         interrupted = True
+    except NoWorkersError as error:
+        interrupted = True
+        warn(f"{error}; the best so far is kept, and --resume goes on from there")
     if state is None:
         return None
     best = state.population
