@@ -1,6 +1,8 @@
 """Stage 1: what is refused, and with which words."""
 
+import os
 import pickle
+from pathlib import Path
 
 import pytest
 from numpy.testing import assert_array_equal
@@ -228,6 +230,13 @@ def test_two_cases_of_one_name_are_refused(tmp_path, system):
     first, second = write(tmp_path / "x" / "01_a"), write(tmp_path / "y" / "01_a")
     match = "y/01_a: found a second case '01_a' beside .*x/01_a"
     assert_refused(match, lambda: read_cases([first, second], system))
+
+
+def test_a_case_whose_name_is_no_text_is_refused(tmp_path, system):
+    folder = write(Path(os.fsdecode(os.fsencode(tmp_path) + b"/01_\xff")))
+    assert_refused(
+        r"01_\\udcff: found a name that is no UTF-8", lambda: read_cases([folder], system)
+    )
 
 
 def test_a_numbered_folder_without_case_toml_is_refused_not_skipped(tmp_path, system):

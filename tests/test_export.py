@@ -307,6 +307,65 @@ def test_in_an_ssp_tool_the_estimate_follows_the_reference(package: Path) -> Non
     assert result["muDCEstimate"][late] == pytest.approx(0.33, abs=1e-3)
 
 
+@pytest.mark.parametrize("parameters", [True, False], ids=["start.ssv", "from rest"])
+@pytest.mark.parametrize("pressure", [0.5e5, 2e5, 4.2e5])
+@pytest.mark.parametrize("step", [0.001, 0.005, 0.02])
+def test_in_an_ssp_tool_frictions_are_right_at_any_step(
+    package: Path, step: float, pressure: float, parameters: bool
+) -> None:
+    """FMPy steps both FMUs once before it connects them: the observer's first inputs are zero.
+
+    It takes the start values from its caller and not from the package; without them the machine is
+    driven up from rest, and has pads of 0.30.
+    """
+    ssp = str(package / "out" / "DisturbanceObserver.ssp")
+    start = read_ssv(ssp, resource="resources/start.ssv") if parameters else None
+    begin = 1.0 if parameters else 4.0  # of braking
+
+    def drive(t: float) -> float:
+        return 0.045 * pressure if t > begin + 0.2 else 0.0 if parameters else 15e3
+
+    result = simulate_ssp(
+        ssp,
+        stop_time=begin + 3.0,
+        step_size=step,
+        parameter_set=start,
+        input={
+            "pB": lambda t: pressure * np.clip((t - begin) / 0.5, 0.0, 1.0),
+            "tauR": drive,
+        },
+    )
+    time, error = result["time"], abs(result["FxEstimate"] - result["Fx"])
+    late = time > begin + 2.0
+    # 0.1 % of the force of a hard stop; before the pads touch, and while friction acts.
+    for part in ((time > begin - 0.5) & (time < begin), late):
+        assert error[part].max() < 30.0
+    # Half a bar is a quarter above where the pads touch: their friction is looked for longest.
+    within = 0.03 if pressure < 1e5 else 3e-3
+    assert result["muDCEstimate"][late] == pytest.approx(0.33 if parameters else 0.30, abs=within)
+
+
+def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(
+    exported: Exported, dry_case: Case
+) -> None:
+    count = 2000
+    time, u, y = dry_case.time[:count], dry_case.u[:count], dry_case.y[:count]
+    earlier = np.append(time[0] - 0.005 * np.arange(3, 0, -1), time)
+    padded = np.vstack([np.zeros((3, 2)), u]), np.vstack([np.zeros((3, 2)), y])
+    found = run_fmu(exported.path, earlier, *padded)[3:]
+    assert disagreement(found, run_python(exported.python, time, u, y)) < AGREEMENT
+
+
+def test_start_values_of_the_package_cover_the_observer(package: Path) -> None:
+    ssp = str(package / "out" / "DisturbanceObserver.ssp")
+    values = {
+        one.name: float(one.value)
+        for one in read_ssv(ssp, resource="resources/start.ssv").parameters
+    }
+    for name in ("omegaW", "omegaR"):
+        assert values[f"observer.{name}"] == values[f"machine.{name}"] > 0.0
+
+
 def test_gains_of_an_estimator_without_a_model_are_refused(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

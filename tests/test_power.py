@@ -276,6 +276,24 @@ def test_line_that_a_kill_cut_off_is_forgotten(tmp_path: Path) -> None:
     assert Journal(path, IDENTITY, resume=True).results == [first, second]
 
 
+def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "sets.jsonl"
+    results = [said({"fx_gain": 0.1 * k}) for k in range(1, 4)]
+    journal = Journal(path, IDENTITY, resume=False)
+    for one in results:
+        journal.append(one)
+    whole = path.read_text()
+    path.write_text(whole.replace("0.2", "0.3", 1))
+    damaged = path.read_text()
+    journal = Journal(path, IDENTITY, resume=True)
+    assert journal.results == [results[0], results[2]]
+    assert journal.damaged == [3]
+    assert (tmp_path / "sets.before.jsonl").read_text() == damaged
+    path.write_text(whole.replace("seed", "sead", 1))
+    with pytest.raises(InputError, match=r"line 1: .*checksum.*put sets.before.jsonl"):
+        Journal(path, IDENTITY, resume=True)
+
+
 def test_verdicts_of_another_run_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "sets.jsonl"
     Journal(path, IDENTITY, resume=False).append(said({}))

@@ -1,6 +1,7 @@
 """The main job, end to end, as a user runs it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -186,3 +187,17 @@ def test_a_recording_without_force_is_estimated_but_not_judged(
     assert "no Fx" in values["reason"]
     assert "n/a" in capsys.readouterr().out
     assert (out / "02_vehicle.png").stat().st_size > 10_000
+
+
+def test_an_estimator_that_fails_in_every_case_is_no_success(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tuned = (root / "workbench/wheelset/gains/disturbance_observer.toml").read_text()
+    gains = tmp_path / "gains.toml"
+    gains.write_text(re.sub(r"^(L\w+ = ).*", r"\g<1>1e300", tuned, flags=re.MULTILINE))
+    out = tmp_path / "out"
+    arguments = ["simulate", str(root / "cases/01_dry_80_1.5"), "--workers", "1", "--out", str(out)]
+    chosen = ["--estimator", "disturbance_observer", "--gains", str(gains)]
+    assert main([*arguments, *chosen]) == 1
+    assert "disturbance_observer estimated nothing in any case" in capsys.readouterr().err
+    assert (out / "summary.json").is_file()  # with the reasons

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
+from workbench.files import write_whole
 from workbench.observers import Gains
 from workbench.observers.gains_file import format_gains, read_gains
 from workbench.simulation import prepare
@@ -47,6 +49,18 @@ def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -
     assert set(read.design) == set(gains.design)
     for constant, values in gains.design.items():
         assert_array_equal(read.design[constant], values)
+
+
+@pytest.mark.parametrize(
+    "name", ['a "quoted" one', "back\\slash", "two\nlines", "a'b", 'x"""', "é"]
+)
+def test_gains_tuned_on_cases_of_any_name_can_be_read_back(tmp_path: Path, name: str) -> None:
+    gains = Gains("ekf", ("a", "b"), np.array([0.1, 1e-300]), {}, "")
+    came_from = {"cases": [name], "z_k": {name: 0.1}, "fmu": {"file": name}}
+    path = tmp_path / "gains.toml"
+    write_whole(path, format_gains(gains, name, came_from))
+    assert_array_equal(read_gains(path, {"ekf": gains}).values, gains.values)
+    assert tomllib.loads(path.read_text())["provenance"] == came_from
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,16 @@
 """A search ends at the same gains with less work, other workers, after deaths and interruptions."""
 
 import errno
+import json
 import os
+import shutil
 import signal
-from collections.abc import Callable, Sequence
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +18,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+import workbench
 from workbench.errors import InputError
+from workbench.files import before_last
 from workbench.pool import Pool
 from workbench.tuning import (
     Candidate,
     Evaluation,
     Evaluator,
+    NoWorkersError,
     Plan,
     Problem,
     Search,
@@ -26,7 +35,7 @@ from workbench.tuning import (
     evaluators,
     search,
 )
-from workbench.tuning.checkpoint import load
+from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.search import identity
 
 SMALL = Plan(generations=4, population=1, seed=3)
@@ -102,6 +111,143 @@ def test_a_cluster_finds_the_same_gains(
         finally:
             remote.close()
     assert_array_equal(found.best, alone.best)
+
+
+BLOCK = """import sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == "workbench":
+            raise ModuleNotFoundError(f"No module named {name!r}")
+sys.meta_path.insert(0, Block())
+"""
+
+
+@contextmanager
+def dask(*arguments: str, path: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
+    """A scheduler or a worker in a process of its own, which finds modules in `path` first."""
+    here = path or Path(__file__).parent.parent
+    environment = {**os.environ, "PYTHONPATH": str(here)}
+    command = [sys.executable, "-m", f"distributed.cli.dask_{arguments[0]}", *arguments[1:]]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([*command, "--no-dashboard"], env=environment, cwd=here, **quiet)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def worker(
+    address: str, path: Path | None = None
+) -> AbstractContextManager[subprocess.Popen[bytes]]:
+    return dask("worker", address, "--no-nanny", "--nthreads", "1", path=path)
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Address and process of a scheduler."""
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    with dask("scheduler", "--scheduler-file", str(file), "--port", "0") as process:
+        deadline = time.monotonic() + 60.0
+        while not (file.exists() and file.read_text()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], process
+
+
+def test_a_cluster_without_workers_is_refused_in_words(
+    scheduler: tuple[str, object], problem: Problem
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    with pytest.raises(InputError, match=r"found no workers; .* start workers with 'dask worker"):
+        DaskPool(scheduler[0], Evaluator, problem.job, 60.0, patience=1.0)
+
+
+def test_only_workers_with_the_same_code_get_work(
+    scheduler: tuple[str, object], problem: Problem, pool: Pool[Evaluator], tmp_path: Path
+) -> None:
+    """One lacks the project, one has a constant of its objective otherwise."""
+    distributed = pytest.importorskip("distributed")
+    from workbench.tuning.cluster import DaskPool
+
+    address, _ = scheduler
+    lacking, other = tmp_path / "lacking", tmp_path / "other"
+    lacking.mkdir()
+    (lacking / "sitecustomize.py").write_text(BLOCK)
+    shutil.copytree(Path(workbench.__file__).parent, other / "workbench")
+    changed = other / "workbench" / "objective.py"
+    changed.write_text(changed.read_text() + "\nBETTER = 2.0\n")
+    warnings: list[str] = []
+    with worker(address, lacking), worker(address, other):
+        with distributed.Client(address) as client:
+            client.wait_for_workers(2, timeout=60)
+        with pytest.raises(InputError, match="code of workbench none, here"):
+            DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
+        assert len(warnings) == 2
+        warnings.clear()
+        with worker(address), distributed.Client(address) as client:
+            client.wait_for_workers(3, timeout=60)
+            remote = DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
+            try:
+                found = run(remote, problem, tmp_path / "remote.json", SMALL)
+            finally:
+                remote.close()
+    assert len(warnings) == 2
+    assert all("it gets no work" in one for one in warnings)
+    assert_array_equal(found.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
+
+
+def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    problem: Problem,
+    pool: Pool[Evaluator],
+    tmp_path: Path,
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    address, process = scheduler
+    warnings: list[str] = []
+
+    def die_in_time(history: Sequence[object]) -> None:
+        if len(history) == 2:
+            process.kill()
+
+    path = tmp_path / "checkpoint.json"
+    with worker(address):
+        remote = DaskPool(address, Evaluator, problem.job, 60.0)
+        try:
+            part = run(remote, problem, path, SMALL, report=die_in_time, warn=warnings.append)
+            with pytest.raises(NoWorkersError, match="does not answer"):
+                remote.submit(pid).result()
+        finally:
+            remote.close()
+    assert part.interrupted
+    assert len(part.history) >= 2
+    assert "--resume goes on from there" in warnings[0]
+    whole = run(pool, problem, tmp_path / "whole.json", SMALL)
+    rest = run(pool, problem, path, SMALL, resume=True)
+    assert_array_equal(rest.best, whole.best)
+
+
+def test_a_cluster_whose_workers_are_gone_says_so(
+    scheduler: tuple[str, object], problem: Problem, tmp_path: Path
+) -> None:
+    from workbench.tuning.cluster import DaskPool
+
+    address, _ = scheduler
+    with worker(address) as process:
+        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=60.0)
+        remote._patience = 2.0
+        process.kill()
+        try:
+            with pytest.raises(NoWorkersError, match=r"all workers of the cluster .* are gone"):
+                remote.submit(pid).result(timeout=60)
+            # Another joins too late for this pool.
+            with pytest.raises(NoWorkersError):
+                remote.submit(pid).result(timeout=60)
+        finally:
+            remote.close()
 
 
 def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
@@ -206,5 +352,55 @@ def test_another_search_does_not_go_on_from_a_checkpoint(
     with pytest.raises(InputError, match="another search"):
         run(pool, problem, path, replace(SMALL, seed=4), resume=True)
     path.write_text(path.read_text()[:-100])
+    before_last(path).unlink()
     with pytest.raises(InputError, match="no checkpoint"):
         run(pool, problem, path, SMALL, resume=True)
+
+
+def test_a_damaged_checkpoint_gives_way_to_the_one_before(
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
+) -> None:
+    path = tmp_path / "checkpoint.json"
+    whole = run(pool, problem, path, SMALL)
+    path.write_text(path.read_text().replace('"z":', '"z": ', 1).replace("0.", "0.1", 1))
+    warnings: list[str] = []
+    found = run(pool, problem, path, SMALL, resume=True, warn=warnings.append)
+    assert_array_equal(found.best, whole.best)
+    assert "its checksum is another one" in warnings[0]
+    assert len(found.history) == len(whole.history)
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> tuple[Path, Checkpoint]:
+    rng = np.random.default_rng(1)
+    population = Population(rng.random((6, 3)), rng.random(6), rng.random((6, 2)))
+    generation = Generation(0.1, "a", "b", 0.2, 6, 100, 120, {"a": 1}, 0, 0.5)
+    checkpoint = Checkpoint("mark", population, False, (generation, generation))
+    path = tmp_path / "checkpoint.json"
+    save(checkpoint, path)
+    return path, checkpoint
+
+
+def test_no_damage_of_a_checkpoint_goes_unseen(saved: tuple[Path, Checkpoint]) -> None:
+    """Bytes replaced, cut out, doubled: what is read is what was written, or refused."""
+    path, checkpoint = saved
+    written = path.read_bytes()
+    rng = np.random.default_rng(2)
+    refused = 0
+    for _ in range(2000):
+        first, last = sorted(rng.integers(0, len(written), 2))
+        middle = [b"", bytes(rng.integers(32, 127, 3).tolist()), 2 * written[first:last]]
+        last = min(last, first + 8)
+        path.write_bytes(written[:first] + middle[rng.integers(3)] + written[last:])
+        try:
+            found = load(path, "mark")
+        except InputError:
+            refused += 1
+        else:
+            assert found is not None
+            assert found.history == checkpoint.history
+            for name in ("members", "z", "z_k"):
+                assert_array_equal(
+                    getattr(found.population, name), getattr(checkpoint.population, name)
+                )
+    assert refused > 1900

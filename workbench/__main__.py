@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    except FMUError as error:
+    except (FMUError, OSError) as error:  # OSError: of the machine, such as a full temporary folder
         print(f"error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -10,6 +10,7 @@ wb.observe(system, cases[0], "ekf").plot()
 import os
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from workbench.modelica import read_library
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
 from workbench.observers.gains_file import usual_gains
+from workbench.plausibility import Origin, doubts
 from workbench.prepare import write_cases
 from workbench.recording import header
 from workbench.system import OBSERVER, System
@@ -48,9 +50,16 @@ def read_cases(path: str | Path | Sequence[str | Path], system: System | None = 
     ------
     InputError
         If a path holds no case, or a case cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        Of what is unlikely in a recording; `Case.doubts` keeps it.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    return read_folders([Path(one) for one in paths], system or load_system(usual_system()))
+    cases = read_folders([Path(one) for one in paths], system or load_system(usual_system()))
+    _warn(cases)
+    return cases
 
 
 def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list[Case], list[Case]]:
@@ -117,16 +126,28 @@ def case_from_frame(
         )
     time_ = found.pop("time")
     check_recording(time_, system, f"{where}, column 'time'", None)
-    return Case(
+    given = read_conditions(Table(conditions or {}, f"{where}, conditions"), system)
+    origin = Origin(where, None, {}, f"{where}, conditions")
+    case = Case(
         name=name,
         title=name,
-        conditions=read_conditions(Table(conditions or {}, f"{where}, conditions"), system),
+        conditions=given,
         time=time_,
         signals=found,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(one.name for one in system.outputs),
         source=Path(name),
+        doubts=doubts(time_, found, given, system, origin),
     )
+    _warn([case])
+    return case
+
+
+def _warn(cases: Sequence[Case]) -> None:
+    """Warn of what is unlikely in recordings."""
+    for case in cases:
+        for doubt in case.doubts:
+            warnings.warn(doubt, stacklevel=3)
 
 
 def observe(system: System, case: Case, estimator: str, gains: Gains | None = None) -> Run:

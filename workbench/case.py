@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.plausibility import Origin, doubts
 from workbench.recording import Matrix, Vector, read_columns
 from workbench.system import Condition, System
-from workbench.tables import Table, read_table
+from workbench.tables import Table, read_table, shown
 from workbench.units import quantity, si_factor
 
 Value = float | int | str | tuple[Any, ...]
@@ -32,6 +33,7 @@ class Case:
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
+    doubts : what is unlikely in the recording, in words.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Case:
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
     counts_from: float = -np.inf
+    doubts: tuple[str, ...] = ()
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -106,6 +109,13 @@ def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
     folders: dict[str, Path] = {}
     for folder in (folder for path in paths for folder in _case_folders(path)):
         name = folder.resolve().name
+        if any("\ud800" <= character <= "\udfff" for character in name):
+            raise InputError(  # as Python reads bytes of a name that are none of a character
+                where=str(folder),
+                found="a name that is no UTF-8",
+                expected="one that files and pages can hold",
+                remedy="rename the folder",
+            )
         if name in folders:
             raise InputError(
                 where=str(folder),
@@ -123,7 +133,8 @@ def read_case(folder: Path, system: System) -> Case:
     Raises
     ------
     InputError
-        At the first problem, with the file and the line, column or key.
+        At the first problem, with the file and the line, column or key; also where the recording
+        cannot be what it says it is.
     """
     toml = folder / "case.toml"
     document = read_table(
@@ -142,6 +153,7 @@ def read_case(folder: Path, system: System) -> Case:
     source = folder / measurement.take("file", str)
     columns = _column_names(measurement, system)
     time, signals = _read_signals(source, columns, system)
+    origin = Origin(str(source), 2, columns, f"{toml}, [conditions]")
     model = document.table("model")
     model.refuse_unknown(("names",))
     names = model.table("names")
@@ -156,6 +168,7 @@ def read_case(folder: Path, system: System) -> Case:
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         counts_from=_counts_from(measurement, time),
+        doubts=doubts(time, signals, conditions, system, origin),
     )
 
 
@@ -272,7 +285,7 @@ def _choice(one: Condition, value: object, where: str) -> str | int:
         if type(value) is type(choice) and value == choice:
             return choice
     raise InputError(
-        where=where, found=repr(value), expected=_either(one), remedy="write one of them"
+        where=where, found=shown(value), expected=_either(one), remedy="write one of them"
     )
 
 
@@ -281,6 +294,18 @@ def _either(one: Condition) -> str:
 
 
 def _case_folders(path: Path) -> list[Path]:
+    try:
+        return _found_folders(path)
+    except OSError as error:
+        raise InputError(
+            where=str(path),
+            found=f"a folder that cannot be read ({error.strerror})",
+            expected="a case folder or a folder of case folders",
+            remedy="correct the path, or the permissions of the folder",
+        ) from None
+
+
+def _found_folders(path: Path) -> list[Path]:
     if not path.is_dir():
         raise InputError(
             where=str(path),

@@ -129,7 +129,9 @@ def replay(case: Case, estimator: Estimator) -> Run:
         seconds = time.perf_counter() - begin
         values = np.asarray(estimate.values)
         given = np.isfinite(values[0])  # what the method estimates at all
-        if (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
+        if not given.any():
+            ending, message = Ending.NOT_FINITE, "from the start"
+        elif (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
             ending = Ending.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
         claimed = _claims(case, estimator, values)

@@ -5,6 +5,8 @@ from difflib import get_close_matches
 from functools import partial
 from typing import Any
 
+_LONGEST = 600  # characters of a part, some six lines of a terminal
+
 
 class InputError(ValueError):
     """A user's mistake: where it is, what was found, what was expected, what to do.
@@ -14,9 +16,12 @@ class InputError(ValueError):
     where : file, and the line, column or key in it.
     found, expected : noun phrases without a full stop.
     remedy : what to do, an imperative without a full stop.
+
+    Each part is one line of printable characters, and cut where it is longer than people read.
     """
 
     def __init__(self, *, where: str, found: str, expected: str, remedy: str) -> None:
+        where, found, expected, remedy = map(_line, (where, found, expected, remedy))
         super().__init__(f"{where}: found {found}; expected {expected}. To do: {remedy}.")
         self.where = where
         self.found = found
@@ -27,6 +32,16 @@ class InputError(ValueError):
         # Pickle would call the class with the message alone and hang a pool of processes.
         parts = {key: getattr(self, key) for key in ("where", "found", "expected", "remedy")}
         return partial(type(self), **parts), ()
+
+
+def _line(text: str) -> str:
+    """One line that a terminal shows as it is, whatever stood in a file."""
+    cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}... ({len(text)} characters)"
+    return cut if cut.isprintable() else "".join(map(_printable, cut))
+
+
+def _printable(character: str) -> str:
+    return character if character.isprintable() else ascii(character)[1:-1]
 
 
 class FMUError(RuntimeError):

@@ -62,7 +62,7 @@ class Expression:
     def _tree(self) -> ast.expr:
         try:
             return ast.parse(self.text, mode="eval").body
-        except (SyntaxError, ValueError, RecursionError):
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise self._wrong(self.text) from None
 
     @cached_property
@@ -74,8 +74,11 @@ class Expression:
             found.append(name)
             return 1.0
 
-        with np.errstate(all="ignore"):
-            self._walk(self._tree, note)
+        try:
+            with np.errstate(all="ignore"):
+                self._walk(self._tree, note)
+        except (RecursionError, OverflowError):
+            raise self._wrong(self.text) from None
         return frozenset(found)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:

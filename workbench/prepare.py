@@ -14,7 +14,7 @@ from typing import Any
 import tomli_w
 
 from workbench.errors import InputError
-from workbench.files import write_json, write_whole
+from workbench.files import claimed, write_json, write_whole
 from workbench.provenance import commit
 from workbench.recording import Vector
 from workbench.systems import system_path
@@ -138,22 +138,23 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
     _refuse_other_files(out)
     layout = _layout(known, source)
     recordings = list(layout.read(source))
-    for one in recordings:
-        _write_case(out / one.name, one)
-    write_json(
-        out / PREPARED,
-        {
-            "system": which,
-            "title": known.title,
-            "source": known.source,
-            "licence": known.licence,
-            "workbench": commit(),
-            "layout": layout.name,
-            "read": dict(layout.files),
-            "held_out": [one.name for one in recordings if one.held_out],
-            "cases": {one.name: _described(one) for one in recordings},
-        },
-    )
+    with claimed(out):
+        for one in recordings:
+            _write_case(out / one.name, one)
+        write_json(
+            out / PREPARED,
+            {
+                "system": which,
+                "title": known.title,
+                "source": known.source,
+                "licence": known.licence,
+                "workbench": commit(),
+                "layout": layout.name,
+                "read": dict(layout.files),
+                "held_out": [one.name for one in recordings if one.held_out],
+                "cases": {one.name: _described(one) for one in recordings},
+            },
+        )
     return recordings
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +45,8 @@ def read_text(path: Path, remedy: str) -> str:
         If the file cannot be read or is not UTF-8; `remedy` is for a file that cannot be read.
     """
     try:
+        if not stat.S_ISREG(path.stat().st_mode):  # a pipe or a device may never end
+            raise OSError(0, "no regular file")
         raw = path.read_bytes()
     except OSError as error:
         missing = isinstance(error, FileNotFoundError)
@@ -110,6 +113,7 @@ def read_columns(
     """
     text = read_text(path, "correct 'file' in the table [measurement] of case.toml")
     lines = text.rstrip("\n").split("\n")
+    _refuse_long(path, lines)
     separator = _separator(path, lines[0])
     header, *rows = _split(path, lines, separator)
     found = _find(path, header, required, optional)
@@ -129,6 +133,19 @@ def read_columns(
         name: Column(unit, column)
         for (name, (_, unit)), column in zip(found.items(), values, strict=True)
     }
+
+
+def _refuse_long(path: Path, lines: list[str]) -> None:
+    lengths = list(map(len, lines))
+    longest = max(lengths)
+    if longest > csv.field_size_limit():
+        line = lengths.index(longest)
+        raise InputError(
+            where=f"{path}, line {line + 1}",
+            found=f"{longest} characters, '{lines[line][:60]}'...",
+            expected=f"a sample, in at most {csv.field_size_limit()} characters",
+            remedy="export the recording again, with a line for each sample",
+        )
 
 
 def _separator(path: Path, header: str) -> str:

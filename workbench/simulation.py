@@ -75,11 +75,12 @@ class CaseResult:
         return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
-        """Title of the case and scores by estimator, as plain numbers and texts."""
+        """Title and doubts of the case, and scores by estimator, as plain numbers and texts."""
         judged = self.system.objective.judged
         unit = self.system.unit(judged)
         return {
             "title": self.case.title,
+            "doubts": list(self.case.doubts),
             "estimators": {
                 name: {
                     f"{judged}_rms_{unit}": one.rms,

@@ -3,6 +3,7 @@
 It is read from one file, `system.toml`, beside its Modelica library; see `system_file`.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,7 +34,9 @@ from workbench.system_parts import (
     Model,
     Objective,
     OperatingPoint,
+    Redundancy,
     Rolling,
+    Sampling,
     Signal,
     Threshold,
     View,
@@ -59,8 +62,10 @@ __all__ = [
     "Model",
     "Objective",
     "OperatingPoint",
+    "Redundancy",
     "Rest",
     "Rolling",
+    "Sampling",
     "Signal",
     "System",
     "Threshold",
@@ -97,6 +102,8 @@ class System:
     fewest : samples that a recording must have.
     settles : [s] in which a model comes to rest at an operating point.
     sample_time : [s] of usual recordings.
+    sampling : which times between samples are likely.
+    redundancies : what tells the same in a recording.
     cases : folder of recordings that come with the system, or None.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -135,6 +142,8 @@ class System:
     sample_time: float = 0.005
     states: tuple[str, ...] | None = None
     cases: Path | None = None
+    sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))
+    redundancies: tuple[Redundancy, ...] = ()
 
     @property
     def signals(self) -> dict[str, Signal]:

@@ -89,6 +89,8 @@ def _formulas(system: System) -> Iterator[_Reference]:
         measured.add(one.name)
     compared = system.comparison
     for formula in (
+        *(side for one in system.redundancies for side in (one.formula, one.other)),
+        *(one.agrees.formula for one in system.conditions if one.agrees),
         *(one.formula for one in compared.channels),
         *(one.formula for one in compared.exclusions),
         *(one.formula for one in compared.influences),

@@ -23,7 +23,9 @@ from workbench.system_tables import (
     read_objective,
     read_of_states,
     read_point,
+    read_redundancy,
     read_rolling,
+    read_sampling,
     read_view,
     within,
 )
@@ -42,7 +44,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases"
+        "export shortest fewest sample_time cases sampling redundancies"
     )
     return _read(file, path, _models(file, path))
 
@@ -161,6 +163,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         cases=path.parent / cases if (cases := file.text("cases", "")) else None,
         settles=file.table("points").number("settles", "s", 10.0),
         sample_time=file.number("sample_time", "s"),
+        sampling=read_sampling(file.table("sampling")),
     )
 
 
@@ -183,4 +186,5 @@ def _placed(file: Table, system: System) -> System:
         following=read_following(tuning.table("follows")) if "follows" in tuning else None,
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),
+        redundancies=tuple(read_redundancy(table, system) for table in file.tables("redundancies")),
     )

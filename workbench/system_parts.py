@@ -9,6 +9,8 @@ import numpy as np
 
 from workbench.expression import Expression
 
+FIRST, LARGEST = "first", "largest"  # of the values along a recording
+
 
 @dataclass(frozen=True)
 class Model:
@@ -56,6 +58,7 @@ class Signal:
     held : whether an input stays as it was sampled until the next sample; else it goes there.
     resolution : step in which it is read, 0 where that is not known [unit].
     limits : between which its sensor reads; what reaches them is saturated [unit].
+    plausible, possible : least and largest sample that is likely, and that is possible [unit].
     """
 
     name: str
@@ -73,6 +76,8 @@ class Signal:
     held: bool
     resolution: float
     limits: tuple[float, float]
+    plausible: tuple[float, float]
+    possible: tuple[float, float]
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
@@ -150,6 +155,71 @@ class Threshold:
 
 
 @dataclass(frozen=True)
+class Tolerance:
+    """By how much two values that tell the same may differ.
+
+    Attributes
+    ----------
+    likely, possible : largest difference that is likely, and that is possible, as a share of the
+        larger of the two [1].
+    slack : difference that means nothing, and size of both below which they are not compared.
+    """
+
+    likely: float
+    possible: float
+    slack: float
+
+
+@dataclass(frozen=True)
+class Redundancy:
+    """Two formulas of measured signals that agree while a third signal is small.
+
+    Attributes
+    ----------
+    reason : why they agree, for people.
+    unit : of both.
+    while_below : the signal and its level; None: always.
+    """
+
+    reason: str
+    formula: Expression
+    other: Expression
+    unit: str
+    tolerance: Tolerance
+    while_below: Threshold | None
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What a recording says of a condition.
+
+    Attributes
+    ----------
+    formula : of measured signals, in the unit of the condition.
+    place : FIRST or LARGEST, which of its values tells the condition.
+    """
+
+    formula: Expression
+    place: str
+    tolerance: Tolerance
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Times between samples [s]; infinite where nothing is known of them.
+
+    Attributes
+    ----------
+    slowest : up to which estimates are what they are at usual rates.
+    gap, largest_gap : longest that is likely, and that is possible, in one recording.
+    """
+
+    slowest: float
+    gap: float
+    largest_gap: float
+
+
+@dataclass(frozen=True)
 class Fading:
     """Feedback fades out where a signal is small against `half`, at which half is left [unit]."""
 
@@ -201,6 +271,7 @@ class Condition:
     parameters : of the model by choice, which it sets.
     sign : whether it is the sign of the recording's signals.
     label : for people.
+    agrees : what the recording says of it, or None.
     """
 
     name: str
@@ -212,6 +283,7 @@ class Condition:
     count: int
     parameters: Mapping[str, Mapping[str, float]]
     sign: bool
+    agrees: Agreement | None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,9 @@ from workbench.errors import InputError
 from workbench.expression import Expression
 from workbench.system import System
 from workbench.system_parts import (
+    FIRST,
+    LARGEST,
+    Agreement,
     Condition,
     Derived,
     Estimated,
@@ -19,9 +22,12 @@ from workbench.system_parts import (
     Model,
     Objective,
     OperatingPoint,
+    Redundancy,
     Rolling,
+    Sampling,
     Signal,
     Threshold,
+    Tolerance,
     View,
 )
 from workbench.tables import Table
@@ -64,7 +70,7 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
         table = within(file, group, name)
         table.refuse_unknown(
             "unit shown label noise relative_noise relative_error scale scale_error reading "
-            "mode smoothed held resolution saturates"
+            "mode smoothed held resolution saturates plausible possible"
         )
         unit = table.unit("unit")
         shown = table.text("shown", unit)
@@ -91,19 +97,21 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
                 smoothed=table.numbers("smoothed", "s", 2) if "smoothed" in table else (),
                 held="held" in table and table.take("held", bool),
                 resolution=table.number("resolution", unit, 0.0),
-                limits=_limits(table, unit),
+                limits=_limits(table, "saturates", unit),
+                plausible=_limits(table, "plausible", unit),
+                possible=_limits(table, "possible", unit),
             )
         )
     return tuple(found)
 
 
-def _limits(table: Table, unit: str) -> tuple[float, float]:
-    """Where a sensor saturates."""
-    if "saturates" not in table:
+def _limits(table: Table, key: str, unit: str) -> tuple[float, float]:
+    """Lower and upper limit of a signal, infinite unless they are given."""
+    if key not in table:
         return -math.inf, math.inf
-    low, high = table.numbers("saturates", unit, 2)
+    low, high = table.numbers(key, unit, 2)
     if low >= high:
-        raise table.wrong("saturates", "the lower limit before the upper one")
+        raise table.wrong(key, "the lower limit before the upper one")
     return low, high
 
 
@@ -167,7 +175,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("label unit least above choices count parameters sign")
+        own.refuse_unknown("label unit least above choices count parameters sign agrees")
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -196,9 +204,53 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                     for choice in parameters.content
                 },
                 sign="sign" in own and own.take("sign", bool),
+                agrees=_agreement(own) if "agrees" in own else None,
             )
         )
     return tuple(found)
+
+
+def _agreement(condition: Table) -> Agreement:
+    """What a recording says of a condition."""
+    table = condition.table("agrees")
+    table.refuse_unknown("is at within slack")
+    place = table.text("at", FIRST)
+    if place not in (FIRST, LARGEST):
+        raise table.wrong("at", f"'{FIRST}' or '{LARGEST}'")
+    unit = condition.text("unit", "1")
+    formula = Expression(table.take("is", str), f"{table.where} is")
+    return Agreement(formula, place, _tolerance(table, unit))
+
+
+def _tolerance(table: Table, unit: str) -> Tolerance:
+    """By how much two values in a unit may differ."""
+    likely, possible = table.numbers("within", "1", 2)
+    if not 0.0 <= likely <= possible:
+        raise table.wrong("within", "the largest likely share before the largest possible one")
+    return Tolerance(likely, possible, table.number("slack", unit, 0.0))
+
+
+def read_redundancy(table: Table, system: System) -> Redundancy:
+    """Two formulas that tell the same."""
+    table.refuse_unknown("reason is equals unit within slack only_while")
+    while_ = table.table("only_while")
+    return Redundancy(
+        reason=table.take("reason", str),
+        formula=Expression(table.take("is", str), f"{table.where} is"),
+        other=Expression(table.take("equals", str), f"{table.where} equals"),
+        unit=table.unit("unit"),
+        tolerance=_tolerance(table, table.unit("unit")),
+        while_below=read_threshold(while_, system, "below") if "only_while" in table else None,
+    )
+
+
+def read_sampling(table: Table) -> Sampling:
+    """Which times between samples are likely."""
+    table.refuse_unknown("slowest gaps")
+    likely, possible = table.numbers("gaps", "s", 2) if "gaps" in table else (math.inf, math.inf)
+    if likely > possible:
+        raise table.wrong("gaps", "the longest likely time before the longest possible one")
+    return Sampling(table.number("slowest", "s", math.inf), likely, possible)
 
 
 def read_point(points: Table, name: str, system: System) -> OperatingPoint:
@@ -227,12 +279,12 @@ def read_export(table: Table, system: System) -> Export:
     )
 
 
-def read_threshold(table: Table, system: System) -> Threshold:
-    """A signal and the level above which something holds."""
-    table.refuse_unknown("signal above")
+def read_threshold(table: Table, system: System, side: str = "above") -> Threshold:
+    """A signal and the level on one `side` of which something holds, above or below."""
+    table.refuse_unknown(("signal", side))
     signal = table.take("signal", str)
     system.refuse_missing(signal, f"{table.where} signal")
-    return Threshold(signal, table.number("above", system.unit(signal)))
+    return Threshold(signal, table.number(side, system.unit(signal)))
 
 
 def read_objective(table: Table, system: System) -> Objective:

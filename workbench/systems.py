@@ -1,5 +1,6 @@
 """Systems by name or file, and their models."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from workbench import shelf
@@ -37,16 +38,16 @@ def system_path(which: str | Path) -> Path:
     known, path = system_files(), Path(which)
     if str(which) in known:
         return known[str(which)]
-    if path.is_dir():
-        path /= FILE
-    if not path.is_file():
-        raise InputError(
-            where=f"system '{which}'",
-            found=f"no such file, and no system of this name{closest(str(which), known)}",
-            expected=f"a system file, or one of {', '.join(known)}",
-            remedy="correct the name or path; 'workbench systems' lists what is installed",
-        )
-    return path
+    with suppress(OSError):  # a name that is too long is none
+        path = path / FILE if path.is_dir() else path
+        if path.is_file():
+            return path
+    raise InputError(
+        where=f"system '{which}'",
+        found=f"no such file, and no system of this name{closest(str(which), known)}",
+        expected=f"a system file, or one of {', '.join(known)}",
+        remedy="correct the name or path; 'workbench systems' lists what is installed",
+    )
 
 
 def _built(system: System) -> System:

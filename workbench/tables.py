@@ -11,6 +11,7 @@ from workbench.recording import read_text
 from workbench.units import check_unit, quantity
 
 _T = TypeVar("_T")
+LARGEST = 1e300  # of plain numbers; leaves room for sums and products
 _KINDS = {
     str: "a text",
     int: "a whole number",
@@ -54,6 +55,9 @@ class Table:
         value = self.content[key]
         if type(value) is not kind or value == "":  # `type`, because true is an int
             raise self.wrong(key, _KINDS[kind])
+        has_zero = isinstance(value, str) and "\0" in value
+        if has_zero:  # no name of a file, or of anything else
+            raise self.wrong(key, "a text without zero characters")
         return value
 
     def text(self, key: str, default: str) -> str:
@@ -118,13 +122,15 @@ class Table:
             )
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.wrong(key, f"a number in [{unit}]")
+        if not abs(value) < LARGEST:  # refuses NaN, too
+            raise self.wrong(key, "a finite number")
         if unit != "1":
             raise self.wrong(key, f"a text with a unit, such as '{value} {unit}'")
         return float(value)
 
     def wrong(self, key: str, expected: str, remedy: str = "correct the value") -> InputError:
         """The error of an entry that is not as expected."""
-        found = repr(self.content.get(key))
+        found = shown(self.content.get(key))
         return InputError(
             where=f"{self.where} {key}", found=found, expected=expected, remedy=remedy
         )
@@ -152,6 +158,14 @@ class Table:
                 )
 
 
+def shown(value: object) -> str:
+    """A value of a file, for the message of an error."""
+    try:
+        return repr(value)
+    except (ValueError, RecursionError):
+        return "a number of thousands of digits, or thousands of tables within each other"
+
+
 def read_table(path: Path, remedy: str, example: str) -> Table:
     """Read a TOML file.
 
@@ -171,10 +185,16 @@ def read_table(path: Path, remedy: str, example: str) -> Table:
     except (ValueError, RecursionError) as error:
         # TOMLDecodeError, a number too long to convert, or brackets within brackets without end.
         place = re.search(r"line (\d+)", str(error))
-        line = int(place[1]) if place else text.count("\n") + 1
+        line = int(place[1]) if place else _longest_line(text)
         raise InputError(
             where=f"{path}, line {line}",
             found=f"text that is no TOML ({error})",
             expected=f"lines such as {example}",
             remedy="correct the line",
         ) from None
+
+
+def _longest_line(text: str) -> int:
+    """Where a number, or a list within lists, is too long to be read: most likely there."""
+    lines = text.split("\n")
+    return max(range(len(lines)), key=lambda n: len(lines[n])) + 1

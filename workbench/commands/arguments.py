@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import sys
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -92,7 +93,11 @@ def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
             expected="folders of recordings",
             remedy=f"name them, or write cases = 'FOLDER' in {nearby(system.source)}",
         )
-    return read_cases(paths or [system.cases], system)  # type: ignore[list-item]  # seen above
+    cases = read_cases(paths or [system.cases], system)  # type: ignore[list-item]  # seen above
+    for case in cases:
+        for doubt in case.doubts:
+            print(f"warning: {doubt}", file=sys.stderr, flush=True)
+    return cases
 
 
 def add_models(parser: argparse.ArgumentParser) -> None:

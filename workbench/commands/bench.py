@@ -12,7 +12,7 @@ from workbench.benchmark.calls import points
 from workbench.commands.arguments import Commands, add_system, given_cases, require_compiler
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
-from workbench.files import write_json
+from workbench.files import prove_writable, write_json
 from workbench.system import System
 from workbench.systems import load_system, open_model
 
@@ -51,6 +51,8 @@ def _run(options: argparse.Namespace) -> int:
     require_compiler()
     system = load_system(options.system)
     cases = given_cases(options.cases, system)
+    if options.json:
+        prove_writable(options.json)
     case = cases[min(_CASE, len(cases) - 1)]
     calls = _time_models(system)
     print(_format_calls(calls, system.sample_time))

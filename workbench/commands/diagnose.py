@@ -17,11 +17,12 @@ from workbench.commands.arguments import (
     given_cases,
     require_compiler,
 )
-from workbench.diagnosis import choose, diagnose, read_effects
+from workbench.diagnosis import Effect, choose, diagnose, read_effects
 from workbench.errors import InputError, closest
-from workbench.modelica import read_library
+from workbench.files import claimed
+from workbench.modelica import Library, read_library
 from workbench.report.diagnosis import write_diagnosis
-from workbench.system import OBSERVER
+from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system, open_model
 
@@ -117,13 +118,24 @@ def _diagnose(options: argparse.Namespace) -> int:
         return 0
     require_compiler()
     cases, held_out = _parted(given_cases(options.cases, system), options.held_out)
+    with claimed(options.out):
+        return _run(options, system, library, effects, cases, held_out)
+
+
+def _run(
+    options: argparse.Namespace,
+    system: System,
+    library: Library,
+    effects: tuple[Effect, ...],
+    cases: Sequence[Case],
+    held_out: Sequence[Case],
+) -> int:
     begin = time.perf_counter()
 
     def report(line: str) -> None:
         print(f"{time.perf_counter() - begin:6.1f} s  {line}", flush=True)
 
     report(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
-    options.out.mkdir(parents=True, exist_ok=True)
     outcome = diagnose(
         *(system, cases, library, effects, options.out, options.workers, report),
         held_out=held_out,
@@ -136,8 +148,8 @@ def _diagnose(options: argparse.Namespace) -> int:
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
             "effects": [effect.name for effect in effects],
         }
+    print(f"\n{outcome.summary()}")
     page = write_diagnosis(outcome, provenance, options.out, options.workers)
     report("done")
-    print(f"\n{outcome.summary()}")
     print(f"to read: {page}, data and figures beside it")
     return 130 if outcome.diagnosis.interrupted else 0

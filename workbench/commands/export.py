@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from workbench.commands.arguments import Commands, add_system, require_compiler
 from workbench.errors import InputError, closest
-from workbench.files import write_json, write_whole
+from workbench.files import claimed, write_json, write_whole
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.gains_file import read_gains, tuned_file
 from workbench.system import REFERENCE, System
@@ -80,7 +80,7 @@ def _export(options: argparse.Namespace) -> int:
     observer = ObserverModel(system, kind, gains, source.read_text(encoding="utf-8"))
     reference: Path = options.reference or model_path(system, REFERENCE)
     name = observer.model.rpartition(".")[2]
-    with tempfile.TemporaryDirectory() as scratch:
+    with claimed(options.out), tempfile.TemporaryDirectory() as scratch:
 
         def build(fmi: int) -> "BuiltFMU":
             path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"

@@ -7,7 +7,7 @@ from pathlib import Path
 from workbench.commands.arguments import Commands, nearby, positive, require_compiler
 from workbench.description import Description, read_description
 from workbench.errors import InputError
-from workbench.files import write_json
+from workbench.files import prove_writable, write_json
 from workbench.fitness import Finding, check, is_fit
 from workbench.installed import built_models
 from workbench.resources import CHECKOUT, fmus
@@ -121,6 +121,7 @@ def _build(options: argparse.Namespace) -> int:
         return 0
     _require_model(options)
     out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
+    prove_writable(out)
     built = compiler.build(options.package, options.model, out, fmi=options.fmi)
     print(f"{built.path}  {built.sha256}")
     return 0
@@ -175,6 +176,8 @@ def _info(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
+    if options.json:
+        prove_writable(options.json)
     findings = check(options.fmu, options.instantiations)
     fit = is_fit(findings)
     print(_format_findings(findings))

@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from workbench.commands.arguments import (
     example_case,
     show_progress,
 )
+from workbench.files import claimed
 from workbench.fmu import Vector
 from workbench.observability import CaseObservability, case_observability, linear_test
 from workbench.pool import Pool
@@ -54,7 +55,11 @@ def add(commands: Commands) -> None:
 
 def _observability(options: argparse.Namespace) -> int:
     system, cases = chosen_system(options)
-    options.out.mkdir(parents=True, exist_ok=True)
+    with claimed(options.out):
+        return _run(options, system, cases)
+
+
+def _run(options: argparse.Namespace, system: System, cases: Sequence[Case]) -> int:
     linear = {}
     for role in (role for role in (OBSERVER, FULL) if role in system.models):
         with open_model(system, role) as fmu:
@@ -79,8 +84,8 @@ def _observability(options: argparse.Namespace) -> int:
     if done:
         done.sort(key=lambda one: one.case.name)
         tests = list(linear.values())
-        write_observability(system, tests, done, provenance, options.out / "observability.json")
         print(format_observability(system, tests, done))
+        write_observability(system, tests, done, provenance, options.out / "observability.json")
         print(f"{len(done)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
     return 130 if interrupted else 0
 

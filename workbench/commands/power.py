@@ -17,6 +17,7 @@ from workbench.commands.arguments import (
 )
 from workbench.diagnosis import Effect
 from workbench.diagnosis.thresholds import thresholds
+from workbench.files import claimed
 from workbench.power import (
     Diagnosed,
     Repertoire,
@@ -147,6 +148,14 @@ def _power(options: argparse.Namespace) -> int:
     reference = options.fmu or model_path(system, REFERENCE)
     rig = open_virtual_rig(system, options.case, reference)
     effects = library_effects(system)
+    with claimed(options.out):
+        return _checked(options, system, rig, effects)
+
+
+def _checked(
+    options: argparse.Namespace, system: System, rig: VirtualRig, effects: tuple[Effect, ...]
+) -> int:
+    """What is asked for, once there is a place for it."""
     run = {"thresholds": _thresholds, "sheet_error": _sheet_error}.get(options.check, _usual)
     print(f"sets of {len(rig.recordings)} recordings", flush=True)
     return run(options, system, rig, effects)

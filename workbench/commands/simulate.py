@@ -1,6 +1,7 @@
 """`workbench simulate`: all estimators on recordings."""
 
 import argparse
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,7 +19,9 @@ from workbench.commands.arguments import (
     example_case,
     show_progress,
 )
-from workbench.files import write_json
+from workbench.cosim import Ending
+from workbench.errors import InputError
+from workbench.files import claimed, write_json
 from workbench.observers import choose
 from workbench.provenance import models, software
 from workbench.report import (
@@ -31,7 +34,7 @@ from workbench.report import (
     write_page,
 )
 from workbench.simulation import CaseResult, Simulation, prepare, simulate
-from workbench.system import OBSERVER
+from workbench.system import OBSERVER, System
 
 
 def add(commands: Commands) -> None:
@@ -84,7 +87,13 @@ def add(commands: Commands) -> None:
 def _simulate(options: argparse.Namespace) -> int:
     system, cases = chosen_system(options)
     window = LiveWindow(system) if options.live else None
-    options.out.mkdir(parents=True, exist_ok=True)
+    with claimed(options.out):
+        return _run(options, system, cases, window)
+
+
+def _run(
+    options: argparse.Namespace, system: System, cases: Sequence[Case], window: LiveWindow | None
+) -> int:
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
@@ -96,6 +105,7 @@ def _simulate(options: argparse.Namespace) -> int:
     done: list[CaseResult] = []
     begin = time.perf_counter()
     interrupted = False
+    failure: InputError | None = None
     try:
         for result in runs:
             done.append(result)
@@ -103,17 +113,37 @@ def _simulate(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         interrupted = True
         print("interrupted", flush=True)
+    except InputError as error:  # such as a full disk: what was estimated is told all the same
+        failure = error
     if done:
         done.sort(key=lambda result: result.case.name)
+        print(format_table(system, done))
         summary = summarise_runs(system, done, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(system, summary, [case_figure(result) for result in done], len(cases), page)
-        print(format_table(system, done))
         print(f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it")
     if window is not None and not interrupted:
         window.wait()
-    return 130 if interrupted else 0
+    if failure is not None:
+        raise failure
+    if interrupted:
+        return 130
+    idle = _idle(done)
+    for name in idle:
+        print(
+            f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
+        )
+    return 1 if idle else 0
+
+
+def _idle(results: Sequence[CaseResult]) -> list[str]:
+    """Estimators that failed in every case."""
+    return [
+        name
+        for name in results[0].runs
+        if all(one.runs[name].ending is not Ending.OK for one in results)
+    ]
 
 
 def _shown(

@@ -25,7 +25,7 @@ from workbench.commands.arguments import (
     positive,
 )
 from workbench.errors import InputError
-from workbench.files import write_whole
+from workbench.files import claimed, write_whole
 from workbench.pool import Pool
 from workbench.report.tuning import format_tuned, write_tuning_page
 from workbench.system_file import with_model
@@ -35,7 +35,9 @@ from workbench.tuning import (
     Evaluator,
     Generation,
     Job,
+    NoWorkersError,
     Plan,
+    Problem,
     Progress,
     Tuned,
     draw_cases,
@@ -176,21 +178,30 @@ def _tune(options: argparse.Namespace) -> int:
         share = options.scale_error / 100.0
         errors = {one.name: share for one in system.outputs if one.scale_error and share}
     problem = pose(system, options.estimator, cases, errors)
+    with claimed(out):
+        return _run(options, problem, len(cases), out)
+
+
+def _run(options: argparse.Namespace, problem: Problem, cases: int, out: Path) -> int:
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     print(
-        f"{options.estimator}: {size} gains, {len(cases)} cases, at most {plan.generations} "
+        f"{options.estimator}: {size} gains, {cases} cases, at most {plan.generations} "
         f"generations of {plan.population * size} candidates",
         flush=True,
     )
     progress = _Printed(plan, options.folds, out, live=options.live)
-    with _one_interruption(), closing(_pool(options, problem.job)) as pool:
-        tuned = tune(
-            *(pool, problem, plan, out),
-            folds=options.folds,
-            resume=options.resume,
-            progress=progress,
-        )
+    try:
+        with _one_interruption(), closing(_pool(options, problem.job)) as pool:
+            tuned = tune(
+                *(pool, problem, plan, out),
+                folds=options.folds,
+                resume=options.resume,
+                progress=progress,
+            )
+    except NoWorkersError as error:
+        print(f"error: {error}; nothing was evaluated", file=sys.stderr)
+        return 1
     if tuned is None:
         print("interrupted before the first generation was evaluated; nothing is written")
         return 130
@@ -251,7 +262,12 @@ def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[
     from workbench.tuning.cluster import DaskPool
 
     try:
-        return DaskPool(options.cluster, Evaluator, job, options.timeout)
+        companion = [job.system.companion] if job.system.companion else []
+        return DaskPool(
+            *(options.cluster, Evaluator, job, options.timeout), modules=companion, warn=_warn
+        )
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(
             where=f"command line, --cluster {options.cluster}",
@@ -259,6 +275,10 @@ def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[
             expected="the address of a running one, such as tcp://10.0.0.1:8786",
             remedy="start one with 'dask scheduler', and workers with 'dask worker ADDRESS'",
         ) from None
+
+
+def _warn(message: str) -> None:
+    print(f"warning: {message}", file=sys.stderr, flush=True)
 
 
 class _Printed(Progress):
@@ -305,7 +325,7 @@ class _Printed(Progress):
 
     def warn(self, message: str) -> None:
         """See Progress."""
-        print(f"warning: {message}", file=sys.stderr, flush=True)
+        _warn(message)
 
 
 def _written(path: Path, text: str) -> bool:

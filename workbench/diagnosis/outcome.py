@@ -183,6 +183,7 @@ class Outcome:
             "verdict": found.verdict,
             "sentence": self.sentence,
             "interrupted": found.interrupted,
+            "doubts": {case.name: list(case.doubts) for case in self.cases if case.doubts},
             "causes": [_cause(cause) for cause in found.causes],
             "gain": None if found.gain is None else self._gain(found.gain),
             "model": _model(self.extension),

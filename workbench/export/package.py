@@ -165,13 +165,15 @@ def _structure(wired: Wiring, observer: str, reference: str) -> str:
 def _start_values(system: System) -> str:
     """Text of the file of start values."""
     start = system.export.start
-    values = {name: float(formula(system.values)) for name, formula in start.held.items()}
-    values |= dict(start.quantities)
-    units = {name: system.unit(name) for name in values}
+    held = {name: float(formula(system.values)) for name, formula in start.held.items()}
+    measured = [one.name for one in system.outputs if one.name in held]
+    values = {(_MACHINE, name): value for name, value in (held | dict(start.quantities)).items()}
+    values |= {(_OBSERVER, name): held[name] for name in measured}  # its first sample
+    units = {name: system.unit(name) for _, name in values}
     root = ET.Element(f"{{{_VALUES}}}ParameterSet", version="1.0", name="start")
     parameters = ET.SubElement(root, f"{{{_VALUES}}}Parameters")
-    for name, value in values.items():
-        parameter = ET.SubElement(parameters, f"{{{_VALUES}}}Parameter", name=f"{_MACHINE}.{name}")
+    for (component, name), value in values.items():
+        parameter = ET.SubElement(parameters, f"{{{_VALUES}}}Parameter", name=f"{component}.{name}")
         ET.SubElement(parameter, f"{{{_VALUES}}}Real", value=repr(value), unit=units[name])
     _add_units(ET.SubElement(root, f"{{{_VALUES}}}Units"), set(units.values()))
     return _text(root)

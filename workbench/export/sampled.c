@@ -1,7 +1,8 @@
 /* The observer's law, one sample at a time; stands in the place of the integrator of other FMUs.
  *
  * A communication step takes one sample: the inputs that stand at its start. The first sample sets
- * the speeds of the observer. Every further one is a linearly implicit Euler step,
+ * what it measures of the observer's states; measured outputs that are all zero are none, but inputs
+ * that a tool has not connected yet, and leave the observer as it is. Every further sample is a linearly implicit Euler step,
  *
  *     (M - h*df/dx) dx = h*f(x, u, p),
  *
@@ -179,14 +180,26 @@ static Outcome take_sample(Rosenbrock *r, double t, double h, const double *u, c
     return OUTCOME_REACHED;
 }
 
+/* Gives the states that are measured the values of the first sample; 0 if there is none yet. */
+static int start(Rosenbrock *r, const double *u) {
+    int measured = 0, connected = 0;
+    for (int n = 0; n < NX; n++) {
+        if (sampled_first[n] >= 0) {
+            r->x[n] = u[sampled_first[n]];
+            measured = 1;
+            connected |= r->x[n] != 0.0;
+        }
+    }
+    return connected || !measured;
+}
+
 Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, double tolerance,
                              double end, double *t, double *x, double *step) {
     (void)tolerance;
     memcpy(r->x, x, NX * sizeof *x);
+    int started = 1;
     if (*step == 0.0) {
-        for (int n = 0; n < NX; n++) {
-            r->x[n] = sampled_first[n] >= 0 ? u[sampled_first[n]] : r->x[n];
-        }
+        started = start(r, u);
     } else {
         const Outcome outcome = take_sample(r, *t, *step, u, p);
         if (outcome != OUTCOME_REACHED) {
@@ -200,7 +213,7 @@ Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, do
         return OUTCOME_ASSERTION;
     }
     memcpy(x, r->x, NX * sizeof *x);
-    *step = end - *t;
+    *step = started ? end - *t : 0.0;
     *t = end;
     return OUTCOME_REACHED;
 }

@@ -1,6 +1,5 @@
 """The file of gains, `gains.toml`: what the tuning writes, and who runs observers reads."""
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from workbench.fmu import FMU, Vector
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
 from workbench.system import System
-from workbench.tables import read_table
+from workbench.tables import LARGEST, read_table, shown
 
 _AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
 
@@ -34,7 +33,7 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     content = _content(path)
     estimator = content.get("estimator")
     if not isinstance(estimator, str) or estimator not in reasoned:
-        raise _wrong(path, f"estimator = {estimator!r}", f"one of {', '.join(reasoned)}")
+        raise _wrong(path, f"estimator = {shown(estimator)}", f"one of {', '.join(reasoned)}")
     blank = reasoned[estimator]
     given = _table(content, "gains", path)
     if missing := [name for name in blank.names if name not in given]:
@@ -54,9 +53,10 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
 def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:
     """The text of a file of gains; numbers have all their digits."""
     values = map(float, gains.values)
+    comment = "".join(f"# {line}\n" for line in meaning.splitlines())
     parts = [
         tomli_w.dumps({"estimator": gains.estimator}),
-        f"# {meaning}\n" + tomli_w.dumps({"gains": dict(zip(gains.names, values, strict=True))}),
+        comment + tomli_w.dumps({"gains": dict(zip(gains.names, values, strict=True))}),
     ]
     if gains.design:
         design = {name: constants.tolist() for name, constants in gains.design.items()}
@@ -93,7 +93,7 @@ def _content(path: Path) -> Mapping[str, Any]:
 def _table(content: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:
     table = content.get(name, {})
     if not isinstance(table, dict):
-        raise _wrong(path, f"{name} = {table!r}", f"a table [{name}]")
+        raise _wrong(path, f"{name} = {shown(table)}", f"a table [{name}]")
     return table
 
 
@@ -103,14 +103,14 @@ def _constants(given: object, name: str, count: int, path: Path) -> Vector:
         values = np.array([_number(value, name, path) for value in given])
         if values.all():
             return values
-    raise _wrong(path, f"{name} = {given!r} in [design]", f"{count} numbers other than zero")
+    raise _wrong(path, f"{name} = {shown(given)} in [design]", f"{count} numbers other than zero")
 
 
 def _number(value: object, name: str, path: Path) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _wrong(path, f"{name} = {value!r}", "a number")
-    if not math.isfinite(value):
-        raise _wrong(path, f"{name} = {value!r}", "a finite number")
+        raise _wrong(path, f"{name} = {shown(value)}", "a number")
+    if not abs(value) < LARGEST:  # refuses NaN, too
+        raise _wrong(path, f"{name} = {shown(value)}", "a finite number")
     return float(value)
 
 

@@ -1,7 +1,5 @@
 """Verdicts on sets of recordings, one line of a file each, which a killed run leaves whole."""
 
-import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,8 +7,9 @@ from typing import Any
 
 from workbench.diagnosis import Diagnosis
 from workbench.errors import InputError
-from workbench.files import write_whole
+from workbench.files import append_line, before_last, sealed, unsealed, write_whole
 from workbench.power.planting import Planting, Repertoire
+from workbench.recording import read_text
 
 
 @dataclass(frozen=True)
@@ -101,6 +100,9 @@ def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire)
 class Journal:
     """A file of verdicts: a line that says what they depend on, then one line for each set.
 
+    Each has a checksum; a line that is damaged is left out, so that its set is diagnosed again. The
+    file that an earlier run left is kept beside it.
+
     Parameters
     ----------
     identity : all that a verdict depends on; only verdicts of the same may stand together.
@@ -109,6 +111,7 @@ class Journal:
     Attributes
     ----------
     results : in the order of the file.
+    damaged : numbers of the lines that were left out.
 
     Raises
     ------
@@ -118,32 +121,33 @@ class Journal:
 
     def __init__(self, path: Path, identity: Mapping[str, Any], *, resume: bool) -> None:
         self.results: list[Diagnosed] = []
+        self.damaged: list[int] = []
         self._path = path
-        if resume and path.exists():
-            self._read(identity)
-        lines = [json.dumps(identity), *(_line(one) for one in self.results)]
+        if path.exists():
+            text = read_text(path, "run without --resume, or give another --out")
+            if resume:
+                self._parse(text, identity)
+            write_whole(before_last(path), text)
+        lines = [sealed(identity), *(sealed(asdict(one)) for one in self.results)]
         write_whole(path, "".join(f"{line}\n" for line in lines))
 
     def append(self, result: Diagnosed) -> None:
         """Add a verdict; it is on the disk when this returns."""
         self.results.append(result)
-        with self._path.open("a") as file:
-            file.write(_line(result) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        append_line(self._path, sealed(asdict(result)))
 
-    def _read(self, identity: Mapping[str, Any]) -> None:
+    def _parse(self, text: str, identity: Mapping[str, Any]) -> None:
         # What follows the last line feed was being written when the run was killed.
-        head, *lines = self._path.read_text().split("\n")[:-1] or [""]
+        head, *lines = text.split("\n")[:-1] or [""]
         try:
-            found = json.loads(head)
-            self.results = [_result(json.loads(line)) for line in lines]
-        except (ValueError, KeyError, TypeError) as error:
+            found = unsealed(head)
+        except (ValueError, RecursionError) as error:
             raise InputError(
-                where=str(self._path),
-                found=f"no verdicts ({error})",
+                where=f"{self._path}, line 1",
+                found=f"no verdicts as they were written ({error})",
                 expected="what an earlier run wrote",
-                remedy="remove the file, or run without --resume",
+                remedy=f"put {before_last(self._path).name} in its place, if it is there, or run "
+                "without --resume",
             ) from None
         if found != identity:
             other = next((key for key in identity if found.get(key) != identity[key]), "more")
@@ -153,10 +157,11 @@ class Journal:
                 expected="the same seed, recordings, FMUs and code",
                 remedy="give another --out, or run without --resume",
             )
-
-
-def _line(result: Diagnosed) -> str:
-    return json.dumps(asdict(result))
+        for number, line in enumerate(lines, start=2):
+            try:
+                self.results.append(_result(unsealed(line)))
+            except (ValueError, KeyError, TypeError, RecursionError):
+                self.damaged.append(number)
 
 
 def _result(content: dict[str, Any]) -> Diagnosed:

@@ -95,6 +95,9 @@ def diagnose_sets(
             "code": _hash(sorted(f for p in diagnosis.__path__ for f in Path(p).glob("*.py"))),
         }
         journal = Journal(out / _JOURNAL, identity, resume=resume)
+        if journal.damaged:
+            numbers = ", ".join(map(str, journal.damaged))
+            report(f"warning: {_JOURNAL}, lines {numbers} are damaged; these sets are made again")
         known = {one.planting.options for one in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
         interrupted = _run([one for one in left if one], setup, workers, journal, report)

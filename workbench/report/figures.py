@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from workbench.cosim import Run
+from workbench.files import replacing, spared
 from workbench.fmu import Vector
 from workbench.objective import judged_window
 from workbench.report.results import label, percent
@@ -223,14 +224,18 @@ def _placed(heights: Sequence[float], entries: int) -> dict[str, Any]:
 
 
 def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
-    """Write one figure in each format, without the date, so that equal figures are equal files."""
+    """Write one figure in each format, without the date, so that equal figures are equal files.
+
+    One that cannot be written is warned of.
+    """
     if layout := sheet.get_layout_engine():
         # To place the parts takes as long as to draw them, and is the same in each format.
         layout.execute(sheet)
         sheet.set_layout_engine(None)
     for path in paths:
         stamp = "Date" if path.suffix == ".svg" else "Software"
-        sheet.savefig(path, dpi=110, metadata={stamp: None})
+        with spared(), replacing(path) as stream:
+            sheet.savefig(stream, format=path.suffix[1:], dpi=110, metadata={stamp: None})
 
 
 def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
@@ -322,7 +327,7 @@ def _panel(title: str, curves: Sequence[Curve], height: float) -> Panel:
 
 def _range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
     """Lowest and highest value with a margin on both sides; 0 to 1 where there is none."""
-    values = np.concatenate(signals)
+    values = np.concatenate([*signals, []])  # none, where nothing was estimated
     values = values[np.isfinite(values)]
     if not values.size:
         return 0.0, 1.0

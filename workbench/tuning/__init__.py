@@ -17,7 +17,7 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import LIMIT, Workers, evaluate_all, evaluators
+from workbench.tuning.workers import LIMIT, NoWorkersError, Workers, evaluate_all, evaluators
 
 __all__ = [
     "LIMIT",
@@ -27,6 +27,7 @@ __all__ = [
     "Fold",
     "Generation",
     "Job",
+    "NoWorkersError",
     "Plan",
     "Problem",
     "Progress",

@@ -1,14 +1,16 @@
 """The state of a search after a generation, in one file that is whole at any moment."""
 
-import json
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.files import write_whole
+from workbench.files import before_last, sealed, unsealed, write_whole
 from workbench.fmu import Matrix, Vector
+from workbench.recording import read_text
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,17 @@ class Checkpoint:
 
 
 def save(checkpoint: Checkpoint, path: Path) -> None:
-    """Write a checkpoint in place of the one before."""
+    """Write a checkpoint in place of the one before, which is kept beside it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    with suppress(FileNotFoundError, InputError):
+        last = path.read_text()
+        _parsed(last, path)  # a damaged one does not take the place of a sound one
+        write_whole(before_last(path), last)
     population = checkpoint.population
     content = {
         "identity": checkpoint.identity,
@@ -89,38 +101,57 @@ def save(checkpoint: Checkpoint, path: Path) -> None:
         "converged": checkpoint.converged,
         "history": [vars(generation) for generation in checkpoint.history],
     }
-    # JSON writes the shortest digits that read back to the same bits.
-    write_whole(path, json.dumps(content))
+    write_whole(path, sealed(content))
 
 
-def load(path: Path, identity: str) -> Checkpoint | None:
-    """Read a checkpoint; None if there is none yet.
+def load(
+    path: Path, identity: str, warn: Callable[[str], None] = lambda message: None
+) -> Checkpoint | None:
+    """Read a checkpoint, or if it is damaged the one before; None if there is none yet.
+
+    Parameters
+    ----------
+    warn : called if the one before is read.
 
     Raises
     ------
     InputError
-        If the file is no checkpoint, or one of another search.
+        If neither is a sound checkpoint, or it is one of another search.
     """
     try:
-        content = json.loads(path.read_text())
-        found = content["identity"]
-        population = Population(*(np.array(content[name]) for name in ("members", "z", "z_k")))
-        converged = bool(content["converged"])
-        history = tuple(Generation(**generation) for generation in content["history"])
-    except FileNotFoundError:
-        return None
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            where=str(path),
-            found=f"no checkpoint ({error})",
-            expected="one that an earlier run wrote",
-            remedy="remove the file, or run without --resume",
-        ) from None
-    if found != identity:
+        found = _read(path)
+    except InputError as damaged:
+        found = _read(before_last(path))
+        if found is None:
+            raise
+        warn(f"going on from the generation before the last: {damaged}")
+    if found is not None and found.identity != identity:
         raise InputError(
             where=str(path),
             found="the checkpoint of another search",
             expected="the same FMU, cases, seed, population and weights",
             remedy="repeat the command of that search, or run without --resume",
         )
-    return Checkpoint(found, population, converged, history)
+    return found
+
+
+def _read(path: Path) -> Checkpoint | None:
+    """A checkpoint, None without a file."""
+    if not path.exists():
+        return None
+    return _parsed(read_text(path, "run without --resume"), path)
+
+
+def _parsed(text: str, path: Path) -> Checkpoint:
+    try:
+        content = unsealed(text)
+        population = Population(*(np.array(content[name]) for name in ("members", "z", "z_k")))
+        history = tuple(Generation(**generation) for generation in content["history"])
+        return Checkpoint(content["identity"], population, content["converged"], history)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(
+            where=str(path),
+            found=f"no checkpoint as it was written ({error})",
+            expected="one that an earlier run wrote",
+            remedy="remove the file, or run without --resume",
+        ) from None

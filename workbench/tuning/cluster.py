@@ -2,24 +2,41 @@
 
 import ctypes
 import faulthandler
+import hashlib
+import logging
+import pickle
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping, Sequence, Set
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar, TypeVarTuple
 
+import cloudpickle
+import distributed
 from distributed import Client, KilledWorker, Worker, get_worker
 from threadpoolctl import threadpool_limits
 
+from workbench.errors import InputError
 from workbench.pool import WorkerError
+from workbench.tuning import proof
+from workbench.tuning.proof import difference, fingerprint
+from workbench.tuning.workers import NoWorkersError
+
+cloudpickle.register_pickle_by_value(proof)  # for workers that may lack it
 
 Given = TypeVar("Given")
 State = TypeVar("State")
 Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
 
-_PATIENCE = 5.0  # [s] for the scheduler to answer
+_ANSWER = 5.0  # [s] for the scheduler to answer
+_PATIENCE = 30.0  # [s] in which a cluster starts a worker
+_PERIOD = 0.5  # [s] between two looks at who is there
+_TRIALS = 3  # workers that a task may end, as of Dask's own
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "fmpy")  # that compute
 _PREPARATION = 600.0  # [s] to load the model and compile its loop, on a busy machine
 
 # Settings of glibc's malloc by number, and how high it would raise them by itself [bytes].
@@ -35,12 +52,42 @@ class _Ready(NamedTuple):
     turn: threading.Lock
 
 
+@dataclass(eq=False)
+class _Task:
+    """What was asked for, and where it may be done.
+
+    Attributes
+    ----------
+    workers : that may do it, by address.
+    done : what the cluster makes of it.
+    tried : how often all of its workers went away.
+    """
+
+    call: tuple[Callable[..., Any], tuple[Any, ...]]
+    answer: "Future[Any]"
+    workers: Set[str]
+    done: Any = None
+    tried: int = 0
+
+
 class DaskPool(Generic[State]):
-    """All workers of a cluster, those that join later included; see `workbench.pool.Pool`.
+    """Workers of a cluster, those that join later included; see `workbench.pool.Pool`.
+
+    A worker gets work once it has proven that it runs the same code with the same packages, and
+    that it has what was sent to it. Others are told to `warn` and left alone.
 
     Parameters
     ----------
     address : of the scheduler, such as tcp://10.0.0.1:8786.
+    modules : whose sources must be the same, beside those of the workbench.
+    patience : to wait for a first worker, or for another when all are gone [s].
+
+    Raises
+    ------
+    OSError
+        If there is no scheduler.
+    InputError
+        If there are no workers, or none of them may work.
     """
 
     def __init__(
@@ -49,48 +96,186 @@ class DaskPool(Generic[State]):
         begin: Callable[[Given], AbstractContextManager[State]],
         given: Given,
         limit: float,
+        *,
+        modules: Sequence[str] = (),
+        patience: float = _PATIENCE,
+        warn: Callable[[str], None] = lambda message: None,
     ) -> None:
-        self._client = Client(address, timeout=_PATIENCE)
-        self._client.register_worker_callbacks(partial(_prepare, begin, given, limit))
-        # Impure: what is done again, after a death, is not to be looked up.
-        self._executor = self._client.get_executor(pure=False)
+        self._address, self._given = address, pickle.dumps((begin, given, limit))
+        self._warn, self._patience = warn, patience
+        self._asked = (["workbench", *modules], _PACKAGES)
+        self._ready: dict[str, str] = {}  # process of each worker that may work, by address
+        self._refused: dict[str, str] = {}  # why others may not, by process
+        self._tasks: dict[Future[Any], _Task] = {}
+        self._lock = threading.RLock()  # answers call back
+        self._lost = ""
+        self._closed = threading.Event()
+        self._client = Client(address, timeout=_ANSWER)
+        try:
+            self._await_worker()
+        except BaseException:
+            self._client.close()
+            raise
+        self._watch = threading.Thread(target=self._attend, daemon=True)
+        self._watch.start()
 
     def submit(
         self, function: Callable[[State, *Arguments], Result], *arguments: *Arguments
     ) -> "Future[Result]":
-        """See Pool; the cluster itself tries again what a worker died with."""
+        """See Pool; the cluster itself tries again what a worker died with.
+
+        A task that no worker is left for raises NoWorkersError.
+        """
         answer: Future[Result] = Future()
-        task = self._executor.submit(_work, function, arguments)
-        task.add_done_callback(partial(_hand_over, answer))
-        answer.add_done_callback(lambda one: task.cancel() if one.cancelled() else None)
+        with self._lock:
+            if self._lost:
+                answer.set_exception(NoWorkersError(self._lost))
+                return answer
+            self._tasks[answer] = _Task((function, arguments), answer, set(self._ready))
+            self._send(self._tasks[answer])
+        answer.add_done_callback(self._forget)
         return answer
 
     def close(self) -> None:
         """See Pool."""
+        self._closed.set()
+        self._watch.join()
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # of what is lost by now
         self._client.close()
 
+    def _send(self, task: _Task) -> None:
+        """Hand a task to the cluster; impure: what is done again is not to be looked up."""
+        try:
+            task.done = self._client.submit(
+                _work, *task.call, pure=False, workers=list(task.workers)
+            )
+            task.done.add_done_callback(partial(self._hand_over, task))
+        except Exception:  # whatever a client without a scheduler raises; the watch sees it, too
+            task.done = None
 
-def _hand_over(answer: "Future[Any]", task: "Future[Any]") -> None:
-    if task.cancelled():
-        answer.cancel()
-    if not answer.set_running_or_notify_cancel():
-        return
-    match task.exception():
-        case None:
-            answer.set_result(task.result())
-        case KilledWorker() as error:
-            answer.set_exception(WorkerError(f"a task ended its workers ({error})"))
-        case error:
-            answer.set_exception(error)
+    def _hand_over(self, task: _Task, done: "distributed.Future[Any]") -> None:
+        if done is not task.done or done.status == "cancelled":
+            return  # another worker does it by now; or the scheduler is gone, which the watch tells
+        match done.exception():
+            case None:
+                self._settle(task, done.result())
+            case KilledWorker() as error:
+                self._settle(task, WorkerError(f"a task ended its workers ({error})"))
+            case error:
+                self._settle(task, error)
+
+    def _settle(self, task: _Task, result: Any) -> None:
+        """Answer a task, once, unless nobody waits for it any more."""
+        with self._lock:
+            if task.answer.done() or not task.answer.set_running_or_notify_cancel():
+                return
+            if isinstance(result, BaseException):
+                task.answer.set_exception(result)
+            else:
+                task.answer.set_result(result)
+
+    def _forget(self, answer: "Future[Any]") -> None:
+        with self._lock:
+            task = self._tasks.pop(answer, None)
+        if task and task.done is not None and answer.cancelled():
+            with suppress(Exception):  # a scheduler that is gone has forgotten it
+                task.done.cancel()
+
+    def _await_worker(self) -> None:
+        """Wait for a first worker that may work."""
+        deadline = time.monotonic() + self._patience
+        while True:
+            self._admit(self._processes())
+            if self._ready:
+                return
+            if self._refused or time.monotonic() > deadline:
+                raise InputError(
+                    where=f"cluster {self._address}",
+                    found="; ".join(self._refused.values()) or "no workers",
+                    expected="workers with the same code and packages as here, and with memory "
+                    "for the recordings",
+                    remedy="install the same state of the project there, and start workers with "
+                    f"'dask worker {self._address}'",
+                )
+            time.sleep(_PERIOD)
+
+    def _attend(self) -> None:
+        """Admit who joins, send tasks of those who left to others, and tell when all are lost."""
+        alone = time.monotonic()
+        while not self._closed.wait(_PERIOD):
+            try:
+                if self._client.status != "running":
+                    raise OSError("no connection")
+                self._admit(self._processes())
+            except Exception as error:  # of many kinds, and whatever it is, it is the scheduler
+                if not self._closed.is_set():
+                    self._lose(f"the scheduler at {self._address} does not answer ({error})")
+                return
+            self._move_tasks()
+            if self._ready:
+                alone = time.monotonic()
+            elif time.monotonic() - alone > self._patience:
+                self._lose(f"all workers of the cluster at {self._address} are gone")
+                return
+
+    def _processes(self) -> dict[str, str]:
+        """Process of each worker by address; a worker that is started again has another one."""
+        workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        return {address: str(one["id"]) for address, one in workers.items()}
+
+    def _admit(self, present: Mapping[str, str]) -> None:
+        """Have workers that are new prove themselves, and forget those that are gone."""
+        self._ready = {a: p for a, p in self._ready.items() if present.get(a) == p}
+        known = {*self._ready.values(), *self._refused}
+        new = [address for address, process in present.items() if process not in known]
+        if not new:
+            return
+        ours = fingerprint(*self._asked)
+        shown = self._client.run(fingerprint, *self._asked, workers=new, on_error="return")
+        equal = []
+        for address, theirs in shown.items():
+            if isinstance(theirs, dict) and not (other := difference(ours, theirs)):
+                equal.append(address)
+            else:
+                reason = other if isinstance(theirs, dict) else repr(theirs)
+                self._refuse(address, present[address], reason)
+        digest = hashlib.sha256(self._given).hexdigest()
+        if equal:
+            ready = self._client.run(_prepare, self._given, workers=equal, on_error="return")
+            for address, got in ready.items():
+                if got == digest:
+                    self._ready[address] = present[address]
+                else:
+                    self._refuse(address, present[address], f"what it was sent ended in {got!r}")
+
+    def _refuse(self, address: str, process: str, reason: str) -> None:
+        self._refused[process] = f"a worker at {address} that may not work: {reason}"
+        self._warn(f"found {self._refused[process]}; it gets no work")
+
+    def _move_tasks(self) -> None:
+        """Send tasks whose workers are all gone to those that are there."""
+        with self._lock:
+            stranded = [one for one in self._tasks.values() if not one.workers & set(self._ready)]
+        for task in stranded if self._ready else ():
+            task.tried += 1
+            before, task.workers = task.done, set(self._ready)
+            if task.tried > _TRIALS:
+                self._settle(task, WorkerError("a task ended all its workers"))
+                continue
+            self._send(task)
+            if before is not None:
+                before.cancel()
+
+    def _lose(self, reason: str) -> None:
+        """Tell all who wait, and all who will, that nothing comes any more."""
+        with self._lock:
+            self._lost = reason
+            for task in list(self._tasks.values()):
+                self._settle(task, NoWorkersError(reason))
 
 
-def _prepare(
-    begin: Callable[[Any], AbstractContextManager[Any]],
-    given: Any,
-    limit: float,
-    dask_worker: Worker,
-) -> None:
-    """Prepare a worker, let it keep its memory, and do not look over its shoulder.
+def _prepare(content: bytes, dask_worker: Worker) -> str:
+    """Prepare a worker, let it keep its memory, do not look over its shoulder; hash of `content`.
 
     Dask has its workers hand back at once what they free. To get it anew for every piece of a
     recording took a tenth of the time. Its profiler stops a loop every 10 ms to see where it is.
@@ -106,12 +291,14 @@ def _prepare(
     before: _Ready | None = getattr(dask_worker, "workbench", None)
     if before is not None:
         before.stack.close()
+    begin, given, limit = pickle.loads(content)
     faulthandler.dump_traceback_later(_PREPARATION, exit=True)
     stack = ExitStack()
     dask_worker.workbench = _Ready(
         stack, stack.enter_context(begin(given)), limit, threading.Lock()
     )
     faulthandler.cancel_dump_traceback_later()
+    return hashlib.sha256(content).hexdigest()
 
 
 def _work(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

@@ -27,7 +27,7 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import Workers
+from workbench.tuning.workers import NoWorkersError, Workers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -282,5 +282,8 @@ class _Run:
                 )
                 tuned = replace(tuned, folds=done, interrupted=len(done) < folds)
         except KeyboardInterrupt:
+            return replace(tuned, interrupted=True)
+        except NoWorkersError as error:
+            self.progress.warn(f"{error}; what the gains are worth is not known")
             return replace(tuned, interrupted=True)
         return tuned

@@ -22,7 +22,7 @@ from workbench.fmu import Matrix, Vector
 from workbench.observers import SearchSpace
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.cost import Candidate, Evaluation, Job
-from workbench.tuning.workers import Workers, evaluate_all
+from workbench.tuning.workers import NoWorkersError, Workers, evaluate_all
 
 SPREAD = 0.1  # of the first candidates about the reasoned gains, as a share of the search space
 TOLERANCE = 1e-3  # spread of z in the population below which more generations gain nothing
@@ -105,14 +105,14 @@ def search(
     checkpoint : file that is written after every generation.
     resume : go on from it, if it is there.
     report : called with the history after every generation.
-    warn : called where a checkpoint cannot be written; the search goes on.
+    warn : called where a checkpoint cannot be written, or is damaged and the one before is read.
 
     Returns
     -------
     Search, or None if it was interrupted before there was anything to return.
     """
     mark = identity(job, space, cases, plan)
-    state = load(checkpoint, mark) if resume else None
+    state = load(checkpoint, mark, warn) if resume else None
     interrupted = False
     try:
         while state is None or not (state.converged or len(state.history) > plan.generations):
@@ -129,6 +129,9 @@ def search(
             report(history)
     except KeyboardInterrupt:
         interrupted = True
+    except NoWorkersError as error:
+        interrupted = True
+        warn(f"{error}; the best so far is kept, and --resume goes on from there")
     if state is None:
         return None
     best = state.population

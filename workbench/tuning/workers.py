@@ -12,13 +12,20 @@ from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job
 LIMIT = 60.0  # [s] for one candidate, which takes about 0.1 s
 
 
+class NoWorkersError(RuntimeError):
+    """No worker is left, and none will come; the message says why."""
+
+
 class Workers(Protocol):
     """Who evaluates candidates: a `workbench.pool.Pool`, or one like it."""
 
     def submit(
         self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate, /
     ) -> "Future[Evaluation]":
-        """Have a worker evaluate a candidate; WorkerError if it cannot."""
+        """Have a worker evaluate a candidate.
+
+        WorkerError if it cannot, NoWorkersError if there is none.
+        """
 
 
 def evaluators(job: Job, workers: int, limit: float = LIMIT) -> Pool[Evaluator]:

@@ -1,0 +1,129 @@
+"""Where results go: a place that takes none is told before the work, and files are whole."""
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.files import claimed, prove_writable, spared, write_whole
+
+COMMANDS = {
+    "simulate": ["simulate", "cases/01_dry_80_1.5"],
+    "observability": ["observability", "cases/01_dry_80_1.5"],
+    "tune": ["tune", "disturbance_observer", "--cases", "cases/01_dry_80_1.5"],
+    "diagnose": ["diagnose", "cases/01_dry_80_1.5"],
+    "export": ["export"],
+    "power": ["power", "--clean", "1"],
+}
+
+
+@contextmanager
+def at_most(size: int) -> Iterator[None]:
+    """No file may be larger, as on a disk that is full by then [byte]."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def refused(command: str, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """What is said when a command cannot write; nothing of its work is begun."""
+    assert main([*COMMANDS[command], "--out", str(out)]) == 2
+    told = capsys.readouterr()
+    assert "s left" not in told.out
+    assert "done" not in told.out
+    return told.err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_place_that_takes_no_results_is_refused_before_the_work(
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+) -> None:
+    if command in ("diagnose", "export", "power"):
+        pytest.importorskip("casadi")
+    monkeypatch.chdir(root)
+    (tmp_path / "file").write_text("mine")
+    for out, match in (
+        (tmp_path / "file", "a file, and no folder"),
+        (tmp_path / "file" / "below", "Not a directory"),
+        (tmp_path / ("long" * 100), "File name too long"),
+        (Path("/proc/results"), "No such file or directory"),
+    ):
+        message = refused(command, out, capsys)
+        assert match in message
+        assert message.count("\n") == 1
+    with at_most(4_900_000):  # less than is asked for, more than any part of an FMU has
+        message = refused(command, tmp_path / "full", capsys)
+    assert "File too large" in message
+    with claimed(tmp_path / "taken"):
+        message = refused(command, tmp_path / "taken", capsys)
+    assert "another run that writes there" in message
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
+    script = (
+        "from pathlib import Path; import os, sys; from workbench.files import claimed\n"
+        "with claimed(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False)
+    with claimed(tmp_path):
+        assert not list(tmp_path.iterdir())
+
+
+def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> None:
+    for name in ("page.html.123.part", "mine.part", "other"):
+        (tmp_path / name).write_text("")
+    with claimed(tmp_path):
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.part", "other"]
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for path, match in (
+        (tmp_path, "a folder, and no file"),
+        (tmp_path / "file" / "x.json", "Not a directory|File exists"),
+        (tmp_path / ("x" * 300), "File name too long"),
+    ):
+        with pytest.raises(InputError, match=match):
+            prove_writable(path)
+    write_whole(tmp_path / ("x" * 255), "the longest name")
+    assert sorted(len(path.name) for path in tmp_path.iterdir()) == [4, 255]
+
+
+def test_a_figure_that_cannot_be_written_costs_no_numbers(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    name = "01_dry_80_1.5"
+    for kind in ("png", "svg"):  # a folder stands where a figure is to be
+        (tmp_path / f"{name}.{kind}" / "mine").mkdir(parents=True)
+    arguments = ["simulate", f"cases/{name}", "--estimator", "open_loop", "--workers", "1"]
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr()
+    assert told.err.count("warning: ") == 2
+    assert "open_loop" in told.out
+    written = sorted(path.name for path in tmp_path.iterdir() if path.is_file())
+    assert written == [f"{name}.csv", "index.html", "summary.json"]
+
+
+def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path: Path) -> None:
+    with at_most(1000):
+        with spared():
+            write_whole(tmp_path / "figure.svg", "x" * 2000)
+        with pytest.raises(InputError, match="File too large"):
+            write_whole(tmp_path / "page.html", "x" * 2000)
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,202 @@
+"""Recordings that contradict themselves: refused where impossible, warned of where unlikely."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import workbench as wb
+from workbench.__main__ import main
+from workbench.case import read_case, read_cases
+from workbench.errors import InputError
+
+RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings"
+NAME = "03_dry_120_3.6"
+SPEEDS = ("omegaW [rad/s]", "omegaR [rad/s]")
+
+Table = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def stop(root: Path) -> tuple[str, Table]:
+    """A recorded stop: its case.toml, and its columns by header."""
+    folder = root / "cases" / NAME
+    header, *rows = (folder / "measured.csv").read_text().splitlines()
+    columns = np.array([[float(cell) for cell in row.split(",")] for row in rows]).T
+    return (folder / "case.toml").read_text(), dict(zip(header.split(","), columns, strict=True))
+
+
+def write(folder: Path, toml: str, table: Table) -> Path:
+    folder.mkdir()
+    (folder / "case.toml").write_text(toml)
+    rows = (
+        ",".join(map(repr, row)) for row in zip(*(c.tolist() for c in table.values()), strict=True)
+    )
+    (folder / "measured.csv").write_text("\n".join([",".join(table), *rows]) + "\n")
+    return folder
+
+
+def changed(table: Table, **columns: np.ndarray) -> Table:
+    """Some columns replaced, by the name before the unit."""
+    return {header: columns.get(header.split()[0], values) for header, values in table.items()}
+
+
+def cell(table: Table, row: int, name: str, value: float) -> Table:
+    values = table[name].copy()
+    values[row] = value
+    return {**table, name: values}
+
+
+def renamed(table: Table, **headers: str) -> Table:
+    return {headers.get(header.split()[0], header): values for header, values in table.items()}
+
+
+def three_stops(table: Table) -> Table:
+    last = table["time [s]"][-1]
+    return {
+        header: np.concatenate([v + k * (last + 30.0) if "time" in header else v for k in range(3)])
+        for header, v in table.items()
+    }
+
+
+RPM = 60.0 / (2.0 * np.pi)
+IMPOSSIBLE: dict[str, tuple[Callable[[Table], Table], str]] = {
+    "rpm of one wheel declared as rad/s": (
+        lambda t: {**t, SPEEDS[0]: t[SPEEDS[0]] * RPM},
+        r"line 2, column 'omegaW': found 69\d\.\d+ rad/s at 0 s, and \d+ more such samples; "
+        "expected what is possible, from -360 rad/s",
+    ),
+    "rpm of a slow wheel": (
+        # Below a speed of 17 km/h even revolutions per minute are possible speeds.
+        lambda t: {**t, SPEEDS[0]: t[SPEEDS[0]] * RPM * 0.2, SPEEDS[1]: t[SPEEDS[1]] * 0.2},
+        "apart in half of .*: wheel and roller roll along while nothing brakes",
+    ),
+    "one cell of 1e50": (
+        lambda t: cell(t, 1000, "Fx [N]", 1e50),
+        r"line 1002, column 'Fx': found 1e\+47 kN at 5 s; expected what is possible",
+    ),
+    "swapped columns of speed": (
+        lambda t: {**t, SPEEDS[0]: t[SPEEDS[1]], SPEEDS[1]: t[SPEEDS[0]]},
+        "line 2, column 'omegaR': found rW.omegaW = .* beside rR.omegaR = .* by 57% apart",
+    ),
+    "constant speed": (
+        lambda t: {**t, SPEEDS[1]: np.full_like(t[SPEEDS[1]], 47.6)},
+        "column 'omegaR': found 47.6 rad/s in all .* samples; expected readings that scatter",
+    ),
+    "torque times 1e90": (
+        lambda t: changed(t, tauR=t["tauR [N.m]"] * 1e90),
+        r"column 'tauR': found .* kN.m at 0 s",
+    ),
+    "three stops in one file": (
+        three_stops,
+        r"column 'time': found a gap of 30 s after .* s; expected samples of one recording",
+    ),
+    "reversed roller": (
+        lambda t: changed(t, omegaR=-t[SPEEDS[1]]),
+        "by 200% apart in half of",
+    ),
+    "bar labelled kPa": (
+        lambda t: renamed(t, pB="pB [kPa]"),
+        "brake_pressure: found 360000 Pa where the record has pB = 36.*its largest",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", IMPOSSIBLE)
+def test_a_recording_that_cannot_be_is_refused_with_its_place(tmp_path, system, stop, change):
+    toml, table = stop
+    apply, match = IMPOSSIBLE[change]
+    with pytest.raises(InputError, match=match):
+        read_case(write(tmp_path / "a", toml, apply(table)), system)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("direction = 1", "direction = -1", "direction: found -1 where the record has .* = 1"),
+        ('"120 km/h"', '"1e99 km/h"', r"initial_speed: found 2.77778e\+98 m/s where the record"),
+        ('"120 km/h"', '"12 km/h"', "initial_speed: found 3.33333 m/s where the record has"),
+    ],
+)
+def test_a_condition_that_the_record_belies_is_refused(tmp_path, system, stop, old, new, match):
+    toml, table = stop
+    with pytest.raises(InputError, match=match):
+        read_case(write(tmp_path / "a", toml.replace(old, new), table), system)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (lambda t: {h: v[::20] for h, v in t.items()}, "line 3, .*found a sample every 0.1 s"),
+        (lambda t: {h: v[::200] for h, v in t.items()}, "line 3, .*found a sample every 1 s"),
+        (
+            lambda t: {h: np.delete(v, slice(1000, 1100)) for h, v in t.items()},
+            "line 1002, column 'time': found a gap of 0.505 s after 4.995 s",
+        ),
+        (
+            lambda t: cell(t, 500, "pB [bar]", 7.0),
+            "line 502, column 'pB': found 7 bar at 2.5 s; expected what is likely",
+        ),
+        (
+            lambda t: changed(t, omegaR=t[SPEEDS[1]] * 1.1),
+            "column 'omegaR': found .* by 9% apart in half of",
+        ),
+        (
+            lambda t: changed(t, tauR=np.zeros_like(t["tauR [N.m]"])),
+            "column 'tauR': found 0 kN.m in all .* samples",
+        ),
+    ],
+    ids=["10 Hz", "1 Hz", "gap", "one cell", "wrong radius", "torque that rests"],
+)
+def test_a_recording_that_is_unlikely_is_read_with_a_doubt(tmp_path, system, stop, change, match):
+    toml, table = stop
+    case = read_case(write(tmp_path / "a", toml, change(table)), system)
+    (doubt,) = case.doubts
+    assert re.search(match, doubt), doubt
+
+
+def test_doubts_are_told_by_commands_and_warned_of_in_notebooks(tmp_path, system, stop, capsys):
+    toml, table = stop
+    folder = write(tmp_path / "a", toml, {h: v[:4000:20] for h, v in table.items()})
+    with pytest.warns(UserWarning, match="a sample every 0.1 s"):
+        wb.read_cases(folder, system)
+    arguments = ["simulate", str(folder), "--estimator", "open_loop", "--workers", "1"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 0
+    assert "warning: " in capsys.readouterr().err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert "a sample every 0.1 s" in summary["cases"]["a"]["doubts"][0]
+    assert "a sample every 0.1 s" in (tmp_path / "out" / "index.html").read_text()
+
+
+def test_a_table_that_cannot_be_is_refused_by_its_column(system, stop):
+    _, table = stop
+    frame = pd.DataFrame(cell(table, 10, "pB [bar]", -3.0))
+    conditions = {
+        **{"initial_speed": "120 km/h", "brake_pressure": "3.6 bar", "wheel_rail": "dry"},
+        **{"discs": ["dry"] * 3, "direction": 1},
+    }
+    with pytest.raises(InputError, match=r"table 'frame', column 'pB': found -3 bar at 0.05 s"):
+        wb.case_from_frame(system, frame, conditions)
+
+
+FOLDERS = [RECORDINGS / "standard", *sorted((RECORDINGS / "labelled").glob("*"))]
+
+
+@pytest.mark.parametrize("folder", [Path("cases"), *FOLDERS], ids=lambda path: path.name)
+def test_recordings_that_are_right_raise_no_doubt(root, system, folder):
+    if not (root / folder).is_dir():
+        pytest.skip("recordings that are not at hand")
+    for case in read_cases([root / folder], system):
+        assert case.doubts == ()
+
+
+def test_a_film_of_water_that_lets_the_wheel_slide_raises_no_doubt(system, root):
+    """Pressure is let off while the wheel is far from rolling along; half of all samples agree."""
+    case = read_case(root / "cases" / "09_wet_160_4.2_wsp", system)
+    slip = system.signal("speed", case.signals) - system.values["rW"] * case["omegaW"]
+    assert slip.max() > 2.0  # [m/s]
+    assert case.doubts == ()
