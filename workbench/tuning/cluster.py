@@ -12,7 +12,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, TypeVarTuple
 from distributed import Client, KilledWorker, Worker, get_worker
 from threadpoolctl import threadpool_limits
 
-from workbench.pool import WorkerError
+from workbench.errors import WorkerError
 
 Given = TypeVar("Given")
 State = TypeVar("State")
