@@ -27,6 +27,7 @@ pytest.register_assert_rewrite(
 )
 
 from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
+from .hostile_fmus import hostile  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
@@ -105,6 +106,15 @@ def inline() -> Iterator[Callable[[Job], Pool[Evaluator]]]:
 @pytest.fixture
 def pool(inline: Callable[[Job], Pool[Evaluator]], problem: Problem) -> Pool[Evaluator]:
     return inline(problem.job)
+
+
+# --- foreign FMUs ---
+
+
+@pytest.fixture(scope="session")
+def hostile_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An FMU that does what HOSTILE in the environment says."""
+    return hostile(tmp_path_factory.mktemp("hostile") / "evil.fmu")
 
 
 # --- the C runtime ---

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from workbench.errors import InputError
-from workbench.pool import Pool, WorkerError
+from workbench.errors import InputError, WorkerError
+from workbench.pool import Pool
 
 from .processes import comes_true, living
 

@@ -1,14 +1,17 @@
 """What an FMU says of itself, stage 2: identity, interfaces, platforms, variables."""
 
 import hashlib
-import zipfile
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import fmpy
 
+from workbench.archive import DESCRIPTION, damaged, opened
 from workbench.errors import InputError, closest
 from workbench.resources import CHECKOUT
 
@@ -63,6 +66,7 @@ class Description:
     token : GUID or instantiation token.
     interfaces : by name, MODEL_EXCHANGE and CO_SIMULATION.
     platforms : those with a binary, in FMI's names.
+    binaries : sizes of the files of all platforms [bytes], by name in the archive.
     states, rates : names of the continuous states and their derivatives, in FMI's order.
     event_indicators : their number; 0 for a smooth model.
     step, stop : of the default experiment [s], None where there is none.
@@ -77,6 +81,7 @@ class Description:
     token: str
     interfaces: Mapping[str, Interface]
     platforms: tuple[str, ...]
+    binaries: Mapping[str, int]
     variables: tuple[Variable, ...]
     states: tuple[str, ...]
     rates: tuple[str, ...]
@@ -147,7 +152,28 @@ class Description:
                 expected=f"a binary for this machine ({fmpy.platform_tuple})",
                 remedy="compile the FMU's sources, for instance with 'fmpy compile'",
             )
+        self.library(interface)
         return self.interfaces[interface]
+
+    def library(self, interface: str) -> str:
+        """Name in the archive of this machine's binary for an interface.
+
+        Raises
+        ------
+        InputError
+            If there is none, or it is empty.
+        """
+        file = f"{self.interfaces[interface].identifier}{fmpy.sharedLibraryExtension}"
+        names = [f"binaries/{one}/{file}" for one in (fmpy.platform, fmpy.platform_tuple)]
+        if found := next((name for name in names if self.binaries.get(name)), None):
+            return found
+        empty = next((name for name in names if name in self.binaries), None)
+        raise InputError(
+            where=str(self.path),
+            found=f"an empty file {empty}" if empty else f"no file {' or '.join(names)}",
+            expected="the binary that the model description names",
+            remedy="export the model again",
+        )
 
 
 def read_description(path: Path) -> Description:
@@ -166,18 +192,17 @@ def read_description(path: Path) -> Description:
             remedy="give the path of one with --fmu"
             + ("" if CHECKOUT is None else ", or build the project's with 'make fmus'"),
         )
+    with opened(path) as archive:
+        files = {entry.filename: entry.file_size for entry in archive.infolist()}
+        if DESCRIPTION not in files:
+            raise damaged(path, f"it holds no {DESCRIPTION}")
+        xml = archive.read(DESCRIPTION)
     try:
+        _refuse_entities(xml)
+        root = ElementTree.fromstring(xml)
         found = fmpy.read_model_description(str(path), validate=False)
-        with zipfile.ZipFile(path) as archive:
-            files = [Path(name).parts for name in archive.namelist()]
-            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
     except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
-        raise InputError(
-            where=str(path),
-            found=f"a file that is no FMU ({error})",
-            expected="an FMU of FMI 2.0 or 3.0",
-            remedy="export the model again",
-        ) from None
+        raise damaged(path, error) from None
     if found.fmiVersion not in ("2.0", "3.0"):
         raise InputError(
             where=str(path),
@@ -185,25 +210,77 @@ def read_description(path: Path) -> Description:
             expected="FMI 2.0 or 3.0",
             remedy="export the model for one of these versions",
         )
+    try:
+        return _description(path, found, root, files)
+    except _WrongError as error:
+        raise InputError(
+            where=f"{path}, {DESCRIPTION}",
+            found=str(error),
+            expected="a description as FMI asks for",
+            remedy="export the model again, or report it to the exporter's makers",
+        ) from None
+
+
+class _WrongError(ValueError):
+    """What a model description has and must not, as a noun phrase."""
+
+
+def _refuse_entities(xml: bytes) -> None:
+    """Refuse a document type: FMI has none, and its entities can grow without bound."""
+
+    def refuse(*_: object) -> None:
+        raise ValueError("its model description declares a document type")
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.Parse(xml, True)
+
+
+def _description(
+    path: Path,
+    found: "fmpy.model_description.ModelDescription",
+    root: ElementTree.Element,
+    files: Mapping[str, int],
+) -> Description:
     offered = {MODEL_EXCHANGE: root.find("ModelExchange"), CO_SIMULATION: root.find("CoSimulation")}
     experiment = found.defaultExperiment
+    if not found.guid:
+        raise _WrongError("no guid or instantiationToken")
+    places = [name.split("/") for name in files]
+    for element in root.iter():
+        for key in ("index", "derivative"):
+            if (element.get(key) or "1").startswith(("0", "-")) and found.fmiVersion == "2.0":
+                raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
+    variables = tuple(_variable(v) for v in found.modelVariables)
+    _refuse_twice(v.name for v in variables)
+    if any(unknown.variable.derivative is None for unknown in found.derivatives):
+        raise _WrongError("a derivative in the model structure that is the derivative of nothing")
     return Description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         version=found.fmiVersion,
-        name=found.modelName,
+        name=found.modelName or "",
         text=found.description or "",
         tool=found.generationTool or "",
         token=found.guid,
         interfaces={name: _interface(tag) for name, tag in offered.items() if tag is not None},
-        platforms=tuple(sorted({f[1] for f in files if f[0] == "binaries" and len(f) > 2})),
-        variables=tuple(_variable(v) for v in found.modelVariables),
+        platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
+        binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
+        variables=variables,
         states=tuple(unknown.variable.derivative.name for unknown in found.derivatives),
         rates=tuple(unknown.variable.name for unknown in found.derivatives),
         event_indicators=max(found.numberOfEventIndicators, len(found.eventIndicators)),
-        step=_number(experiment.stepSize) if experiment else None,
-        stop=_number(experiment.stopTime) if experiment else None,
+        step=_number(experiment.stepSize, "the step size") if experiment else None,
+        stop=_number(experiment.stopTime, "the stop time") if experiment else None,
     )
+
+
+def _refuse_twice(names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise _WrongError(f"two variables '{name}'")
+        seen.add(name)
 
 
 def _interface(element: ElementTree.Element) -> Interface:
@@ -212,8 +289,12 @@ def _interface(element: ElementTree.Element) -> Interface:
     def has(*names: str) -> bool:
         return any(element.get(name) in ("true", "1") for name in names)
 
+    identifier = element.get("modelIdentifier", "")
+    # It is the name of a file: none outside the folder of binaries.
+    if not re.fullmatch(r"\w[\w.-]*", identifier):
+        raise _WrongError(f"the modelIdentifier '{identifier[:80]}' of <{element.tag}>")
     return Interface(
-        identifier=element.attrib["modelIdentifier"],
+        identifier=identifier,
         saves_state=has("canGetAndSetFMUstate", "canGetAndSetFMUState"),
         serialises_state=has("canSerializeFMUstate", "canSerializeFMUState"),
         directional_derivatives=has(
@@ -226,21 +307,43 @@ def _interface(element: ElementTree.Element) -> Interface:
 
 def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
     declared = variable.declaredType
+    real = variable.type in ("Real", "Float64") and not variable.dimensions
+    name = variable.name
+    if not name:
+        raise _WrongError("a variable without a name")
+    if not 0 <= variable.valueReference < 2**32:
+        raise _WrongError(f"the value reference {variable.valueReference} of '{name}'")
+    if real:
+        _number(variable.start, f"the start value of '{name}'")
+
+    def limit(key: str) -> float | None:
+        text = getattr(variable, key) or (getattr(declared, key) if declared else None)
+        return _number(text, f"{key} of '{name}'", endless=key != "nominal") if real else None
+
     return Variable(
-        name=variable.name,
+        name=name,
         reference=variable.valueReference,
         type=variable.type,
-        real=variable.type in ("Real", "Float64") and not variable.dimensions,
+        real=real,
         causality=variable.causality,
         variability=variable.variability or "continuous",
         unit=variable.unit or (declared.unit if declared else None),
         start=None if variable.start is None else str(variable.start),
-        nominal=_number(variable.nominal or (declared.nominal if declared else None)),
-        minimum=_number(variable.min or (declared.min if declared else None)),
-        maximum=_number(variable.max or (declared.max if declared else None)),
+        nominal=limit("nominal"),
+        minimum=limit("min"),
+        maximum=limit("max"),
         text=variable.description or "",
     )
 
 
-def _number(text: str | None) -> float | None:
-    return None if text is None else float(text)
+def _number(text: str | float | None, what: str, *, endless: bool = False) -> float | None:
+    """A number of the description, if there is one; endless ones only where they have a meaning."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if math.isnan(number) or (math.isinf(number) and not endless):
+        raise _WrongError(f"{what} = '{str(text)[:40]}'")
+    return number

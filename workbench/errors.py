@@ -48,6 +48,10 @@ class FMUError(RuntimeError):
     """A call into an FMU failed; the message holds what the FMU logged."""
 
 
+class WorkerError(RuntimeError):
+    """A task ended the process that worked on it, twice, or took longer than it may."""
+
+
 def closest(name: str, names: Iterable[str]) -> str:
     """Say which of `names` was probably meant, or nothing.
 

@@ -5,61 +5,19 @@ with the addresses of the FMU's functions, so that another FMU needs no compilat
 may also be called from ordinary Python.
 """
 
-import hashlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import platformdirs
 from llvmlite import ir
 from numba import njit, types
-from numba.core import caching, cgutils
+from numba.core import cgutils
 from numba.extending import intrinsic
 
+from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
-
-_PACKAGE = Path(__file__).parent
-
-
-def _folder() -> Path:
-    """Folder of compiled code, one for each state of the sources that hold laws and loops.
-
-    numba renews a compiled function when its own file changes, not when one that it calls does.
-    """
-    files = sorted(_PACKAGE.rglob("*.py"))
-    sources = (file.read_bytes() for file in files)
-    compiled_ones = b"".join(source for source in sources if b"workbench.kernel import" in source)
-    state = hashlib.sha256(compiled_ones).hexdigest()[:16]
-    return Path(platformdirs.user_cache_dir("wheelset-workbench")) / state
-
-
-_FOLDER = _folder()
-
-
-class _Locator(caching.UserWideCacheLocator):  # type: ignore[misc]
-    """Our own functions are found by what they are, wherever the package lies."""
-
-    def __init__(self, function: Any, file: str) -> None:
-        super().__init__(function, file)
-        self._own = Path(file).is_relative_to(_PACKAGE)
-        inside = Path(file).parent.relative_to(_PACKAGE) if self._own else None
-        self._cache_path = str(_FOLDER / (inside or self.get_suitable_cache_subpath(file)))
-
-    def get_source_stamp(self) -> Any:
-        return _FOLDER.name if self._own else super().get_source_stamp()
-
-
-class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes: ClassVar = [_Locator]
-
-
-class _Cache(caching.FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function in our folder; numba's own setting is left to the user."""
-
-    _impl_class = _CodeCache
 
 
 def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
@@ -71,9 +29,8 @@ def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
 
     def compile_(function: Callable[..., Any]) -> Any:
         dispatcher = njit(error_model="numpy", _nrt=False, inline=inline)(function)
-        # Where nothing can be kept (no file, no writable folder) each process compiles anew.
-        with suppress(RuntimeError):
-            dispatcher._cache = _Cache(function)
+        with suppress(RuntimeError):  # a function without a file is compiled in each process
+            dispatcher._cache = CodeCache(function)
         return dispatcher
 
     return compile_

@@ -4,16 +4,18 @@ With `description` the only file that knows FMPy.
 """
 
 import ctypes
-import shutil
-import tempfile
+import os
 from collections.abc import Callable
+from pathlib import PurePosixPath
 
-import fmpy
 from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
 
+from workbench.archive import unpack
 from workbench.description import CO_SIMULATION, MODEL_EXCHANGE, Description
-from workbench.errors import FMUError
+from workbench.errors import FMUError, InputError
+from workbench.proof import prove
+from workbench.scratch import Scratch
 
 _FUNCTIONS = {
     "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
@@ -30,6 +32,11 @@ _FUNCTIONS = {
     "size": {"2.0": "fmi2SerializedFMUstateSize", "3.0": "fmi3SerializedFMUStateSize"},
     "serialise": {"2.0": "fmi2SerializeFMUstate", "3.0": "fmi3SerializeFMUState"},
     "deserialise": {"2.0": "fmi2DeSerializeFMUstate", "3.0": "fmi3DeserializeFMUState"},
+}
+
+_NEEDED = {
+    MODEL_EXCHANGE: ("time", "set_states", "get_states", "derivatives", "set", "get"),
+    CO_SIMULATION: ("do_step", "set", "get"),
 }
 
 _CLASSES = {
@@ -55,9 +62,9 @@ class Loaded:
     Raises
     ------
     InputError
-        If the FMU has no such interface for this machine.
+        If the FMU has no such interface for this machine, or its archive or binary is damaged.
     FMUError
-        If it refuses to be instantiated.
+        If it refuses to be instantiated, or is not known and does not stand being tried.
     """
 
     def __init__(self, description: Description, interface: str) -> None:
@@ -66,25 +73,56 @@ class Loaded:
         self._description = description
         self._interface = interface
         self._log: list[str] = []
-        self._folder = tempfile.mkdtemp(prefix="fmu-")
-        fmpy.extract(str(description.path), self._folder)
-        self._load(identifier)
+        self._scratch = Scratch()
+        try:
+            library = description.library(interface)
+            folder = self._scratch.path
+            unpack(description.path, folder, str(PurePosixPath(library).parent))
+            prove(description, interface, folder)
+            self._library = str(folder / library)
+            self._load(identifier)
+        except BaseException:
+            self._scratch.close()
+            raise
 
     def _load(self, identifier: str) -> None:
         """Load the library and make an instance."""
-        self._instance = _CLASSES[self._interface, self.version](
-            guid=self._description.token,
-            unzipDirectory=self._folder,
-            modelIdentifier=identifier,
-            instanceName=identifier,
-        )
+        here = os.getcwd()
+        try:
+            self._instance = _CLASSES[self._interface, self.version](
+                guid=self._description.token,
+                unzipDirectory=str(self._scratch.path),
+                modelIdentifier=identifier,
+                instanceName=identifier,
+                libraryPath=self._library,
+            )
+        except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
+            os.chdir(here)  # it looks for the library in its own folder, and stays there
+            raise InputError(
+                where=str(self._description.path),
+                found=f"a binary that cannot be loaded ({error})",
+                expected="one that this machine can load, with the functions of FMI",
+                remedy="export the model again for this machine",
+            ) from None
         dll = self._instance.dll
+        self._require(dll)
         # A fresh pointer per function: FMPy's own carry argument types that cost conversions.
         names = {use: function[self.version] for use, function in _FUNCTIONS.items()}
         self._call = {use: dll[name] for use, name in names.items() if hasattr(dll, name)}
         if "time" in self._call:
             self._call["time"].argtypes = [ctypes.c_void_p, ctypes.c_double]
         self._instantiate()
+
+    def _require(self, library: ctypes.CDLL) -> None:
+        """Refuse a library without the functions that every use needs."""
+        names = [_FUNCTIONS[use][self.version] for use in _NEEDED[self._interface]]
+        if missing := [name for name in names if not hasattr(library, name)]:
+            raise InputError(
+                where=str(self._description.path),
+                found=f"a binary without the function {missing[0]}",
+                expected=f"all of FMI {self.version}, {self._interface}",
+                remedy="export the model again",
+            )
 
     def _instantiate(self) -> None:
         log = self._log
@@ -109,7 +147,7 @@ class Loaded:
     def close(self) -> None:
         """Free the instance and the unpacked files."""
         self._instance.freeInstance()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._scratch.close()
 
     def renew(self, *, reload: bool) -> None:
         """Free the instance and make a new one; with `reload` of a library loaded anew."""

@@ -30,6 +30,9 @@ from typing import Any, Generic, Self, TypeVar, TypeVarTuple
 
 from threadpoolctl import threadpool_limits
 
+from workbench.errors import WorkerError
+from workbench.scratch import scratch_folder
+
 Given = TypeVar("Given")
 State = TypeVar("State")
 Item = TypeVar("Item")
@@ -37,6 +40,7 @@ Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
 
 _PREPARATION = 600.0  # [s] to load models and compile loops, on a busy machine
+_END = 5.0  # [s] from the end of a pipe to that of its process, on a busy machine
 _GIVEN = "given.pickle"  # in the folder of a pool
 _SERVED = "forkserver" in multiprocessing.get_all_start_methods()
 _CONTEXT: ForkServerContext | SpawnContext = (
@@ -44,10 +48,6 @@ _CONTEXT: ForkServerContext | SpawnContext = (
 )
 
 _starting = threading.Lock()
-
-
-class WorkerError(RuntimeError):
-    """A task ended the process that worked on it, twice, or took longer than it may."""
 
 
 class Pool(Generic[State]):
@@ -99,8 +99,7 @@ class Pool(Generic[State]):
         self._prepare: Callable[[], State] = lambda: self._stack.enter_context(begin(given))
         if workers == 1 and limit == math.inf and not isolated:
             return
-        folder = tempfile.TemporaryDirectory(prefix="pool-", ignore_cleanup_errors=True)
-        self._folder = self._stack.enter_context(folder)
+        self._folder = self._stack.enter_context(scratch_folder())
         # In a file, because handing so much to a process that dies as it starts waits for ever.
         Path(self._folder, _GIVEN).write_bytes(pickle.dumps((dict(os.environ), begin, given)))
         preload(begin.__module__, type(given).__module__)
@@ -182,6 +181,8 @@ class Pool(Generic[State]):
                 worker.kill()
         for thread in self._threads:
             thread.join()
+        for worker in self._running.values():
+            worker.end()  # or it would write to the folder while that is removed
         self._stack.close()
 
     def _attend(self, number: int) -> None:
@@ -202,6 +203,7 @@ class Pool(Generic[State]):
 
     def _answer(self, number: int, message: bytes) -> tuple[Any, BaseException | None]:
         """Result or error of a task."""
+        ended = ""
         for _ in range(2):
             try:
                 answer: tuple[Any, BaseException | None] = pickle.loads(
@@ -214,8 +216,9 @@ class Pool(Generic[State]):
             except (EOFError, OSError):
                 if self._closed:
                     return None, WorkerError("the pool was closed")
+                ended = self._running[number].end()
                 self._start(number)
-        return None, WorkerError("a task ended its worker, twice")
+        return None, WorkerError(f"a task ended its worker, twice: {ended}")
 
     def _start(self, number: int) -> None:
         """Start a worker in place of the one before, unless the pool is being closed."""
@@ -256,6 +259,14 @@ class _Worker:
     def kill(self) -> None:
         """End the process."""
         self._process.kill()
+
+    def end(self) -> str:
+        """Wait for the end of the process, which is near; says how it came."""
+        self._process.join(_END)
+        self._process.kill()
+        self._process.join()
+        code = self._process.exitcode or 0
+        return f"by {signal.Signals(-code).name}" if code < 0 else f"with exit status {code}"
 
     def _receive(self, limit: float) -> bytes:
         if not self._connection.poll(None if limit == math.inf else limit):

@@ -1,7 +1,9 @@
-"""Built FMUs, kept between runs in the user's cache folder.
+"""Built FMUs, and what is known of others, kept between runs in the user's cache folder.
 
 The name of a kept file is the hash of all that goes into it, so that it needs no renewal and any
-process may use it. Nothing depends on the folder: where it cannot be written, FMUs are built anew.
+process may use it. What is known are hashes of FMUs that were built here, or tried and found sound:
+a kept file that is not among them was damaged, and is built anew. Nothing depends on the folder:
+where it cannot be written, FMUs are built and tried anew.
 """
 
 import contextlib
@@ -18,16 +20,64 @@ from pathlib import Path
 import platformdirs
 
 from workbench.modelica import files, packages
+from workbench.scratch import Scratch
 
 _COMPILER = Path(__file__).parent / "compiler"
 _CODE = (".py", ".c", ".h")
 _TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
+_MOST_KNOWN = 4096  # empty files; a diagnosis builds some, a user has some
 _MOST = 128  # files, of 0.1 to 0.5 MB: the claims of all libraries, and some months' recordings
+
+
+def cache_folder() -> Path:
+    """Folder of what is kept between runs and can be made anew; it may be out of reach."""
+    folder = Path(platformdirs.user_cache_dir("wheelset-workbench"))
+    # Without a home it is a relative one, which nobody would find again.
+    return folder if folder.is_absolute() else Path(os.devnull) / folder
 
 
 def folder() -> Path:
     """Where built FMUs are kept."""
-    return Path(platformdirs.user_cache_dir("wheelset-workbench")) / "fmus"
+    return cache_folder() / "fmus"
+
+
+def is_known(*names: str) -> bool:
+    """Whether one of the names was remembered, by any process."""
+    return any(name in _remembered() or (_known() / name).is_file() for name in names)
+
+
+def remember(name: str) -> None:
+    """Remember that an FMU is sound, by its hash."""
+    _remembered().add(name)
+    with contextlib.suppress(OSError):
+        _known().mkdir(parents=True, exist_ok=True)
+        (_known() / name).touch()
+        _drop(_known(), _MOST_KNOWN)
+
+
+def _known() -> Path:
+    return cache_folder() / "known"
+
+
+@cache
+def _remembered() -> set[str]:
+    """What this process knows, where nothing can be kept."""
+    return set()
+
+
+def _drop(place: Path, most: int) -> None:
+    """Drop the files that were not used for the longest time."""
+    every = sorted(place.iterdir(), key=lambda file: -file.stat().st_mtime)
+    for old in every[most:]:
+        old.unlink()
+
+
+def _is_whole(kept: Path) -> bool:
+    """Whether a kept file is there, and as it was built."""
+    try:
+        return is_known(hashlib.sha256(kept.read_bytes()).hexdigest())
+    except OSError:
+        return False
 
 
 def key(library: Path, *parts: str) -> str:
@@ -63,19 +113,19 @@ def keep(name: str, make: Callable[[Path], object]) -> Path:
     Where the folder cannot be written, it is in a temporary one, for as long as this process runs.
     """
     kept = folder() / f"{name}.fmu"
-    if kept.is_file():
+    if _is_whole(kept):
         with contextlib.suppress(OSError):
             os.utime(kept)
         return kept
-    part = Path(_scratch().name) / f"{name}.fmu"
+    part = _scratch().path / f"{name}.fmu"
     if not part.is_file():
         fetch(name, part, make)
-    return kept if kept.is_file() else part
+    return kept if _is_whole(kept) else part
 
 
 @cache
-def _scratch() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory(prefix="fmus-", ignore_cleanup_errors=True)
+def _scratch() -> Scratch:
+    return Scratch()
 
 
 def fetch(name: str, path: Path, make: Callable[[Path], object]) -> None:
@@ -87,18 +137,21 @@ def fetch(name: str, path: Path, make: Callable[[Path], object]) -> None:
     make : builds the FMU at the path that it is given.
     """
     kept = folder() / f"{name}.fmu"
-    with contextlib.suppress(OSError):
-        shutil.copyfile(kept, path)
-        os.utime(kept)  # of use, which decides what is dropped
-        return
+    if _is_whole(kept):
+        with contextlib.suppress(OSError):
+            shutil.copyfile(kept, path)
+            os.utime(kept)  # of use, which decides what is dropped
+            return
     make(path)
+    remember(hashlib.sha256(path.read_bytes()).hexdigest())
     # Another process may keep the same file, or drop it, at any time: it appears whole or not.
     with contextlib.suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(dir=kept.parent, suffix=".part")
         os.close(handle)
-        shutil.copyfile(path, part)
-        Path(part).replace(kept)
-        every = sorted(kept.parent.iterdir(), key=lambda file: -file.stat().st_mtime)
-        for old in every[_MOST:]:
-            old.unlink()
+        try:
+            shutil.copyfile(path, part)
+            Path(part).replace(kept)
+        finally:
+            Path(part).unlink(missing_ok=True)
+        _drop(kept.parent, _MOST)

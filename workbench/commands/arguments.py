@@ -34,6 +34,24 @@ def positive(text: str) -> int:
     return value
 
 
+def above_zero(text: str) -> float:
+    """Type of an argument that is a number above zero."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def add_isolated(parser: argparse.ArgumentParser) -> None:
+    """Add the option --isolated, which `main` reads before the command is run."""
+    parser.add_argument(
+        "--isolated",
+        action="store_true",
+        help="for FMUs that nobody vouches for: no network, and no writing but to the results and "
+        "temporary files; a line says so, and what this system cannot do (Linux)",
+    )
+
+
 def add_system(parser: argparse.ArgumentParser) -> None:
     """Add the option --system, which `load_system` reads."""
     parser.add_argument(

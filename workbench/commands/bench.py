@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.benchmark.calls import points
-from workbench.commands.arguments import Commands, add_system, given_cases, require_compiler
+from workbench.commands.arguments import (
+    Commands,
+    add_isolated,
+    add_system,
+    given_cases,
+    require_compiler,
+)
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
 from workbench.files import prove_writable, write_json
@@ -44,6 +50,7 @@ def add(commands: Commands) -> None:
         metavar="CASE",
         help="recordings that observers and tuning are timed on (default: those of the system)",
     )
+    add_isolated(bench)
     bench.set_defaults(run=_run)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
+    add_isolated,
     add_recordings,
     add_system,
     add_workers,
@@ -85,6 +86,7 @@ def add(commands: Commands) -> None:
         help="of the extended FMU: this machine's, or all (default: %(default)s)",
     )
     add_workers(parser)
+    add_isolated(parser)
     parser.set_defaults(run=_diagnose)
 
 

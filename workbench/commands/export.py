@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.commands.arguments import Commands, add_system, require_compiler
+from workbench.commands.arguments import Commands, add_isolated, add_system, require_compiler
 from workbench.errors import InputError, closest
 from workbench.files import claimed, write_json, write_whole
 from workbench.observers import Estimator, Gains, choose
@@ -68,6 +68,7 @@ def add(commands: Commands) -> None:
         metavar="DIR",
         help="where to write (default: %(default)s)",
     )
+    add_isolated(export)
     export.set_defaults(run=_export)
 
 

@@ -1,15 +1,24 @@
 """`workbench fmu`: build FMUs from Modelica, describe them, check whether they are fit."""
 
 import argparse
-from dataclasses import asdict
+import sys
+from dataclasses import asdict, replace
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, nearby, positive, require_compiler
+from workbench.commands.arguments import (
+    Commands,
+    above_zero,
+    add_isolated,
+    nearby,
+    positive,
+    require_compiler,
+)
 from workbench.description import Description, read_description
 from workbench.errors import InputError
 from workbench.files import prove_writable, write_json
-from workbench.fitness import Finding, check, is_fit
+from workbench.fitness import Finding, check, is_fit, uses
 from workbench.installed import built_models
+from workbench.proof import usual_limits
 from workbench.resources import CHECKOUT, fmus
 
 _OMC = Path("build/omc")
@@ -81,7 +90,7 @@ def _add_check(jobs: Commands) -> None:
         description="Try what an observer needs: replay after reset, states set from outside, "
         "rollback, derivatives, Co-Simulation against Model Exchange, many instances, memory, "
         "time per call. A crash of the FMU is a finding. Exit status: 0 fit, 1 not fit, 2 no FMU "
-        "to check.",
+        "to check, 3 not measured, because the FMU did not answer in time.",
         epilog="example:\n  python -m workbench fmu check my_model.fmu --json fitness.json",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -94,6 +103,13 @@ def _add_check(jobs: Commands) -> None:
         metavar="N",
         help="instances to make, one after the other (default: %(default)s)",
     )
+    checking.add_argument(
+        "--limit",
+        type=above_zero,
+        metavar="SECONDS",
+        help="processor time that a call of the FMU may take (default: 5)",
+    )
+    add_isolated(checking)
     checking.set_defaults(run=_check)
 
 
@@ -178,11 +194,18 @@ def _check(options: argparse.Namespace) -> int:
     description = read_description(options.fmu)
     if options.json:
         prove_writable(options.json)
-    findings = check(options.fmu, options.instantiations)
-    fit = is_fit(findings)
-    print(_format_findings(findings))
-    verdict = "fit for observers" if fit else "not fit for observers"
-    print(f"{options.fmu.name} ({description.name}): {verdict}")
+    limits = usual_limits()
+    if options.limit is not None:
+        limits = replace(limits, processor=options.limit, answer=max(limits.answer, options.limit))
+    print(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit", flush=True)
+    findings = check(options.fmu, options.instantiations, limits, _show_begin, _show_finding)
+    unknown = any(finding.unknown for finding in findings)
+    fit = None if unknown and is_fit(findings) else is_fit(findings)
+    verdict = {True: "fit for observers", False: "not fit for observers", None: "not measured"}
+    print(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
+    if fit is False:
+        for use, failed in uses(findings).items():
+            print(f"    {use}: " + (f"no, for {', '.join(failed)}" if failed else "it would do"))
     if options.json:
         identity = {
             "file": description.path.name,
@@ -191,8 +214,14 @@ def _check(options: argparse.Namespace) -> int:
             "sha256": description.sha256,
         }
         listed = [asdict(finding) for finding in findings]
-        write_json(options.json, {"fmu": identity, "fit": fit, "findings": listed})
-    return 0 if fit else 1
+        told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
+        write_json(options.json, told)
+    return {True: 0, False: 1, None: 3}[fit]
+
+
+def _show_begin(name: str) -> None:
+    if sys.stderr.isatty():  # overwritten by what is found
+        print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
 
 
 def _format_description(description: Description) -> str:
@@ -219,16 +248,12 @@ def _format_description(description: Description) -> str:
     return "\n".join(lines)
 
 
-def _format_findings(findings: list[Finding]) -> str:
-    lines = [f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit"]
-    for f in findings:
-        value, limit = (f"{n:.4g}" if n is not None else "" for n in (f.value, f.limit))
-        if f.passed is None:
-            lines.append(f"{f.name:<38} -       {f.reason}")
-            continue
-        lines.append(
-            f"{f.name:<38} {'passed' if f.passed else 'FAILED':<7} {value:>9} {limit:>9}  {f.unit}"
-        )
-        if f.reason:
-            lines.append(f"    {f.reason}")
-    return "\n".join(lines)
+def _show_finding(finding: Finding) -> None:
+    value, limit = (f"{n:.4g}" if n is not None else "" for n in (finding.value, finding.limit))
+    if finding.passed is None:
+        print(f"{finding.name:<38} -       {finding.reason}", flush=True)
+        return
+    result = "passed" if finding.passed else "FAILED"
+    print(f"{finding.name:<38} {result:<7} {value:>9} {limit:>9}  {finding.unit}", flush=True)
+    if finding.reason:
+        print(f"    {finding.reason}", flush=True)

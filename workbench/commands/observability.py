@@ -9,6 +9,7 @@ from pathlib import Path
 from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
+    add_isolated,
     add_models,
     add_recordings,
     add_system,
@@ -50,6 +51,7 @@ def add(commands: Commands) -> None:
     add_system(observability)
     add_models(observability)
     add_workers(observability)
+    add_isolated(observability)
     observability.set_defaults(run=_observability)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from workbench.commands.arguments import (
     Commands,
+    add_isolated,
     add_system,
     add_workers,
     positive,
@@ -70,6 +71,7 @@ def add(commands: Commands) -> None:
         ("--out", Path("results/power"), "where to write (default: %(default)s)"),
     ):
         parser.add_argument(option, type=Path, default=default_path, metavar="PATH", help=text)
+    add_isolated(parser)
     parser.set_defaults(run=_power)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
+    add_isolated,
     add_models,
     add_recordings,
     add_system,
@@ -81,6 +82,7 @@ def add(commands: Commands) -> None:
         action="store_true",
         help="show each run in a window as it goes, one after the other",
     )
+    add_isolated(parser)
     parser.set_defaults(run=_simulate)
 
 

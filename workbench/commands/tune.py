@@ -16,6 +16,7 @@ import numpy as np
 from workbench.case import Case
 from workbench.commands.arguments import (
     Commands,
+    add_isolated,
     add_map,
     add_system,
     add_workers,
@@ -92,6 +93,7 @@ def add(commands: Commands) -> None:
     add_map(parser)
     _add_search(parser)
     _add_work(parser)
+    add_isolated(parser)
     parser.set_defaults(run=_tune)
 
 

@@ -7,6 +7,6 @@ tried, so that a fault is named once, where it is.
 """
 
 from workbench.fitness.checks import check
-from workbench.fitness.finding import Finding, is_fit
+from workbench.fitness.finding import Finding, is_fit, uses
 
-__all__ = ["Finding", "check", "is_fit"]
+__all__ = ["Finding", "check", "is_fit", "uses"]

@@ -43,16 +43,25 @@ from workbench.fitness.finding import (
 )
 from workbench.fitness.isolation import isolated
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
+from workbench.proof import ContainedError, Limits, NoAnswerError, attempt, unpacked, usual_limits
 
 
-def check(path: Path, instantiations: int = 2000, timeout: float = 120.0) -> list[Finding]:
+def check(
+    path: Path,
+    instantiations: int = 2000,
+    limits: Limits | None = None,
+    begin: Callable[[str], None] = lambda name: None,
+    report: Callable[[Finding], None] = lambda finding: None,
+) -> list[Finding]:
     """Check whether an FMU is fit for observers.
 
     Parameters
     ----------
     path : FMU with Model Exchange.
     instantiations : number of instances to make, one after the other.
-    timeout : time without progress after which a check is stopped [s].
+    limits : of what the FMU may use; the usual ones unless others are given.
+    begin : takes the name of what is tried next.
+    report : takes each finding as it comes.
 
     Raises
     ------
@@ -61,17 +70,38 @@ def check(path: Path, instantiations: int = 2000, timeout: float = 120.0) -> lis
     """
     description = read_description(path)
     description.require(MODEL_EXCHANGE)
+    limits = limits or usual_limits()
     findings: dict[str, Finding] = {}
-    for attempt, questions, needs in _CHECKS:
+    for attempted, questions, needs in _CHECKS:
         failed = next((n.name for n in needs if not findings[n.name].passed), None)
         obstacle = f"needs '{failed}'" if failed else _obstacle(questions[0], description)
+        begin(questions[0].name)
         if obstacle:
             found = [replace(q, reason=f"not tried: {obstacle}") for q in questions]
+        elif questions[0] is START and (refused := _unproved(description, limits)):
+            found = [
+                refused,
+                *(replace(q, reason=f"not tried: needs '{START.name}'") for q in questions[1:]),
+            ]
         else:
-            task = functools.partial(attempt, path, instantiations)
-            found = isolated(task, questions, timeout)
-        findings |= {finding.name: finding for finding in found}
+            task = functools.partial(attempted, path, instantiations)
+            found = isolated(task, questions, limits)
+        for finding in found:
+            findings[finding.name] = finding
+            report(finding)
     return list(findings.values())
+
+
+def _unproved(description: Description, limits: Limits) -> Finding | None:
+    """What keeps an FMU from being started at all: it ends its process, or does not return."""
+    with unpacked(description, MODEL_EXCHANGE) as folder:
+        try:
+            attempt(description, MODEL_EXCHANGE, folder, limits)
+        except NoAnswerError as error:
+            return replace(START, unknown=True, reason=f"not measured: {error}")
+        except ContainedError as error:
+            return replace(START, passed=False, value=0, reason=str(error))
+    return None
 
 
 def _obstacle(question: Finding, description: Description) -> str:

@@ -13,6 +13,7 @@ class Finding:
     passed : None if the check was not made, for the reason given.
     value, limit : measured, and the largest (of instances: the smallest) that passes, in `unit`.
     reason : of a failure or of what was not checked, for whom has to act on it.
+    unknown : whether the check was begun and the FMU did not answer.
     """
 
     name: str
@@ -21,10 +22,11 @@ class Finding:
     limit: float | None = None
     unit: str = "1"
     reason: str = ""
+    unknown: bool = False
 
 
 def is_fit(findings: Iterable[Finding]) -> bool:
-    """Say whether no check failed."""
+    """Say whether no check failed; see `Finding.unknown`, too."""
     return all(finding.passed is not False for finding in findings)
 
 
@@ -52,3 +54,29 @@ TIME_GET = Finding("time of states and outputs", limit=SAMPLE, unit="us")
 TIME_SET = Finding("time of inputs", limit=SAMPLE, unit="us")
 TIME_DERIVATIVES = Finding("time of states and derivatives", limit=SAMPLE, unit="us")
 TIME_STEP = Finding("time of states and step", limit=SAMPLE, unit="us")
+
+# Every estimator sets states and steps by the Jacobian; none rolls back, so far. What makes many
+# instances are tuning and diagnosis; what rolls back are other tools.
+_OBSERVING = (START, EVENTS, RESET, INJECTION, DERIVATIVES)
+_USES = {
+    "observers on recordings": _OBSERVING,
+    "tuning and diagnosis": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
+    "observers beside a running rig": (
+        *_OBSERVING,
+        TIME_GET,
+        TIME_SET,
+        TIME_DERIVATIVES,
+        TIME_STEP,
+    ),
+    "tools that roll back": (START, ROLLBACK, SERIALISATION, ROLLBACK_CS),
+    "tools that use its own solver": (START, INTERFACES),
+}
+
+
+def uses(findings: Iterable[Finding]) -> dict[str, list[str]]:
+    """Uses of an FMU, each with the names of what failed that it rests on; none: it would do."""
+    failed = {finding.name for finding in findings if finding.passed is False}
+    return {
+        use: [question.name for question in questions if question.name in failed]
+        for use, questions in _USES.items()
+    }

@@ -13,7 +13,8 @@ from typing import Any
 from workbench import diagnosis
 from workbench.case import Case, read_cases
 from workbench.diagnosis import Effect
-from workbench.pool import Pool, WorkerError
+from workbench.errors import WorkerError
+from workbench.pool import Pool
 from workbench.power.diagnosing import build_everything, diagnose_set
 from workbench.power.journal import Diagnosed, Journal, diagnosed
 from workbench.power.planting import Group, Planting, Repertoire

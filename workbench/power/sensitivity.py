@@ -18,9 +18,9 @@ from workbench.diagnosis.evidence import Evidence, Simulations, Variation
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
 from workbench.diagnosis.verdict import conclude
-from workbench.errors import InputError
+from workbench.errors import InputError, WorkerError
 from workbench.fmu import Matrix
-from workbench.pool import Pool, WorkerError
+from workbench.pool import Pool
 from workbench.power.diagnosing import build_everything
 from workbench.power.planting import Planting
 from workbench.power.run import Setup

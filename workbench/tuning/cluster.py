@@ -19,13 +19,12 @@ import distributed
 from distributed import Client, KilledWorker, Worker, get_worker
 from threadpoolctl import threadpool_limits
 
-from workbench.errors import InputError
-from workbench.pool import WorkerError
-from workbench.tuning import proof
-from workbench.tuning.proof import difference, fingerprint
+from workbench.errors import InputError, WorkerError
+from workbench.tuning import installation
+from workbench.tuning.installation import difference, fingerprint
 from workbench.tuning.workers import NoWorkersError
 
-cloudpickle.register_pickle_by_value(proof)  # for workers that may lack it
+cloudpickle.register_pickle_by_value(installation)  # for workers that may lack it
 
 Given = TypeVar("Given")
 State = TypeVar("State")

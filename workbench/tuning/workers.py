@@ -6,7 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from workbench.pool import Pool, WorkerError
+from workbench.errors import WorkerError
+from workbench.pool import Pool
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job
 
 LIMIT = 60.0  # [s] for one candidate, which takes about 0.1 s

@@ -1,0 +1,248 @@
+"""A hostile FMU harms the process it is tried in, and nothing else; what it did is named."""
+
+import json
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from workbench import proof, shelf
+from workbench.__main__ import main
+from workbench.description import Description, read_description
+from workbench.errors import InputError
+from workbench.fitness import check
+from workbench.fmu import FMU, CoSimulation
+from workbench.proof import ContainedError, Limits, NoAnswerError
+
+from .hostile_fmus import needs_compiler, rewritten
+
+pytestmark = needs_compiler
+
+
+@pytest.fixture(autouse=True)
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A memory, a cache, a folder of temporary files of its own; returns the last."""
+    monkeypatch.setattr(shelf.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache"))
+    shelf._remembered.cache_clear()
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    # Of waiting generous, for a machine that has other work to do.
+    monkeypatch.setenv("WORKBENCH_PROOF", "processor=1 answer=60 memory=512 file=10")
+    return folder
+
+
+@pytest.fixture
+def plan(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Sets what the FMU does."""
+    return lambda what: monkeypatch.setenv("HOSTILE", what)
+
+
+CALL = "fmi2GetDerivatives"
+CALLS = [
+    *("load", "fmi2Instantiate", "fmi2SetupExperiment", "fmi2SetReal", "fmi2GetReal"),
+    *("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2NewDiscreteStates"),
+    *("fmi2EnterContinuousTimeMode", "fmi2SetTime", "fmi2GetContinuousStates"),
+    *("fmi2SetContinuousStates", "fmi2GetDirectionalDerivative", "fmi2GetFMUstate"),
+    *("fmi2SetFMUstate", "fmi2FreeFMUstate", "fmi2Reset", "fmi2FreeInstance"),
+]
+ATTACKS = {
+    "exit": f"ended the process with exit status 0 in {CALL}",
+    "_exit": f"ended the process with exit status 0 in {CALL}",
+    "abort": f"crashed with SIGABRT in {CALL}",
+    "crash": f"crashed with SIGSEGV in {CALL}",
+    "overflow": f"crashed with SIGSEGV in {CALL}",
+    "kill": f"crashed with SIGKILL in {CALL}",
+    "eat": f"crashed with SIGSEGV in {CALL}.*512 MB of memory",
+    "ask": f"crashed with SIGSEGV in {CALL}.*512 MB of memory",
+    "flood": f"crashed with SIGXFSZ in {CALL}.*files of 10 MB",
+    "spin": rf"did not return from {CALL} within \d\.\d s of processor time",
+    "daemon": f"ended the process with exit status 0 in {CALL}",
+}
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_what_an_fmu_did_is_named_and_leaves_nothing(
+    attack: str, hostile_path: Path, places: Path, plan: Callable[[str], None]
+) -> None:
+    plan(f"{attack} {CALL} 2")
+    with pytest.raises(ContainedError, match=f"^evil.fmu: {ATTACKS[attack]}"):
+        FMU(hostile_path)
+    assert list(places.iterdir()) == []
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_every_call_of_an_observer_is_tried(
+    call: str, hostile_path: Path, plan: Callable[[str], None]
+) -> None:
+    plan(f"exit {call} 1")
+    named = "loading of its library" if call == "load" else call
+    with pytest.raises(ContainedError, match=f"exit status 0 in {named} "):
+        FMU(hostile_path)
+
+
+def test_a_solver_of_its_own_is_tried_where_it_is_used(
+    hostile_path: Path, plan: Callable[[str], None]
+) -> None:
+    plan("crash fmi2DoStep 1")
+    FMU(hostile_path).close()
+    with pytest.raises(ContainedError, match="SIGSEGV in fmi2DoStep"):
+        CoSimulation(hostile_path)
+
+
+def test_one_that_waits_is_not_measured_rather_than_unfit(
+    hostile_path: Path,
+    places: Path,
+    plan: Callable[[str], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plan(f"wait {CALL} 1")
+    monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
+    with pytest.raises(NoAnswerError, match=r"did not answer from .* within 1 s, .* for 0\.\d s"):
+        FMU(hostile_path)
+    assert list(places.iterdir()) == []
+
+
+def test_limits_that_cannot_be_read_are_refused(
+    hostile_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for text in ("processor=fast", "time=3", "memory=-1", "answer=nan"):
+        monkeypatch.setenv("WORKBENCH_PROOF", text)
+        with pytest.raises(InputError, match=f"found '{text}'"):
+            FMU(hostile_path)
+
+
+# --- what is remembered ---
+
+
+@pytest.fixture
+def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the FMUs that were tried."""
+    names: list[str] = []
+    original = proof.attempt
+
+    def attempt(description: Description, *rest: Any) -> str:
+        names.append(description.path.name)
+        return original(description, *rest)
+
+    monkeypatch.setattr(proof, "attempt", attempt)
+    return names
+
+
+def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(
+    hostile_path: Path, tmp_path: Path, tried: list[str]
+) -> None:
+    copy = tmp_path / "copy.fmu"
+    shutil.copy(hostile_path, copy)
+    other = rewritten(copy, tmp_path / "other.fmu", lambda folder: (folder / "new").touch())
+    for path in (copy, copy, hostile_path, other, other):
+        shelf._remembered.cache_clear()  # as in another process
+        FMU(path).close()
+    assert tried == ["copy.fmu", "other.fmu"]
+
+
+def test_an_unsound_fmu_is_tried_again(
+    hostile_path: Path, tried: list[str], plan: Callable[[str], None]
+) -> None:
+    plan("exit load 1")
+    for _ in range(2):
+        with pytest.raises(ContainedError):
+            FMU(hostile_path)
+    assert tried == ["evil.fmu"] * 2
+
+
+def test_the_process_remembers_where_nothing_can_be_kept(
+    hostile_path: Path, tmp_path: Path, tried: list[str]
+) -> None:
+    (tmp_path / "cache").write_text("a file where the folder should be")
+    for _ in range(2):
+        FMU(hostile_path).close()
+    assert tried == ["evil.fmu"]
+
+
+def test_the_projects_own_fmus_are_not_tried(minimal_path: Path, tried: list[str]) -> None:
+    FMU(minimal_path).close()
+    assert tried == []
+
+
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+@pytest.mark.parametrize("interface", ["Model Exchange", "Co-Simulation"])
+def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(
+    root: Path, version: str, interface: str
+) -> None:
+    """A refusal ends the trial, so that it must be none of the trial's own making."""
+    description = read_description(root / "fmus" / version / "Reference.fmu")
+    with proof.unpacked(description, interface) as folder:
+        assert proof.attempt(description, interface, folder, proof.Limits()) == ""
+
+
+def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
+    """The least of several, because other work on the machine only adds."""
+    description = read_description(minimal_path)
+    times = []
+    with proof.unpacked(description, "Model Exchange") as folder:
+        for _ in range(5):
+            begin = time.perf_counter()
+            proof.attempt(description, "Model Exchange", folder, proof.Limits())
+            times.append(time.perf_counter() - begin)
+    assert min(times) < 0.3
+
+
+# --- the check ---
+
+QUICK = Limits(processor=1.0, answer=60.0)
+
+
+def test_a_call_that_returns_at_first_and_then_not_is_named_by_its_check(
+    hostile_path: Path, plan: Callable[[str], None]
+) -> None:
+    plan("spin fmi2Instantiate 30")
+    findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
+    found = findings["instantiations"]
+    assert found.passed is False
+    assert re.search(
+        r"^the FMU did not return from a call within 1 s of processor time after 2\d instances$",
+        found.reason,
+    )
+    assert findings["rollback"].passed
+
+
+def test_a_process_that_ends_well_before_its_time_is_a_failure(
+    hostile_path: Path, plan: Callable[[str], None]
+) -> None:
+    plan("exit fmi2Instantiate 30")
+    findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
+    reason = "the FMU ended the process with exit code 0 after"
+    assert findings["instantiations"].passed is False
+    assert findings["instantiations"].reason.startswith(reason)
+
+
+def test_the_check_shows_what_it_finds_as_it_goes_and_what_an_unfit_fmu_would_do_for(
+    hostile_path: Path, plan: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan("exit fmi2SerializedFMUstateSize 1")
+    assert main(["fmu", "check", str(hostile_path), "--instantiations", "5"]) == 1
+    printed = capsys.readouterr().out
+    assert "FAILED" in printed
+    assert "observers on recordings: it would do" in printed
+    assert "tools that roll back: no, for serialised rollback" in printed
+
+
+def test_an_fmu_that_does_not_answer_is_neither_fit_nor_unfit(
+    hostile_path: Path,
+    tmp_path: Path,
+    plan: Callable[[str], None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plan(f"wait {CALL} 1")
+    monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
+    file = tmp_path / "fitness.json"
+    assert main(["fmu", "check", str(hostile_path), "--json", str(file)]) == 3
+    assert "evil.fmu (MinimalObserver): not measured" in capsys.readouterr().out
+    assert json.loads(file.read_text())["fit"] is None

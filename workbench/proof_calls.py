@@ -1,0 +1,294 @@
+"""Make the calls of an observer into an FMU; run by `proof` in a process of its own.
+
+It stands alone, on the standard library, to start in hundredths of a second. A child makes the
+calls and tells the name of each before it is made; this process says how the child ended, and ends
+what it started.
+"""
+
+import ctypes
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+try:
+    import resource
+    import signal
+except ImportError:  # Windows: the time of an answer is all that is limited
+    resource = None  # type: ignore[assignment]
+
+_ROUNDS = 10  # of set and get, as an observer goes through them sample by sample
+_OK, _WARNING, _FATAL = 0, 1, 4
+_DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
+_SIZE, _DOUBLE, _TEXT, _POINTER = ctypes.c_size_t, ctypes.c_double, ctypes.c_char_p, ctypes.c_void_p
+_LOG2 = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
+_LOG3 = ctypes.CFUNCTYPE(None, _POINTER, ctypes.c_int, _TEXT, _TEXT)
+_ALLOCATE = ctypes.CFUNCTYPE(_POINTER, _SIZE, _SIZE)
+_FREE = ctypes.CFUNCTYPE(None, _POINTER)
+
+
+class _RefusedError(Exception):
+    """The FMU answered a call with an error, which is an answer."""
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("logger", _LOG2),
+        ("allocate", _ALLOCATE),
+        ("free", _FREE),
+        ("finished", _POINTER),
+        ("environment", _POINTER),
+    )
+
+
+class _EventInfo(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("again", "end", "nominals", "values", "defined")),
+        ("next", _DOUBLE),
+    )
+
+
+class _Calls:
+    """The functions of an FMU that was loaded, each limited in time and told before it is made."""
+
+    def __init__(self, task: dict[str, Any], tell: Callable[[str], None]) -> None:
+        self._task, self._tell = task, tell
+        self.three = task["version"] == "3.0"
+        self._prefix = "fmi3" if self.three else "fmi2"
+        tell("loading of its library")
+        self._limit()
+        os.chdir(os.path.dirname(task["library"]))
+        self._library = ctypes.CDLL(task["library"])
+        self.component: int | None = None
+        libc = ctypes.CDLL(None) if os.name == "posix" else ctypes.cdll.msvcrt
+        self._kept = (
+            _LOG2(lambda *_: None),
+            _LOG3(lambda *_: None),
+            _ALLOCATE(("calloc", libc)),
+            _FREE(("free", libc)),
+        )
+        self._callbacks = _Callbacks(self._kept[0], *self._kept[2:], None, None)
+
+    def _limit(self) -> None:
+        """Limit processor time, from now on."""
+        if resource is not None:
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            seconds = int(used.ru_utime + used.ru_stime + self._task["processor"]) + 1
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
+
+    def has(self, name: str) -> bool:
+        return hasattr(self._library, self._prefix + name)
+
+    def __call__(self, name: str, *arguments: Any) -> None:
+        """Call a function with the instance and further arguments."""
+        status = self._raw(self._prefix + name, ctypes.c_int, self.component, *arguments)
+        if status not in (_OK, _WARNING):
+            if status == _FATAL:
+                self.component = None
+            raise _RefusedError(f"{self._prefix}{name} returned {status}")
+
+    def _raw(self, name: str, result: Any, *arguments: Any) -> Any:
+        function = getattr(self._library, name)
+        function.restype = result
+        self._tell(name)
+        self._limit()
+        return function(*(_POINTER(a) if isinstance(a, int) else a for a in arguments))
+
+    def instantiate(self) -> None:
+        task, no, text = self._task, ctypes.c_int(0), str.encode
+        identifier, token = text(task["identifier"]), text(task["token"])
+        if not self.three:
+            kind = ctypes.c_int(0 if task["exchange"] else 1)
+            arguments = (identifier, kind, token, text(task["resources"]))
+            callbacks = ctypes.byref(self._callbacks)
+            made = self._raw("fmi2Instantiate", _POINTER, *arguments, callbacks, no, no)
+        else:
+            false = ctypes.c_bool(False)
+            common = (identifier, token, text(task["resources"]), false, false)
+            if task["exchange"]:
+                name = "fmi3InstantiateModelExchange"
+                rest: list[Any] = [None, self._kept[1]]
+            else:
+                name = "fmi3InstantiateCoSimulation"
+                rest = [false, false, None, _SIZE(0), None, self._kept[1], None]
+            made = self._raw(name, _POINTER, *common, *rest)
+        if not made:
+            raise _RefusedError("it would not be instantiated")
+        self.component = made
+
+    def free(self) -> None:
+        if self.component is not None:
+            self._raw(f"{self._prefix}FreeInstance", None, self.component)
+        self.component = None
+
+    def reals(self, use: str, references: list[int], values: Any) -> None:
+        """Set or get real variables."""
+        if references:
+            count = _SIZE(len(references))
+            name = f"{use}Float64" if self.three else f"{use}Real"
+            array = (ctypes.c_uint * len(references))(*references)
+            self(name, array, count, values, *((count,) if self.three else ()))
+
+
+def _initialise(call: _Calls, task: dict[str, Any]) -> None:
+    if not call.three:
+        zero = _DOUBLE(0.0)
+        call("SetupExperiment", ctypes.c_int(0), zero, zero, ctypes.c_int(0), zero)
+    begin = task["start"]
+    call.reals("Set", [r for r, _ in begin], (_DOUBLE * len(begin))(*(v for _, v in begin)))
+    if call.three:
+        false, zero = ctypes.c_bool(False), _DOUBLE(0.0)
+        call("EnterInitializationMode", false, zero, zero, false, zero)
+    else:
+        call("EnterInitializationMode")
+    call("ExitInitializationMode")
+    if not task["exchange"]:
+        return
+    if call.three:
+        flags = [ctypes.byref(ctypes.c_bool()) for _ in range(5)]
+        call("UpdateDiscreteStates", *flags, ctypes.byref(_DOUBLE()))
+    else:
+        call("NewDiscreteStates", ctypes.byref(_EventInfo()))
+    call("EnterContinuousTimeMode")
+
+
+def _go(call: _Calls, task: dict[str, Any]) -> None:
+    """Set and get what an observer does, some times."""
+    n, inputs = task["states"], task["inputs"]
+    states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
+    held, everything = (_DOUBLE * len(inputs))(), (_DOUBLE * len(task["reals"]))()
+    call.reals("Get", inputs, held)
+    for k in range(_ROUNDS):
+        call.reals("Set", inputs, held)
+        if task["exchange"]:
+            call("SetTime", _DOUBLE(1e-3 * k))
+            if n:
+                call("GetContinuousStates", states, _SIZE(n))
+                call("SetContinuousStates", states, _SIZE(n))
+                rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
+                call(rate, rates, _SIZE(n))
+        else:
+            _step(call, 1e-3 * k)
+        call.reals("Get", task["reals"], everything)
+        for unknowns, knowns in task["directional"]:
+            _differentiate(call, unknowns, knowns[k % len(knowns)])
+
+
+def _step(call: _Calls, t: float) -> None:
+    if not call.three:
+        call("DoStep", _DOUBLE(t), _DOUBLE(1e-3), ctypes.c_int(0))
+        return
+    flags = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
+    last = ctypes.byref(_DOUBLE())
+    call("DoStep", _DOUBLE(t), _DOUBLE(1e-3), ctypes.c_bool(False), *flags, last)
+
+
+def _differentiate(call: _Calls, unknowns: list[int], known: int) -> None:
+    rows, one = _SIZE(len(unknowns)), _SIZE(1)
+    result, seed = (_DOUBLE * len(unknowns))(), (_DOUBLE * 1)(1.0)
+    references = ((ctypes.c_uint * len(unknowns))(*unknowns), rows, (ctypes.c_uint * 1)(known), one)
+    tail = (seed, one, result, rows) if call.three else (seed, result)
+    call("GetDirectionalDerivative", *references, *tail)
+
+
+def _roll_back(call: _Calls) -> None:
+    saved = _POINTER()
+    name = "FMUState" if call.three else "FMUstate"
+    call(f"Get{name}", ctypes.byref(saved))
+    call(f"Set{name}", saved)
+    call(f"Free{name}", ctypes.byref(saved))
+
+
+def _try(task: dict[str, Any], tell: Callable[[str], None]) -> None:
+    call = _Calls(task, tell)
+    try:
+        call.instantiate()
+        _initialise(call, task)
+        _go(call, task)
+        if task["saves"]:
+            _roll_back(call)
+        call("Reset")
+        _initialise(call, task)
+        _go(call, task)
+    finally:
+        call.free()
+
+
+def _work(task: dict[str, Any], report: int) -> None:
+    """Try the FMU, and end this process."""
+
+    def tell(what: str, **rest: str) -> None:
+        os.write(report, json.dumps({"call": what, **rest}).encode() + b"\n")
+
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what an FMU prints is nobody's concern
+    os.dup2(1, 2)
+    if resource is not None:
+        for number in (signal.SIGXFSZ, signal.SIGPIPE):  # Python ignores them
+            signal.signal(number, signal.SIG_DFL)
+        # Of memory that can be written: some runtimes reserve much more than they use.
+        for kind, size in (
+            (resource.RLIMIT_CORE, 0),
+            (resource.RLIMIT_FSIZE, task["file"]),
+            (resource.RLIMIT_DATA, task["memory"]),
+        ):
+            resource.setrlimit(kind, (size, size))
+    refused = ""
+    try:
+        _try(task, tell)
+    except _RefusedError as error:  # an answer; the log that explains it is for who calls it next
+        refused = str(error)
+    except (OSError, AttributeError) as error:
+        tell("not loaded", error=str(error))
+        os._exit(0)
+    tell("end", refused=refused)
+    os._exit(0)
+
+
+def _watch(child: int, answer: float) -> dict[str, Any]:
+    """Wait for the end of a process, and end what it left; returns how it was."""
+    late = []
+
+    def end(*_: object) -> None:
+        late.append(True)
+        os.kill(child, signal.SIGKILL)
+
+    signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, answer)
+    _, ending, used = os.wait4(child, 0)
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    while orphans := _orphans():
+        for orphan in orphans:
+            os.kill(orphan, signal.SIGKILL)
+            os.waitpid(orphan, 0)
+    status = os.waitstatus_to_exitcode(ending)
+    return {"status": status, "used": used.ru_utime + used.ru_stime, "late": bool(late)}
+
+
+def _orphans() -> list[int]:
+    """Processes that the child left to this one (`_ADOPT`); each that ends may leave others."""
+    try:
+        with open(f"/proc/self/task/{os.getpid()}/children") as listing:
+            return [int(one) for one in listing.read().split()]
+    except OSError:
+        return []
+
+
+def main() -> None:
+    """Work on the task that standard input holds, and say on standard output how it ended."""
+    task = json.load(sys.stdin)
+    report = os.dup(1)
+    if not hasattr(os, "fork"):
+        _work(task, report)
+    control = ctypes.CDLL(None).prctl if sys.platform == "linux" else lambda *_: None
+    control(_DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+    control(_ADOPT, 1, 0, 0, 0)
+    child = os.fork()
+    if child == 0:
+        control(_DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+        _work(task, report)
+    os.write(report, json.dumps(_watch(child, task["answer"])).encode() + b"\n")
+
+
+if __name__ == "__main__":
+    main()
