@@ -45,7 +45,8 @@ def read_text(path: Path, remedy: str) -> str:
         If the file cannot be read or is not UTF-8; `remedy` is for a file that cannot be read.
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # a pipe or a device may never end
+        kind = path.stat().st_mode
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end
             raise OSError(0, "no regular file")
         raw = path.read_bytes()
     except OSError as error:
