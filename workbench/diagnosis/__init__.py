@@ -17,7 +17,7 @@ from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.counting import refuse_too_few
-from workbench.diagnosis.evidence import Simulated, Simulations, delay, simulating
+from workbench.diagnosis.evidence import Simulations, delay, simulating
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
@@ -228,7 +228,7 @@ def _extend(
     build(library, EXTENDED, text, path, every_platform=every_platform)
     point, difference = diagnosis.best.point, 0.0
     delays = {delay(name) for name in system.signals}
-    with simulating(Simulated(path, system, tuple(simulations.recordings))) as extended:
+    with simulating(simulations.simulated._replace(path=path, system=system)) as extended:
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value

@@ -19,7 +19,7 @@ from workbench.case import Case
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.samples import Samples, compared, prepare
-from workbench.diagnosis.thresholds import SOUND, Soundness
+from workbench.diagnosis.thresholds import SOUND, Soundness, Thresholds
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.pool import Pool
 from workbench.system import System
@@ -28,6 +28,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
+_FINEST = 32  # steps of a sample time
 _CHUNK = 6  # columns of one task: few, so that no processor waits long for the last one
 
 
@@ -82,6 +83,7 @@ class Simulated(NamedTuple):
     path: Path
     system: System
     recordings: tuple[Samples, ...]
+    parts: int = 1  # steps of a sample time
 
 
 class Simulator:
@@ -91,7 +93,7 @@ class Simulator:
         self._fmu = FMU(given.path)
         self._recordings = given.recordings
         signals = given.recordings[0].signals
-        self._predictor = Predictor(self._fmu, given.system, signals)
+        self._predictor = Predictor(self._fmu, given.system, signals, given.parts)
         self._delays = {
             j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
         }
@@ -102,6 +104,12 @@ class Simulator:
     def parameters(self) -> set[str]:
         """Names of the FMU's variables that have a default."""
         return set(self._fmu.defaults)
+
+    def errors(self, number: int, values: Mapping[str, float]) -> Matrix:
+        """Prediction errors of the samples of one recording that count, (m, c)."""
+        one = self._recordings[number]
+        found: Matrix = self._simulated(number, values)[0][one.told]
+        return found
 
     def begin(self, number: int) -> dict[str, float]:
         """Start values of states that a recording's outputs show."""
@@ -193,6 +201,32 @@ def simulating(given: Simulated) -> Iterator[Simulator]:
         simulator.close()
 
 
+def settled_parts(given: Simulated, values: Mapping[str, float]) -> int:
+    """Steps of a sample time from which on finer ones hardly move prediction errors.
+
+    A step that is long for what oscillates damps it and turns its phase, and a wrong law would be
+    named for that. Of the squares of errors, half a step may move what forms of laws differ by.
+
+    Parameters
+    ----------
+    values : of the FMU's variables, SI.
+    """
+
+    def errors(parts: int) -> list[Matrix]:
+        with simulating(given._replace(parts=parts)) as simulator:
+            return [simulator.errors(k, values) for k in range(len(given.recordings))]
+
+    parts, coarse = 1, errors(1)
+    while parts < _FINEST:
+        fine = errors(2 * parts)
+        moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
+        wrong = [np.square(a).sum(axis=0) for a in fine]
+        if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
+            break
+        parts, coarse = 2 * parts, fine
+    return parts
+
+
 class Simulations:
     """A model along all recordings, in worker processes if there are more than one.
 
@@ -206,6 +240,7 @@ class Simulations:
     ----------
     nominal, units, bounds : value, unit, (least, greatest) value by variable of the FMU.
     begin : start values of states by recording, as measured.
+    simulated : what its simulators are made from.
     cases, recordings : as recorded, and made ready.
     """
 
@@ -235,11 +270,12 @@ class Simulations:
             prepare(one, system, signals, self.nominal, moving, sound) for one in cases
         ]
         workers = min(workers, len(cases))
-        simulated = Simulated(path, system, tuple(self.recordings))
-        with simulating(simulated) as own:
+        coarse = Simulated(path, system, tuple(self.recordings))
+        self.simulated = coarse._replace(parts=settled_parts(coarse, self.nominal))
+        with simulating(self.simulated) as own:
             self.begin = [own.begin(k) for k in range(len(cases))]
         self._alone = workers == 1
-        self._pool = Pool(workers, simulating, simulated)
+        self._pool = Pool(workers, simulating, self.simulated)
         # Long ones first: the last one to finish leaves the other processors idle.
         self._order = sorted(range(len(cases)), key=lambda k: -self.recordings[k].time.size)
         self._interrupted = threading.Event()

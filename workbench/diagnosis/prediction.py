@@ -99,14 +99,15 @@ class Predictor:
     ----------
     fmu : model with the states, inputs and readings of the system; it must outlive the predictor.
     signals : that are predicted.
+    parts : of a sample time, one step each.
     """
 
-    def __init__(self, fmu: FMU, system: System, signals: Sequence[str]) -> None:
+    def __init__(self, fmu: FMU, system: System, signals: Sequence[str], parts: int = 1) -> None:
         self._fmu, self._system = fmu, system
         inputs = [one.name for one in system.inputs]
         readings = [system.signals[name].reading for name in signals]
         self._model = instance(fmu, inputs, system.corrections, readings)
-        self._longest = _LONGEST * system.sample_time
+        self._longest = _LONGEST * system.sample_time / parts
         leading = system.comparison.leading
         states: list[int] = []
         if leading is not None:
