@@ -274,6 +274,7 @@ def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_pa
             'size="share", shapes(share=1.0),',
             r"found share = 1\.0; expected an arr",
         ),
+        ('size="share",', 'size="share", shapes(share={0.0, 1.0}),', "numbers that are not 0"),
         ('size="share",', 'size="share", after="Rust",', 'found after="Rust"'),
         ('size="share",', 'size="share", after="Clogging",', "which does not stand after this one"),
         ('size="share",', 'size={"a", "b"},', r"found size = \('a', 'b'\)"),

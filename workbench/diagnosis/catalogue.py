@@ -210,7 +210,12 @@ class _Said:
         return self._array(key, str, 'an array of texts, such as {"a", "b"}')
 
     def numbers(self, key: str) -> tuple[float, ...]:
-        return self._array(key, float, "an array of numbers, such as {0.5, 1.0}")
+        """Of which none is zero: a fit changes them by shares."""
+        expected = "an array of numbers that are not 0, such as {0.5, 1.0}"
+        values = self._array(key, float, expected)
+        if 0.0 in values:
+            raise self._wrong(key, expected)
+        return values
 
     def part(self, key: str) -> "_Said":
         content = self._of(key, dict, f"{key}(...)", None)
