@@ -48,7 +48,7 @@ def _read(folder: Path) -> list[Recording]:
 
 PUBLISHED = Published(
     title="A carriage on a ball screw: reference and position, and the command of its controller",
-    source="A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS (2019), "
+    source="A. Janot, M. Gautier, M. Brunot, data set and models of EMPS (2019), "
     "https://www.nonlinearbenchmark.org; also in https://github.com/forgi86/"
     "sysid-neural-continuous, examples/EMPS/data",
     licence="none stated; free for benchmarks",
