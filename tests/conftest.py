@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from workbench.case import Case, read_case
 from workbench.fmu import FMU
 from workbench.pool import Pool
+from workbench.prepare import write_cases
 from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.tuning import Evaluator, Job, Problem, pose, tunable
@@ -62,6 +64,34 @@ def minimal(minimal_path: Path) -> Iterator[FMU]:
 @pytest.fixture(scope="session")
 def dry_case(system: System) -> Case:
     return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
+
+
+@pytest.fixture(scope="session")
+def published(root: Path) -> Callable[[str], Path]:
+    """Finds the folder of a published set; without it the test is skipped."""
+
+    def found(name: str) -> Path:
+        folder = root.parent / "shared" / "recordings" / "real" / name
+        if not folder.exists():
+            pytest.skip("the recordings are not at hand")
+        return folder
+
+    return found
+
+
+@pytest.fixture(scope="session")
+def published_cases(
+    published: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str, str], Path]:
+    """Makes the case folders of a system from a published set, once."""
+
+    @cache
+    def made(system: str, name: str) -> Path:
+        out = tmp_path_factory.mktemp(system) / "cases"
+        write_cases(system, published(name), out)
+        return out
+
+    return made
 
 
 # --- tuning ---

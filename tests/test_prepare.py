@@ -1,6 +1,8 @@
 """Published recordings become case folders: checked, described, and the same from each layout."""
 
+import importlib
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,85 @@ from workbench.errors import InputError
 from workbench.prepare import PREPARED, write_cases
 
 TANKS = ("estimation/measured.csv", "test/measured.csv")
+PUMPS = """
+import hashlib
+from pathlib import Path
+import numpy as np
+from workbench.prepare import Layout, Published, Recording
+
+def read(folder):
+    names = (folder / "pumps.txt").read_text().split()
+    columns = {"time [s]": np.arange(3.0), "p [bar]": np.ones(3)}
+    made = lambda name: Recording(
+        name, name, columns, "pumps.txt", (0, 2), held_out="test" in name, machine=name[0]
+    )
+    return [made(name) for name in names]
+
+def layout(names):
+    checksum = hashlib.sha256(" ".join(names).encode()).hexdigest()
+    return Layout("a list", {"pumps.txt": checksum}, read)
+
+PUBLISHED = Published("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
+"""
+
+
+@pytest.fixture
+def pumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    """Publishes recordings of pumps by names; returns the system file."""
+    monkeypatch.syspath_prepend(str(tmp_path / "modules"))
+    (tmp_path / "modules").mkdir()
+    (tmp_path / "set").mkdir()
+
+    def publish(*names: str) -> Path:
+        number = len(list((tmp_path / "modules").glob("*.py")))
+        module = tmp_path / "modules" / f"{tmp_path.name}_{number}.py"
+        module.write_text(PUMPS.replace("NAMES", repr(names)))
+        (tmp_path / "set" / "pumps.txt").write_text(" ".join(names))
+        (tmp_path / "system.toml").write_text(f'title = "Pumps"\ncompanion = "{module.stem}"\n')
+        importlib.invalidate_caches()
+        return tmp_path / "system.toml"
+
+    return publish
+
+
+def test_each_machine_of_a_set_has_its_own_next_command(
+    pumps: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    system = str(pumps("a_1", "a_test", "b_1"))
+    out = tmp_path / "cases"
+    assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
+    _, *commands = capsys.readouterr().out.splitlines()
+    diagnose = f"next: workbench diagnose --system {system}"
+    assert commands == [
+        f"{diagnose} {out}/a_1 {out}/a_test --held-out a_test",
+        f"{diagnose} {out}/b_1",
+    ]
+
+
+def test_a_single_machine_has_one_command_with_the_whole_folder(
+    pumps: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    system = str(pumps("a_1", "a_test"))
+    out = tmp_path / "cases"
+    assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
+    (command,) = capsys.readouterr().out.splitlines()[1:]
+    assert command == f"next: workbench diagnose --system {system} {out} --held-out a_test"
+
+
+def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(
+    pumps: Callable[..., Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "cases"
+    write_cases(str(pumps("a_1", "a_2", "a_3", "a_4")), tmp_path / "set", out)
+    (out / "a_2" / "measured.csv").write_text("mine")
+    (out / "a_3" / "notes.txt").write_text("mine")
+    (out / "mine").mkdir()
+    write_cases(str(pumps("a_1")), tmp_path / "set", out)
+    left = {str(path.relative_to(out)) for path in out.rglob("*")}
+    assert left == {
+        *("prepared.json", "mine", "a_1", "a_1/case.toml", "a_1/measured.csv"),
+        *("a_2", "a_2/measured.csv", "a_3", "a_3/notes.txt"),
+    }
 
 
 def test_a_set_says_where_it_is_to_be_had(capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,12 +134,11 @@ def test_a_folder_with_other_files_is_left_as_it_is(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_what_was_read_and_cut_is_told_to_machines(tmp_path: Path, root: Path) -> None:
-    tanks = root.parent / "shared" / "recordings" / "real" / "cascaded_tanks"
-    if not tanks.exists():
-        pytest.skip("the recordings are not at hand")
+def test_what_was_read_and_cut_is_told_to_machines(
+    tmp_path: Path, published: Callable[[str], Path]
+) -> None:
     for _ in range(2):  # over its own files it writes again
-        write_cases("cascaded_tanks", tanks, tmp_path)
+        write_cases("cascaded_tanks", published("cascaded_tanks"), tmp_path)
     told = json.loads((tmp_path / PREPARED).read_text())
     assert told["licence"] == "CC BY-SA 4.0"
     assert list(told["read"]) == ["dataBenchmark.mat"]
@@ -67,10 +147,9 @@ def test_what_was_read_and_cut_is_told_to_machines(tmp_path: Path, root: Path) -
     assert told["cases"]["test"]["rows"] == [0, 1023]
 
 
-def test_a_script_gets_recordings_to_fit_and_those_held_out(tmp_path: Path, root: Path) -> None:
-    tanks = root.parent / "shared" / "recordings" / "real" / "cascaded_tanks"
-    if not tanks.exists():
-        pytest.skip("the recordings are not at hand")
-    fitted, held_out = wb.prepare_cases("cascaded_tanks", tanks, tmp_path)
+def test_a_script_gets_recordings_to_fit_and_those_held_out(
+    tmp_path: Path, published: Callable[[str], Path]
+) -> None:
+    fitted, held_out = wb.prepare_cases("cascaded_tanks", published("cascaded_tanks"), tmp_path)
     assert [case.name for case in fitted] == ["estimation"]
     assert [case.name for case in held_out] == ["test"]

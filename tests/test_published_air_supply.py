@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,26 +18,24 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-METRO = Path(__file__).parents[2] / "shared" / "recordings" / "real" / "metro_air_supply"
-pytestmark = pytest.mark.skipif(not METRO.exists(), reason="the recordings are not at hand")
 
 FITTED = ("cycle_1", "cycle_2", "cycle_3")
 LEAKS = {"LaminarLeak", "CompressibleLeak", "OrificeLeak", "SteadyConsumption"}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("metro") / "cases"
-    write_cases("air_supply", METRO, out)
-    return out
+def folder(published_cases: Callable[[str, str], Path]) -> Path:
+    return published_cases("air_supply", "metro_air_supply")
 
 
 def read(folder: Path) -> dict[str, Case]:
     return {one.name: one for one in read_cases([folder], load_system("air_supply"))}
 
 
-def test_both_layouts_hold_the_same_recordings(folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(METRO / "20200201", tmp_path / "set" / "20200201")
+def test_both_layouts_hold_the_same_recordings(
+    folder: Path, published: Callable[[str], Path], tmp_path: Path
+) -> None:
+    shutil.copytree(published("metro_air_supply") / "20200201", tmp_path / "set" / "20200201")
     write_cases("air_supply", tmp_path / "set", tmp_path / "cases")
     published, digits = read(folder), read(tmp_path / "cases")
     assert published.keys() == digits.keys()

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,24 +18,21 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-TANKS = Path(__file__).parents[2] / "shared" / "recordings" / "real" / "cascaded_tanks"
-pytestmark = pytest.mark.skipif(not TANKS.exists(), reason="the recordings are not at hand")
-
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("tanks") / "cases"
-    write_cases("cascaded_tanks", TANKS, out)
-    return out
+def folder(published_cases: Callable[[str, str], Path]) -> Path:
+    return published_cases("cascaded_tanks", "cascaded_tanks")
 
 
 def read(folder: Path) -> dict[str, Case]:
     return {one.name: one for one in read_cases([folder], load_system("cascaded_tanks"))}
 
 
-def test_both_layouts_hold_the_same_recordings(folder: Path, tmp_path: Path) -> None:
+def test_both_layouts_hold_the_same_recordings(
+    folder: Path, published: Callable[[str], Path], tmp_path: Path
+) -> None:
     for name in ("estimation", "test"):
-        shutil.copytree(TANKS / name, tmp_path / "set" / name)
+        shutil.copytree(published("cascaded_tanks") / name, tmp_path / "set" / name)
     write_cases("cascaded_tanks", tmp_path / "set", tmp_path / "cases")
     published, digits = read(folder), read(tmp_path / "cases")
     assert published.keys() == digits.keys() == {"estimation", "test"}

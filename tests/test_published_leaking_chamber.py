@@ -1,5 +1,6 @@
 """Published pressures of closed chambers: read from each layout, and the leaking ones leak."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.testing import assert_allclose
 from workbench.api import diagnose
 from workbench.case import read_cases
 from workbench.diagnosis import Outcome
-from workbench.prepare import Recording, write_cases
+from workbench.prepare import Recording
 from workbench.published.leaking_chamber import PUBLISHED
 from workbench.systems import load_system
 
@@ -82,13 +83,8 @@ def pressure(one: Recording) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    recordings = root.parent / "shared" / "recordings" / "real" / "pneumatic_cylinder"
-    if not recordings.exists():
-        pytest.skip("the recordings are not at hand")
-    folder = tmp_path_factory.mktemp("chambers")
-    write_cases("leaking_chamber", recordings, folder)
-    return folder
+def cases(published_cases: Callable[[str, str], Path]) -> Path:
+    return published_cases("leaking_chamber", "pneumatic_cylinder")
 
 
 def diagnosed(cases: Path, name: str, out: Path) -> Outcome:

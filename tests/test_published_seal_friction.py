@@ -1,5 +1,6 @@
 """Published friction of two seals: read from each layout, and its pressure dependence is named."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.testing import assert_allclose
 from workbench import published
 from workbench.api import diagnose
 from workbench.case import read_cases
-from workbench.prepare import write_cases
 from workbench.published import seal_friction
 from workbench.systems import load_system
 
@@ -61,13 +61,8 @@ def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    recordings = root.parent / "shared" / "recordings" / "real" / "pneumatic_cylinder"
-    if not recordings.exists():
-        pytest.skip("the recordings are not at hand")
-    folder = tmp_path_factory.mktemp("seals")
-    write_cases("seal_friction", recordings, folder)
-    return folder
+def cases(published_cases: Callable[[str, str], Path]) -> Path:
+    return published_cases("seal_friction", "pneumatic_cylinder")
 
 
 @pytest.mark.parametrize(("seal", "before", "after"), [("O-ring", 5.95, 1.0), ("NAPN", 7.9, 1.2)])

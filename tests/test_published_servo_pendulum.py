@@ -1,6 +1,7 @@
 """The servo's published records become cases, from each layout, and its system fits them."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,21 +10,15 @@ import pytest
 from workbench.case import read_case
 from workbench.diagnosis import diagnose, read_effects
 from workbench.modelica import read_library
-from workbench.prepare import PREPARED, write_cases
+from workbench.prepare import PREPARED
 from workbench.systems import load_system
 
 SYSTEM = load_system("servo_pendulum")
 
 
 @pytest.fixture(scope="module")
-def cases(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Case folders of the published set, if it is at hand."""
-    servo = root.parent / "shared" / "recordings" / "real" / "servo_pendulum"
-    if not servo.exists():
-        pytest.skip("the recordings are not at hand")
-    out: Path = tmp_path_factory.mktemp("servo_pendulum")
-    write_cases("servo_pendulum", servo, out)
-    return out
+def cases(published_cases: Callable[[str, str], Path]) -> Path:
+    return published_cases("servo_pendulum", "servo_pendulum")
 
 
 def test_records_of_one_gain_are_held_out(cases: Path) -> None:

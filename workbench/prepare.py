@@ -5,6 +5,7 @@ companion has as `PUBLISHED`.
 """
 
 import hashlib
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -37,6 +38,7 @@ class Recording:
     changed : what was converted, chosen or cut, for people.
     conditions : of the case, as `case.toml` has them.
     held_out : it is there to judge a fit to the others by.
+    machine : that it was recorded on, where a set has several; each is diagnosed for itself.
     counts_from : time before which samples only lead to those that count [s]; None: all count.
     """
 
@@ -48,6 +50,7 @@ class Recording:
     changed: tuple[str, ...] = ()
     conditions: Mapping[str, Any] = field(default_factory=dict)
     held_out: bool = False
+    machine: str = ""
     counts_from: float | None = None
 
 
@@ -127,7 +130,8 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
     ----------
     which : see `published`.
     source : folder that holds the set in one of its layouts.
-    out : a new folder, an empty one, or one that was written so before.
+    out : a new folder, an empty one, or one that was written so before. What was written then and
+        is no case now is removed, if it is as it was written.
 
     Raises
     ------
@@ -139,8 +143,13 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
     layout = _layout(known, source)
     recordings = list(layout.read(source))
     with claimed(out):
+        before = _written(out)
+        written: dict[str, str] = {}
         for one in recordings:
-            _write_case(out / one.name, one)
+            written |= {f"{one.name}/{file}": text for file, text in _texts(one).items()}
+        _remove(out, {path: sha256 for path, sha256 in before.items() if path not in written})
+        for path, text in written.items():
+            write_whole(out / path, text)
         write_json(
             out / PREPARED,
             {
@@ -152,6 +161,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
                 "layout": layout.name,
                 "read": dict(layout.files),
                 "held_out": [one.name for one in recordings if one.held_out],
+                "written": {path: _sha256(text.encode()) for path, text in written.items()},
                 "cases": {one.name: _described(one) for one in recordings},
             },
         )
@@ -167,6 +177,7 @@ def _described(one: Recording) -> dict[str, Any]:
         "seconds": float(time[-1] - time[0]),
         "columns": list(one.columns),
         "conditions": dict(one.conditions),
+        "machine": one.machine,
         "changed": list(one.changed),
     }
 
@@ -205,7 +216,7 @@ def _check(path: Path, sha256: str) -> None:
             expected="all files of the set",
             remedy="complete the folder",
         )
-    found = hashlib.sha256(path.read_bytes()).hexdigest()
+    found = _sha256(path.read_bytes())
     if found != sha256:
         raise InputError(
             where=str(path),
@@ -215,13 +226,39 @@ def _check(path: Path, sha256: str) -> None:
         )
 
 
-def _write_case(folder: Path, one: Recording) -> None:
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _written(out: Path) -> dict[str, str]:
+    """SHA-256 of the files that were written into a folder before, by their path there."""
+    path = out / PREPARED
+    if not path.is_file():
+        return {}
+    found: dict[str, str] = json.loads(path.read_text()).get("written", {})
+    return found
+
+
+def _remove(out: Path, files: Mapping[str, str]) -> None:
+    """Remove files that are as they were written, and the folders which that leaves empty."""
+    for name, sha256 in files.items():
+        path = out / name
+        if path.is_file() and _sha256(path.read_bytes()) == sha256:
+            path.unlink()
+            if not any(path.parent.iterdir()):
+                path.parent.rmdir()
+
+
+def _texts(one: Recording) -> dict[str, str]:
+    """Files of a case folder, by name."""
     measurement = {"file": "measured.csv"}
     if one.counts_from is not None:
         measurement["counts_from"] = f"{one.counts_from!r} s"
     case = {"title": one.title, "measurement": measurement}
     conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
-    write_whole(folder / "case.toml", tomli_w.dumps(case | conditions))
     rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
     lines = [",".join(one.columns), *(",".join(map(repr, row)) for row in rows)]
-    write_whole(folder / "measured.csv", "\n".join(lines) + "\n")
+    return {
+        "case.toml": tomli_w.dumps(case | conditions),
+        "measured.csv": "\n".join(lines) + "\n",
+    }

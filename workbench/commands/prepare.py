@@ -39,8 +39,14 @@ def _prepare(options: argparse.Namespace) -> int:
         print(f"\nnext: workbench prepare {options.system} --from FOLDER --out CASES")
         return 0
     recordings = write_cases(options.system, options.source, options.out)
-    held_out = [one.name for one in recordings if one.held_out]
     print(f"{len(recordings)} recordings in {nearby(options.out)}, see {PREPARED} there")
-    command = f"workbench diagnose --system {options.system} {nearby(options.out)}"
-    print(f"next: {command}" + " --held-out " * bool(held_out) + " ".join(held_out))
+    machines = list(dict.fromkeys(one.machine for one in recordings))
+    for machine in machines:
+        own = [one for one in recordings if one.machine == machine]
+        folders = [str(nearby(options.out / one.name)) for one in own]
+        if len(machines) == 1:
+            folders = [str(nearby(options.out))]
+        held_out = [one.name for one in own if one.held_out]
+        words = ["workbench diagnose --system", options.system, *folders]
+        print("next:", *words, *["--held-out"] * bool(held_out), *held_out)
     return 0

@@ -16,7 +16,9 @@ def add(commands: Commands) -> None:
 
 
 def _systems(options: argparse.Namespace) -> int:
-    for name, path in system_files().items():
+    files = system_files()
+    width = max(map(len, files))
+    for name, path in files.items():
         title = read_table(path, "install the workbench again", 'title = "..."').take("title", str)
-        print(f"{name:<16} {title}\n{'':<16} {nearby(path)}")
+        print(f"{name:<{width}} {title}\n{'':<{width}} {nearby(path)}")
     return 0

@@ -8,15 +8,13 @@ Metric: root mean square error of the pressure, over all samples above and below
 that never fall to 2 bar have no record that is held out.
 """
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
-from workbench.recording import Vector, read_columns
+from workbench.prepare import Published, Recording
+from workbench.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
 
-_THEIRS = "appendix_compressed-air_chamber/data"
 _BETWEEN = 2.0  # bar: what is above is fitted, what is below is held out
 _CLOSED = 0.05  # bar from a sample to the next: as long as air comes in, pressure moves by less
 _PUBLISHED = {  # SHA-256: by the publisher, in folders
@@ -43,8 +41,9 @@ _PUBLISHED = {  # SHA-256: by the publisher, in folders
 }
 
 
-def _recordings(name: str, time: Vector, pressure: Vector, file: str) -> list[Recording]:
+def _recordings(name: str, columns: Columns, file: str) -> list[Recording]:
     """What a chamber shows above and, if it falls so far, below the pressure between."""
+    time, pressure = columns["time"], columns["pressure"]
     falls = np.flatnonzero(np.diff(pressure) < -_CLOSED)
     first = int(falls[0]) + 1 if falls.size else 0
     low = pressure[first:] < _BETWEEN
@@ -64,6 +63,7 @@ def _recordings(name: str, time: Vector, pressure: Vector, file: str) -> list[Re
             (first, end - 1),
             tuple(changed),
             held_out=begin is not None,
+            machine=name,
             counts_from=begin,
         )
 
@@ -73,51 +73,29 @@ def _recordings(name: str, time: Vector, pressure: Vector, file: str) -> list[Re
     return [above, until(pressure.size, "below", float(time[middle]))]
 
 
-def _read_theirs(folder: Path) -> list[Recording]:
-    found = []
-    for name in _PUBLISHED:
-        file = f"{_THEIRS}/{name}.csv"
-        rows = [line.split(";") for line in (folder / file).read_text().splitlines()]
-        # Time in ms, "3.066.000": all points but the last stand between thousands.
-        time = np.array([float(row[0].replace(".", "")) / 1e6 for row in rows])
-        pressure = np.array([float(row[2]) for row in rows])
-        found += _recordings(name, time, pressure, file)
-    return found
-
-
-def _read_folders(prefix: str, folder: Path) -> list[Recording]:
-    found = []
-    for name in _PUBLISHED:
-        file = f"{prefix}{name}/measured.csv"
-        read = read_columns(folder / file, ("time", "pressure"))
-        found += _recordings(name, read["time"].values, read["pressure"].values, file)
-    return found
-
-
-def _folders(prefix: str) -> Layout:
-    return Layout(
-        "one folder for each chamber, with one sample a second",
-        {f"{prefix}{name}/measured.csv": ours for name, (_, ours) in _PUBLISHED.items()},
-        partial(_read_folders, prefix),
-    )
+def _theirs(path: Path) -> Columns:
+    rows = [line.split(";") for line in path.read_text().splitlines()]
+    # Time in ms, "3.066.000": all points but the last stand between thousands.
+    time = np.array([float(row[0].replace(".", "")) / 1e6 for row in rows])
+    return {"time": time, "pressure": np.array([float(row[2]) for row in rows])}
 
 
 PUBLISHED = Published(
     title="Pressure of closed chambers: one of aluminium, and printed ones",
-    source="E. Zillen, H. Vallery, G. Smit, 3D printed pneumatic actuator (2021), Delft University "
-    "of Technology, https://github.com/EvaZillen/3D-printed-pneumatic-actuator, commit 6e0bcb46",
-    licence="CC0 1.0",
+    source=SOURCE,
+    licence=LICENCE,
     recordings="Five chambers, filled to about 7.5 bar and closed, ten samples a second as "
     "published. A machine is one chamber: diagnose what it shows above 2 bar, and hold out what it "
     "shows below, to which what is above leads without being counted; three of them never fall so "
     "far.",
-    layouts=(
-        Layout(
-            "the publisher's own files",
-            {f"{_THEIRS}/{name}.csv": theirs for name, (theirs, _) in _PUBLISHED.items()},
-            _read_theirs,
+    layouts=layouts(
+        ("appendix_compressed-air_chamber/data", _theirs),
+        (
+            "one folder for each chamber, with one sample a second",
+            "chamber",
+            ("time", "pressure"),
         ),
-        _folders("chamber/"),
-        _folders(""),
+        _PUBLISHED,
+        _recordings,
     ),
 )

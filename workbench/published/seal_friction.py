@@ -7,17 +7,15 @@ of effects start at rest. Metric: root mean square error of the force, over all 
 set aside: the first 15 are left out, the first second does not count.
 """
 
-from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from workbench.prepare import Layout, Published, Recording
-from workbench.recording import Vector, read_columns
+from workbench.prepare import Published, Recording
+from workbench.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
+from workbench.recording import Vector
 
-_THEIRS = "results_pneumatic-actuator/data/friction"
 _HELD_OUT = "_5bar"
 _DROPPED = 15  # samples at the start, as the publisher does
 _WINDOW = 11  # samples, 0.1 s: noise of 0.01 mm becomes one of 0.1 mm/s
@@ -81,13 +79,13 @@ def _slope(t: Vector, s: Vector) -> Vector:
     return slopes
 
 
-def _recording(name: str, columns: Mapping[str, Vector], file: str) -> Recording:
+def _recordings(name: str, columns: Columns, file: str) -> list[Recording]:
     seal, pressure = name.removesuffix("bar").rsplit("_", 1)
     size = columns["time"].size
     time, stroke, p, force = (
         columns[one][_DROPPED:] for one in ("time", "stroke", "pressure", "force")
     )
-    return Recording(
+    one = Recording(
         name,
         f"Ten strokes at {pressure} bar, seal {seal}",
         {
@@ -104,55 +102,34 @@ def _recording(name: str, columns: Mapping[str, Vector], file: str) -> Recording
             f"v is the slope of a line through {_WINDOW} samples of the stroke around each",
         ),
         held_out=name.endswith(_HELD_OUT),
+        machine=seal,
     )
+    return [one]
 
 
-def _read_theirs(folder: Path) -> list[Recording]:
-    found = []
-    for name in _PUBLISHED:
-        file = f"{_THEIRS}/{name}.csv"
-        # Time in ms; three voltages of sensors; stroke in mm, pressure in bar, force in N.
-        time, _, _, _, stroke, pressure, force = np.loadtxt(folder / file).T
-        columns = {"time": time / 1e3, "stroke": stroke, "pressure": pressure, "force": force}
-        found.append(_recording(name, columns, file))
-    return found
-
-
-def _read_folders(prefix: str, folder: Path) -> list[Recording]:
-    found = []
-    for name in _PUBLISHED:
-        file = f"{prefix}{name}/measured.csv"
-        read = read_columns(folder / file, ("time", "stroke", "pressure", "force"))
-        columns = {one: column.values for one, column in read.items()}
-        found.append(_recording(name, columns, file))
-    return found
-
-
-def _folders(prefix: str) -> Layout:
-    return Layout(
-        "one folder for each recording",
-        {f"{prefix}{name}/measured.csv": ours for name, (_, ours) in _PUBLISHED.items()},
-        partial(_read_folders, prefix),
-    )
+def _theirs(path: Path) -> Columns:
+    # Time in ms; three voltages of sensors; stroke in mm, pressure in bar, force in N.
+    time, _, _, _, stroke, pressure, force = np.loadtxt(path).T
+    return {"time": time / 1e3, "stroke": stroke, "pressure": pressure, "force": force}
 
 
 PUBLISHED = Published(
     title="Force of a pneumatic cylinder of 25 mm bore with two seals, an O-ring and a lip seal "
     "(NAPN), by pressure and stroke",
-    source="E. Zillen, H. Vallery, G. Smit, 3D printed pneumatic actuator (2021), Delft University "
-    "of Technology, https://github.com/EvaZillen/3D-printed-pneumatic-actuator, commit 6e0bcb46",
-    licence="CC0 1.0",
+    source=SOURCE,
+    licence=LICENCE,
     recordings="Ten strokes each, at 1, 3, 5 and 7 bar, about 95 samples a second, unevenly. A "
     "machine is one seal: diagnose its recordings at 1, 3 and 7 bar, and hold out that at 5 bar. "
     "Pressure and force are as the publisher converted them; force is that which pushes the piston "
     "in.",
-    layouts=(
-        Layout(
-            "the publisher's own files",
-            {f"{_THEIRS}/{name}.csv": theirs for name, (theirs, _) in _PUBLISHED.items()},
-            _read_theirs,
+    layouts=layouts(
+        ("results_pneumatic-actuator/data/friction", _theirs),
+        (
+            "one folder for each recording",
+            "friction",
+            ("time", "stroke", "pressure", "force"),
         ),
-        _folders("friction/"),
-        _folders(""),
+        _PUBLISHED,
+        _recordings,
     ),
 )

@@ -1,0 +1,3 @@
+within ElectronicOscillator;
+package Interfaces "Partial models by which slots are constrained"
+end Interfaces;
