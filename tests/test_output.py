@@ -2,6 +2,7 @@
 
 import os
 import resource
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ COMMANDS = {
     "diagnose": ["diagnose", "cases/01_dry_80_1.5"],
     "export": ["export"],
     "power": ["power", "--clean", "1"],
+    "rig": ["rig", "--case", "01_dry_80_1.5", "--workers", "1"],
+    "accuracy": ["accuracy", "cases/01_dry_80_1.5"],
 }
 
 
@@ -82,6 +85,24 @@ def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False)
     with claimed(tmp_path):
         assert not list(tmp_path.iterdir())
+
+
+def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) -> None:
+    script = (
+        "from pathlib import Path; import os, sys, time; from workbench.files import claimed\n"
+        "with claimed(Path(sys.argv[1])):\n"
+        "    if os.fork(): time.sleep(60)\n"
+        "    print(os.getpid(), flush=True); os.kill(os.getppid(), 9)\n"
+        "    os.close(1); os.close(2); time.sleep(60)"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path)]
+    child = int(subprocess.run(command, check=False, capture_output=True, text=True).stdout)
+    try:
+        os.kill(child, 0)  # it lives
+        with claimed(tmp_path):
+            pass
+    finally:
+        os.kill(child, signal.SIGKILL)
 
 
 def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> None:

@@ -137,6 +137,31 @@ MISTAKES = {
         ('inputs = { pB = "1.5 bar" }', 'inputs = { pb = "1.5 bar" }'),
         r"found unknown key 'pb' \(closest: 'pB'\)",
     ),
+    # --- what it says of recordings ---
+    "range that is none": (
+        ('possible = ["-1 bar", "20 bar"]', 'possible = ["20 bar", "-1 bar"]'),
+        r"\[inputs\.pB\] possible: found .*; expected the lower limit before the upper one",
+    ),
+    "gaps that are none": (
+        ('gaps = ["0.1 s", "2 s"]', 'gaps = ["2 s", "0.1 s"]'),
+        r"\[sampling\] gaps: found .*; expected the longest likely time before",
+    ),
+    "tolerance that is none": (
+        ("within = [0.05, 0.3]", "within = [0.3, 0.05]"),
+        r"\[\[redundancies\]\] 1 within: found \[0\.3, 0\.05\]; expected the largest likely",
+    ),
+    "redundancy of an unknown signal": (
+        ('is = "rW*omegaW"', 'is = "rW*omegaw"'),
+        r"\[\[redundancies\]\] 1 is: found 'omegaw' \(closest: 'omegaW'\)",
+    ),
+    "place in a recording": (
+        ('at = "largest"', 'at = "last"'),
+        r"agrees at: found 'last'; expected 'first' or 'largest'",
+    ),
+    "a word that a recording shows": (
+        ("count = 3", 'agrees = { is = "pB", within = [0.1, 0.2] }'),
+        r"discs: found 'agrees' of words, or of a list; expected a quantity",
+    ),
     # --- what it says of itself ---
     "condition": (
         ('muDC = { by = "discs" }', 'muDC = { by = "disc" }'),

@@ -34,9 +34,16 @@ def claimed(folder: Path) -> Iterator[None]:
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(0, "a file, and no folder")
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder, os.O_RDONLY)
+        lock = [os.open(folder, os.O_RDONLY)]
+
+    def release() -> None:
+        while lock:
+            os.close(lock.pop())
+
+    # A forked child that outlives this process must not hold the folder for it.
+    os.register_at_fork(after_in_child=release)
     try:
-        _lock(lock, folder)
+        _lock(lock[0], folder)
         with _told(folder):
             for left in folder.iterdir():
                 if _PART.fullmatch(left.name):
@@ -44,7 +51,7 @@ def claimed(folder: Path) -> Iterator[None]:
             _prove_room(folder)
         yield
     finally:
-        os.close(lock)
+        release()
 
 
 def _lock(descriptor: int, folder: Path) -> None:

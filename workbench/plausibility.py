@@ -5,7 +5,7 @@ told of a machine stands in its system file: ranges, redundancies, conditions th
 and times between samples.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from workbench.errors import InputError
 from workbench.recording import Vector
 from workbench.system import System
-from workbench.system_parts import FIRST, Condition, Redundancy, Signal, Tolerance
+from workbench.system_parts import FIRST, Condition, Signal, Tolerance
 from workbench.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
@@ -82,6 +82,20 @@ def doubts(
     """
     found = list(_ranges(time, signals, system, origin))
     _refuse(found)  # what is out of range has no use in formulas
+    with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
+        found += _contradictions(time, signals, conditions, system, origin)
+    _refuse(found)
+    return tuple(str(one.refusal()) for one in found)
+
+
+def _contradictions(
+    time: Vector,
+    signals: Mapping[str, Vector],
+    conditions: Mapping[str, Any],
+    system: System,
+    origin: Origin,
+) -> list[_Finding]:
+    found: list[_Finding] = []
     for check in (
         _still(signals, system, origin),
         _sampling(time, system, origin),
@@ -89,8 +103,7 @@ def doubts(
         _conditions(signals, conditions, system, origin),
     ):
         found += check
-    _refuse(found)
-    return tuple(str(one.refusal()) for one in found)
+    return found
 
 
 def _refuse(found: list[_Finding]) -> None:
@@ -174,7 +187,10 @@ def _redundancies(
 ) -> Iterator[_Finding]:
     """Signals that contradict each other while they ought to agree."""
     for one in system.redundancies:
-        if not _known(one, signals, system):
+        names = one.formula.names | one.other.names
+        if one.while_below is not None:
+            names |= {one.while_below.signal}
+        if not _has(names, signals, system):
             continue
         left, right = (system.evaluate(formula, signals) for formula in (one.formula, one.other))
         large = np.maximum(np.abs(left), np.abs(right))
@@ -187,28 +203,26 @@ def _redundancies(
             continue
         shares = np.abs(left - right)[chosen] / large[chosen]
         share = float(np.median(shares))  # whatever single samples read
-        if share <= one.tolerance.likely:
+        if not share > one.tolerance.likely:
             continue
         first = int(chosen[shares > one.tolerance.likely][0])
-        names = [name for name in signals if name in one.formula.names | one.other.names]
+        columns = [name for name in signals if name in one.formula.names | one.other.names]
         yield _Finding(
             share > one.tolerance.possible,
-            origin.at(first, names[-1] if names else "time"),
+            origin.at(first, columns[-1] if columns else "time"),
             f"{one.formula.text} = {left[first]:.6g} {one.unit} beside {one.other.text} = "
             f"{right[first]:.6g} {one.unit} at {time[first]:.9g} s, and by {share:.0%} apart in "
             f"half of {chosen.size} samples",
             f"the same within {one.tolerance.likely:.0%}: {one.reason}",
-            f"check units, signs and columns of {', '.join(names)}",
+            f"check units, signs and columns of {', '.join(columns)}",
         )
 
 
-def _known(one: Redundancy, signals: Mapping[str, Vector], system: System) -> bool:
-    """Whether a recording has all that is compared; what only judges may be missing."""
-    names = one.formula.names | one.other.names
-    if one.while_below is not None:
-        names |= {one.while_below.signal}
-    absent = system.signals.keys() - signals.keys()
-    return not names & absent
+def _has(names: Set[str], signals: Mapping[str, Vector], system: System) -> bool:
+    """Whether a recording has all of some signals; what only judges may be missing."""
+    for one in reversed(system.derived):  # each is made of those before it
+        names |= one.formula.names if one.name in names else set()
+    return not names & (system.signals.keys() - signals.keys())
 
 
 def _conditions(
@@ -216,7 +230,7 @@ def _conditions(
 ) -> Iterator[_Finding]:
     """Conditions that the record contradicts."""
     for one in system.conditions:
-        if one.agrees is None:
+        if one.agrees is None or not _has(one.agrees.formula.names, signals, system):
             continue
         values = system.evaluate(one.agrees.formula, signals)
         at_start = one.agrees.place == FIRST
@@ -225,7 +239,7 @@ def _conditions(
         shown = float(np.median(values[:few]) if at_start else values[sample])
         said = float(conditions[one.name])
         share = _apart(shown, said, one.agrees.tolerance)
-        if share <= one.agrees.tolerance.likely:
+        if not share > one.agrees.tolerance.likely:
             continue
         names = [name for name in signals if name in one.agrees.formula.names]
         where = origin.at(sample, names[0]) if names else origin.name

@@ -213,6 +213,15 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
 def _agreement(condition: Table) -> Agreement:
     """What a recording says of a condition."""
     table = condition.table("agrees")
+    if "count" in condition or any(
+        isinstance(c, str) for c in condition.content.get("choices", [])
+    ):
+        raise InputError(
+            where=condition.where,
+            found="'agrees' of words, or of a list",
+            expected="a quantity, or choices that are whole numbers",
+            remedy="remove 'agrees'",
+        )
     table.refuse_unknown("is at within slack")
     place = table.text("at", FIRST)
     if place not in (FIRST, LARGEST):

@@ -8,7 +8,7 @@ import pickle
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence, Set
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -37,6 +37,8 @@ _PERIOD = 0.5  # [s] between two looks at who is there
 _TRIALS = 3  # workers that a task may end, as of Dask's own
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "fmpy")  # that compute
 _PREPARATION = 600.0  # [s] to load the model and compile its loop, on a busy machine
+
+_LOG = logging.getLogger("distributed.client")
 
 # Settings of glibc's malloc by number, and how high it would raise them by itself [bytes].
 _TRIM_THRESHOLD, _MAP_THRESHOLD = (-1, 2**26), (-3, 2**25)
@@ -110,10 +112,14 @@ class DaskPool(Generic[State]):
         self._lost = ""
         self._closed = threading.Event()
         self._client = Client(address, timeout=_ANSWER)
+        # A scheduler that dies is told once and in words.
+        self._loudness = _LOG.level
+        _LOG.setLevel(logging.CRITICAL)
         try:
             self._await_worker()
         except BaseException:
             self._client.close()
+            _LOG.setLevel(self._loudness)
             raise
         self._watch = threading.Thread(target=self._attend, daemon=True)
         self._watch.start()
@@ -139,8 +145,8 @@ class DaskPool(Generic[State]):
         """See Pool."""
         self._closed.set()
         self._watch.join()
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # of what is lost by now
         self._client.close()
+        _LOG.setLevel(self._loudness)
 
     def _send(self, task: _Task) -> None:
         """Hand a task to the cluster; impure: what is done again is not to be looked up."""
@@ -153,14 +159,19 @@ class DaskPool(Generic[State]):
             task.done = None
 
     def _hand_over(self, task: _Task, done: "distributed.Future[Any]") -> None:
-        if done is not task.done or done.status == "cancelled":
-            return  # another worker does it by now; or the scheduler is gone, which the watch tells
-        match done.exception():
+        if done is not task.done:
+            return  # another worker does it by now
+        try:
+            error = done.exception()
+            result = done.result() if error is None else None
+        except CancelledError:
+            return  # the scheduler was gone: the watch sends the task again, or tells that
+        match error:
             case None:
-                self._settle(task, done.result())
-            case KilledWorker() as error:
+                self._settle(task, result)
+            case KilledWorker():
                 self._settle(task, WorkerError(f"a task ended its workers ({error})"))
-            case error:
+            case _:
                 self._settle(task, error)
 
     def _settle(self, task: _Task, result: Any) -> None:
@@ -252,11 +263,16 @@ class DaskPool(Generic[State]):
         self._warn(f"found {self._refused[process]}; it gets no work")
 
     def _move_tasks(self) -> None:
-        """Send tasks whose workers are all gone to those that are there."""
+        """Send tasks whose workers are all gone, or that were lost, to those that are there."""
+        if not self._ready:
+            return
         with self._lock:
-            stranded = [one for one in self._tasks.values() if not one.workers & set(self._ready)]
-        for task in stranded if self._ready else ():
-            task.tried += 1
+            tasks = list(self._tasks.values())
+        for task in tasks:
+            if not task.workers & set(self._ready):
+                task.tried += 1
+            elif task.done is not None and task.done.status != "cancelled":
+                continue
             before, task.workers = task.done, set(self._ready)
             if task.tried > _TRIALS:
                 self._settle(task, WorkerError("a task ended all its workers"))

@@ -12,6 +12,7 @@ from workbench.commands.arguments import (
     example_case,
     given_cases,
 )
+from workbench.files import claimed
 from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
 from workbench.systems import load_system, open_model
@@ -56,7 +57,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []
     begin = time.perf_counter()
-    with ExitStack() as stack:
+    with claimed(options.out), ExitStack() as stack:
         roles = dict.fromkeys(kind.role for kind in chosen.values())
         models = {role: stack.enter_context(open_model(system, role)) for role in roles}
         gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}
@@ -78,8 +79,8 @@ def _accuracy(options: argparse.Namespace) -> int:
                 f"{time.perf_counter() - begin:5.1f} s",
                 flush=True,
             )
-    write_accuracies(stops, options.out / "accuracy.csv")
-    write_accuracy(stops, provenance, options.out / "accuracy.json")
-    print(format_accuracy(stops))
+        print(format_accuracy(stops))
+        write_accuracies(stops, options.out / "accuracy.csv")
+        write_accuracy(stops, provenance, options.out / "accuracy.json")
     print(f"every stop: {options.out / 'accuracy.csv'}, accuracy.json beside it")
     return 0

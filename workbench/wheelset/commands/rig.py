@@ -3,12 +3,14 @@
 import argparse
 import dataclasses
 import time
+from collections.abc import Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.commands.arguments import Commands, add_system, add_workers, positive
+from workbench.files import claimed
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
 from workbench.system import REFERENCE
@@ -135,6 +137,11 @@ def _rig(options: argparse.Namespace) -> int:
     scenarios = select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
+    with claimed(options.out):
+        return _recorded(options, scenarios, effects)
+
+
+def _recorded(options: argparse.Namespace, scenarios: Sequence[Scenario], effects: Effects) -> int:
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
     fmu = options.fmu or model_path(load_system(options.system), REFERENCE)
     with CoSimulation(fmu):
