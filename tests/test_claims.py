@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler
+from workbench import compiler, shelf
 
 LIBRARIES = sorted(
     path.parents[1]
@@ -23,11 +23,15 @@ CLAIMS = [
 ]
 
 
-def simulate(package: Path, claim: str, folder: Path) -> list[str]:
-    """Build a claim and co-simulate it to its StopTime; returns what the FMU complained of."""
-    path = folder / f"{claim}.fmu"
-    compiler.build(
-        package, f"{package.parent.name}.Tests.{claim}", path, platforms=["linux-x86_64"]
+def simulate(package: Path, claim: str) -> list[str]:
+    """Co-simulate a claim to its StopTime; returns what the FMU complained of.
+
+    It is built once for each state of library and compiler.
+    """
+    model = f"{package.parent.name}.Tests.{claim}"
+    path = shelf.keep(
+        shelf.key(package, model),
+        lambda path: compiler.build(package, model, path, platforms=[compiler.native()]),
     )
     experiment = fmpy.read_model_description(str(path)).defaultExperiment
     messages: list[str] = []
@@ -59,8 +63,8 @@ def test_every_claim_is_listed(library: Path) -> None:
 @pytest.mark.parametrize(
     ("library", "claim"), CLAIMS, ids=lambda value: getattr(value, "name", value)
 )
-def test_claim(library: Path, claim: str, tmp_path: Path) -> None:
-    assert simulate(library / "package.mo", claim, tmp_path) == []
+def test_claim(library: Path, claim: str) -> None:
+    assert simulate(library / "package.mo", claim) == []
 
 
 def test_a_wrong_claim_fails_with_its_text(tmp_path: Path) -> None:
@@ -68,5 +72,5 @@ def test_a_wrong_claim_fails_with_its_text(tmp_path: Path) -> None:
     shutil.copytree(RIG, copy)
     claim = copy / "Tests" / "PolachSlopeIsKalkerStiffness.mo"
     claim.write_text(claim.read_text().replace("kS=1.0", "kS=0.9"))
-    messages = simulate(copy / "package.mo", claim.stem, tmp_path)
+    messages = simulate(copy / "package.mo", claim.stem)
     assert any("Polach's slope at zero slip differs from K" in message for message in messages)

@@ -51,10 +51,10 @@ def test_a_cache_that_cannot_be_written_costs_only_time(cache: Path, tmp_path: P
 
 
 def test_the_least_used_are_dropped(cache: Path, tmp_path: Path) -> None:
-    for number in range(40):
+    for number in range(136):
         shelf.fetch(f"{number}", tmp_path / "a.fmu", lambda path: path.write_bytes(b"an FMU"))
-    assert len(list(cache.iterdir())) == 32
-    assert (cache / "39.fmu").exists()
+    assert len(list(cache.iterdir())) == 128
+    assert (cache / "135.fmu").exists()
 
 
 def test_a_build_that_fails_keeps_nothing(cache: Path, tmp_path: Path) -> None:

@@ -9,10 +9,12 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
+from workbench import shelf
 from workbench.compiler.archive import PLATFORMS, RUNTIME, digest, digest_file, native
 from workbench.compiler.assembly import BuiltFMU, Law, assemble
 from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
+from workbench.description import read_description
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
 from workbench.modelica import files, packages
@@ -85,7 +87,8 @@ def build(
 def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltFMU]:
     """Build models for FMI 2.0 and 3.0 into `folder`, and their manifest.
 
-    Files in `folder` change only when all of them have been built.
+    Files in `folder` change only when all of them have been built. What this machine has built of
+    these very sources is taken from where built FMUs are kept.
 
     Parameters
     ----------
@@ -93,11 +96,11 @@ def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltF
     """
     with tempfile.TemporaryDirectory() as scratch:
         built = [
-            build(
+            _kept_build(
                 package,
                 model,
                 Path(scratch) / f"fmi{fmi}" / f"{model.rpartition('.')[2]}.fmu",
-                fmi=fmi,
+                fmi,
             )
             for fmi in FMI_VERSIONS
             for package, names in models.items()
@@ -122,8 +125,16 @@ def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltF
     return [replace(b, path=folder / b.path.relative_to(scratch)) for b in built]
 
 
+def _kept_build(package: Path, model: str, fmu: Path, fmi: int) -> BuiltFMU:
+    """Build for every platform, once for each state of the sources."""
+    fmu.parent.mkdir(exist_ok=True)
+    key = shelf.key(package, model, f"FMI {fmi}", *PLATFORMS)
+    shelf.fetch(key, fmu, lambda path: build(package, model, path, fmi=fmi))
+    return BuiltFMU(fmu, model, fmi, read_description(fmu).token, digest_file(fmu))
+
+
 def differences(models: Mapping[Path, Sequence[str]], folder: Path) -> list[str]:
-    """Build everything anew and compare with what `folder` holds; returns the differences.
+    """Compare what the sources give with what `folder` holds; returns the differences.
 
     Parameters
     ----------

@@ -125,9 +125,9 @@ def _column(entries: Sequence[ca.SX]) -> ca.SX:
 
 def _incidence(expression: ca.SX, symbols: ca.SX) -> Incidence:
     """(rows, symbols) True where a row depends on a symbol."""
-    return np.asarray(ca.DM(ca.jacobian_sparsity(expression, symbols), 1).full() != 0).reshape(
-        expression.numel(), symbols.numel()
-    )
+    incidence = np.zeros((expression.numel(), symbols.numel()), bool)
+    incidence[tuple(ca.jacobian_sparsity(expression, symbols).get_triplet())] = True
+    return incidence
 
 
 def _singular(model: FlatModel, names: Sequence[str], reason: str) -> InputError:
@@ -150,6 +150,7 @@ class _Solver:
         self.places = [place for _, place in model.equations]
         self.state_rates = {s.name() for s in model.derivatives[: len(model.states)]}
         self.solution: dict[str, ca.SX] = {}
+        self.start = {v.symbol.name(): v.start for v in [*model.states, *model.parameters]}
 
     def equate(self, symbols: ca.SX, expressions: ca.SX) -> None:
         """Add symbol = expression as equations."""
@@ -221,7 +222,7 @@ class _Solver:
         for block_rows, block_columns in blocks:
             self._solve_block(list(block_rows), unknowns[list(block_columns)])
             used += block_rows
-        keep = [i for i in range(self.residuals.numel()) if i not in set(used)]
+        keep = sorted(set(range(self.residuals.numel())) - set(used))
         self.residuals = self.residuals[keep] if keep else ca.SX(0, 1)
         self.places = [self.places[i] for i in keep]
 
@@ -243,12 +244,12 @@ class _Solver:
 
     def _numbers(self, coefficients: ca.SX) -> np.ndarray:
         """Coefficients at the default parameters and the initial state; inputs and time are 0."""
-        known = [*self.model.states, *self.model.parameters]
-        values = {v.symbol.name(): v.start for v in known}
+        if coefficients.is_constant():
+            return np.array(ca.evalf(ca.densify(coefficients)).full())
         resolved = self.resolve(coefficients)
         symbols = ca.symvar(resolved)
         function = ca.Function("coefficients", [_column(symbols)], [ca.densify(resolved)])
-        return np.array(function([values.get(s.name(), 0.0) for s in symbols]).full())
+        return np.array(function([self.start.get(s.name(), 0.0) for s in symbols]).full())
 
 
 def _pattern(incidence: Incidence) -> ca.Sparsity:

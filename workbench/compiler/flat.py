@@ -250,12 +250,12 @@ class _Reader:
             symbols += list(self.arena.symbols[number].flat)
             values += list(np.broadcast_to(default, self.arena.symbols[number].shape).flat)
         substitute = _substitution(bound)
+        every, defaults = ca.vertcat(*symbols), ca.vertcat(*values)
 
         def number_of(expression: ca.SX) -> float:
-            constant = ca.substitute(
-                substitute(expression), ca.vertcat(*symbols), ca.vertcat(*values)
-            )
-            return float(ca.evalf(constant))
+            if expression.is_constant():  # most are, and models have thousands
+                return float(expression)
+            return float(ca.evalf(ca.substitute(substitute(expression), every, defaults)))
 
         return number_of
 
