@@ -21,13 +21,15 @@ from numba.extending import intrinsic
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
 
+_PACKAGE = Path(__file__).parent
+
 
 def _folder() -> Path:
     """Folder of compiled code, one for each state of the sources that hold laws and loops.
 
     numba renews a compiled function when its own file changes, not when one that it calls does.
     """
-    files = sorted(Path(__file__).parent.rglob("*.py"))
+    files = sorted(_PACKAGE.rglob("*.py"))
     sources = (file.read_bytes() for file in files)
     compiled_ones = b"".join(source for source in sources if b"workbench.kernel import" in source)
     state = hashlib.sha256(compiled_ones).hexdigest()[:16]
@@ -38,9 +40,16 @@ _FOLDER = _folder()
 
 
 class _Locator(caching.UserWideCacheLocator):  # type: ignore[misc]
+    """Our own functions are found by what they are, wherever the package lies."""
+
     def __init__(self, function: Any, file: str) -> None:
         super().__init__(function, file)
-        self._cache_path = str(_FOLDER / self.get_suitable_cache_subpath(file))
+        self._own = Path(file).is_relative_to(_PACKAGE)
+        inside = Path(file).parent.relative_to(_PACKAGE) if self._own else None
+        self._cache_path = str(_FOLDER / (inside or self.get_suitable_cache_subpath(file)))
+
+    def get_source_stamp(self) -> Any:
+        return _FOLDER.name if self._own else super().get_source_stamp()
 
 
 class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
@@ -308,6 +317,13 @@ def solve(a):  # type: ignore[no-untyped-def]
                 total -= a[k, i] * a[i, j]
             a[k, j] = total / a[k, k]
     return OK
+
+
+def given(values: Matrix) -> Matrix:
+    """What a compiled loop reads of its caller, of one type, so that it is compiled once."""
+    view = np.ascontiguousarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def checked(status: int, fmu: FMU) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, instance
+from workbench.kernel import checked, given, instance
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout
 from workbench.system import OBSERVER, System
@@ -170,7 +170,8 @@ class Estimator(ABC):
         self.start(u, y)
         settings, memory = self._arguments()
         self._row[:] = np.nan
-        checked(self._law(self._model, settings, memory, 0.0, u, y, self._row), self.fmu)
+        status = self._law(self._model, settings, memory, 0.0, given(u), given(y), self._row)
+        checked(status, self.fmu)
         return self._split(self._row.copy())
 
     def step(self, t: float, u: Vector, y: Vector) -> Estimate:
@@ -178,7 +179,8 @@ class Estimator(ABC):
         settings, memory = self._arguments()
         h, self._t = t - self._t, t
         self._row[:] = np.nan
-        checked(self._law(self._model, settings, memory, h, u, y, self._row), self.fmu)
+        status = self._law(self._model, settings, memory, h, given(u), given(y), self._row)
+        checked(status, self.fmu)
         return self._split(self._row.copy())
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
@@ -212,8 +214,8 @@ class Estimator(ABC):
         """
         rows = np.full((steps.size, self._row.size), np.nan)
         settings, memory = self._arguments()
-        inputs, outputs = np.ascontiguousarray(u), np.ascontiguousarray(y)
-        checked(self._loop(self._model, settings, memory, steps, inputs, outputs, rows), self.fmu)
+        status = self._loop(self._model, settings, memory, steps, given(u), given(y), rows)
+        checked(status, self.fmu)
         return self._split(rows)
 
     def _split(self, rows: Any) -> Estimate:
