@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -61,6 +62,18 @@ def minimal(minimal_path: Path) -> Iterator[FMU]:
 @pytest.fixture(scope="session")
 def dry_case(system: System) -> Case:
     return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Programs that a test starts hear Ctrl-C, also where the suite itself does not.
+
+    A shell without job control has what it starts in the background ignore it, and that is handed
+    on to every program started from there.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 # --- tuning ---
