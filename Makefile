@@ -5,7 +5,16 @@ RUN := $(VENV)/bin/python
 # Modelica compiler of `make fmus`: workbench, or omc (OpenModelica, writes to build/omc)
 COMPILER ?= workbench
 
-.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test check clean
+# On all processors; the slowest are listed.
+PYTEST := $(RUN) -m pytest --numprocesses logical --maxprocesses 4 --dist worksteal --durations 10
+# The long tests, and all that their diagnoses are made of; what is left out are layers above, which
+# they cannot import.
+LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/conftest.py \
+	$(patsubst %,':(exclude)workbench/%',commands template report benchmark export)
+LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
+	| xargs -0 sha256sum | sha256sum | cut -c 1-64
+
+.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test test-long test-changed check clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -20,6 +29,8 @@ help:
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
 	@echo "make test       format, lint, types, import layers, FMUs against sources, tests"
+	@echo "make test-long  the tests that 'make test' leaves out: many more diagnoses; before a"
+	@echo "                release, and by .ci/run when what they test has changed"
 	@echo "make clean      remove the environment and results"
 
 $(VENV)/run.stamp: pyproject.toml constraints.txt
@@ -60,7 +71,15 @@ test: $(VENV)/dev.stamp
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
 	$(RUN) -m workbench fmu build --all --check
-	$(RUN) -m pytest --numprocesses logical --maxprocesses 4 --dist worksteal
+	$(PYTEST) -m "not long"
+
+# Which state of all that they test has passed them is recorded, to be committed with it.
+test-long: $(VENV)/dev.stamp
+	$(PYTEST) -m long
+	$(LONG_STATE) > tests/long.sha256
+
+test-changed: test
+	test "$$($(LONG_STATE))" = "$$(cat tests/long.sha256)" || $(MAKE) test-long
 
 fuzz: $(VENV)/dev.stamp
 	$(RUN) -m tests.fuzz --count 100000

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -21,7 +22,7 @@ from workbench.prepare import write_cases
 from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.tuning import Evaluator, Job, Problem, pose, tunable
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, write_recording
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
 pytest.register_assert_rewrite(
@@ -30,6 +31,7 @@ pytest.register_assert_rewrite(
 
 from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
 from .hostile_fmus import hostile  # noqa: E402
+from .recordings import record  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
@@ -92,6 +94,18 @@ def published_cases(
         return out
 
     return made
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Programs that a test starts hear Ctrl-C, also where the suite itself does not.
+
+    A shell without job control has what it starts in the background ignore it, and that is handed
+    on to every program started from there.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 # --- tuning ---
@@ -170,7 +184,7 @@ def open_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Fmu]:
 
 
 @pytest.fixture(scope="session")
-def stops(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def stops(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three stops of the virtual rig, whose load cells have a wrong zero."""
     folder = tmp_path_factory.mktemp("stops")
     effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
@@ -178,8 +192,7 @@ def stops(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
         usual = SCENARIOS[name]
         conditions = replace(usual.conditions, initial_speed=speed / 3.6)
         short = replace(usual, conditions=conditions)
-        stop = simulate(short, seed, effects, root / "fmus" / "fmi2" / "Reference.fmu")
-        write_recording(stop, effects, 200, folder / name)
+        record(short, seed, effects, folder / name)
     return folder
 
 

@@ -4,9 +4,10 @@ The recordings come from the multibody model on the virtual rig, or from an inde
 never from the model that diagnoses them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,9 @@ from workbench.modelica import read_library
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
-from workbench.wheelset.rig import SCENARIOS, Effects, select, simulate, write_recording
+from workbench.wheelset.rig import SCENARIOS, Effects, select
+
+from .recordings import record
 
 ROOT = Path(__file__).parent.parent
 SYSTEM = load_system("wheelset")
@@ -63,9 +66,17 @@ PLANTED = {
     "time_skew": ("LoggerTimeSkew", "skew", 0.025),
     "roller_radius": ("RollerRadius", "delta", -5e-4),
 }
+# One each of pads, cylinders, contact, losses, sensors and what turns; all of them take minutes.
+SHORT = {"fade", "cylinder_lag", "wheel_load", "roller_losses", "fx_gain", "pole_ring"}
 # Dry stops in which pressure only rises and no wheel slides do not show these.
 HIDDEN = {"caliper_hysteresis", "adhesion_recovery", "wheel_inertia"}
 OUTSIDE = {"friction_step": 0.05, "friction_ripple": 0.02, "drive_beat": 0.03}
+
+
+def mostly_long(names: Iterable[str], short: Collection[str]) -> list[Any]:
+    """Parameters of a test, marked `long` but for the short ones."""
+    marks = {name: () if name in short else (pytest.mark.long,) for name in names}
+    return [pytest.param(name, marks=marked) for name, marked in marks.items()]
 
 
 @pytest.fixture(scope="session")
@@ -90,8 +101,7 @@ def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
 def recorded(folder: Path, effects: Effects, seed: int, names: Sequence[str] = STOPS) -> list[Case]:
     """Stops on the rig, with pads of constant friction but for what is planted."""
     for scenario in select(names):
-        stop = simulate(scenario, seed, effects, ROOT / "fmus" / "fmi2" / "Reference.fmu")
-        write_recording(stop, effects, 200, folder / scenario.name)
+        record(scenario, seed, effects, folder / scenario.name)
     return read_cases([folder], SYSTEM)
 
 
@@ -106,7 +116,7 @@ def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden() -> Non
     assert named | hidden == {effect.name for effect in EFFECTS}
 
 
-@pytest.mark.parametrize("planted", PLANTED)
+@pytest.mark.parametrize("planted", mostly_long(PLANTED, SHORT))
 def test_a_planted_effect_is_named_with_its_size(
     planted: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -140,7 +150,7 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Pat
     assert (again.diagnosis.verdict, again.extension) == ("nothing", None)
 
 
-@pytest.mark.parametrize("planted", sorted(HIDDEN))
+@pytest.mark.parametrize("planted", mostly_long(sorted(HIDDEN), {"adhesion_recovery"}))
 def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     planted: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -183,7 +193,7 @@ def test_fade_is_found_without_a_measured_force(
     assert [cause.effect.name for cause in found.causes] == ["BrakeFade"]
 
 
-@pytest.mark.parametrize("outside", OUTSIDE)
+@pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"friction_ripple", "drive_beat"}))
 def test_a_cause_outside_the_catalogue_is_not_given_a_name(
     outside: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -194,10 +204,10 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        ("fade", "wheel_radius"),
+        pytest.param("fade", "wheel_radius", marks=pytest.mark.long),
         ("speed_friction", "fx_offset"),
-        ("cylinder_lag", "roller_losses"),
-        ("pressure_offset", "cylinder_lag"),
+        pytest.param("cylinder_lag", "roller_losses", marks=pytest.mark.long),
+        pytest.param("pressure_offset", "cylinder_lag", marks=pytest.mark.long),
     ],
 )
 def test_two_effects_are_found_one_after_the_other(
@@ -211,6 +221,7 @@ def test_two_effects_are_found_one_after_the_other(
         assert any(PLANTED[planted][0] in group for group in groups)
 
 
+@pytest.mark.long
 def test_two_effects_that_hide_each_other_are_found_in_six_stops(
     tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -244,7 +255,7 @@ SEEN = {
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize("folder", SEEN)
+@pytest.mark.parametrize("folder", mostly_long(SEEN, {"speed_friction", "pole_ring"}))
 def test_an_independent_simulator_is_seen_through(
     folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -334,7 +345,7 @@ WRONG_SENSORS: dict[str, tuple[Callable[[Case], Case], str, str, float]] = {
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize("sensor", WRONG_SENSORS)
+@pytest.mark.parametrize("sensor", mostly_long(WRONG_SENSORS, {"late wheel speed"}))
 def test_a_wrong_sensor_on_an_independent_simulator_is_named(
     sensor: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -359,6 +370,7 @@ def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
     assert diagnosed(drifting).verdict == "unexplained"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
@@ -368,6 +380,7 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
     assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_two_wrong_sensors_are_found_though_either_hides_the_other(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
@@ -382,6 +395,7 @@ def test_two_wrong_sensors_are_found_though_either_hides_the_other(
         assert any(name in group for group in groups)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],

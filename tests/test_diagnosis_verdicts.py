@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from .diagnosis_pages import EFFECTS, STOPS, TWINS, diagnose, section, text
+from .processes import ending
 
 
 @pytest.fixture(scope="session")
@@ -29,13 +30,15 @@ def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory)
     return lxml.html.fromstring((out / "index.html").read_bytes())
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_path: Path) -> None:
     """Ctrl-C while a second cause is sought."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
     command = [sys.executable, "-m", "workbench", *arguments]
     searches = 0
-    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as run:
+    search = subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True)
+    with ending(search) as run:
         assert run.stdout is not None
         for line in run.stdout:
             searches += "signatures" in line

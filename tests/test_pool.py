@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_info
 from workbench.errors import InputError, WorkerError
 from workbench.pool import Pool
 
-from .processes import comes_true, living
+from .processes import comes_true, ending, living
 
 ROOT = Path(__file__).parents[1]
 
@@ -219,7 +219,7 @@ def _started(program: str, folder: Path) -> "subprocess.Popen[str]":
 
 
 def test_a_script_needs_no_guard(tmp_path: Path) -> None:
-    with _started(PLAIN, tmp_path) as program:
+    with ending(_started(PLAIN, tmp_path)) as program:
         out, errors = program.communicate(timeout=120)
     assert out == "program\n[3.0, 9.0]\n"
     assert errors == ""
@@ -241,8 +241,9 @@ def test_a_program_from_the_prompt_needs_no_guard(tmp_path: Path) -> None:
     assert (run.stdout, run.stderr) == ("program\n[3.0, 9.0]\n", "")
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
-    with _started(WAITING, tmp_path) as program:
+    with ending(_started(WAITING, tmp_path)) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "under way\n"
         os.killpg(program.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
@@ -252,7 +253,7 @@ def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
 
 
 def test_workers_end_with_a_program_that_is_killed(tmp_path: Path) -> None:
-    with _started(WAITING, tmp_path) as program:
+    with ending(_started(WAITING, tmp_path)) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "under way\n"
         assert len(living(program.pid)) > 2

@@ -28,6 +28,8 @@ from workbench.wheelset.rig import (
     simulate,
 )
 
+from .processes import ending
+
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1
@@ -300,6 +302,7 @@ def test_a_measured_recording_is_never_overwritten(tmp_path: Path) -> None:
         check_files([folder], 200)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "workbench", "rig", "--workers", "1", "--out", str(tmp_path)]
     process = subprocess.Popen(
@@ -310,10 +313,11 @@ def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     )
-    assert process.stdout is not None
-    first = process.stdout.readline()
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
-    rest, errors = process.communicate(timeout=30)
+    with ending(process):
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
+        rest, errors = process.communicate(timeout=30)
     assert first.startswith("[  1/14]")
     assert process.returncode == 130
     assert "Traceback" not in errors

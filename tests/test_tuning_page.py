@@ -23,6 +23,8 @@ from workbench.report.tuning import write_tuning_page
 from workbench.system import System
 from workbench.systems import load_system, open_model
 
+from .processes import ending
+
 HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
 CASES = {"03_dry_120_3.6": "03_dry_120_3.6", HOSTILE: "08_wet_120_3.6"}  # and where it is from
 SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
@@ -389,11 +391,13 @@ def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], result
 # --- bad news ---
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupted_run_says_so_and_claims_no_sensitivity(
     root: Path, folder: Path, tmp_path: Path
 ) -> None:
     arguments = [sys.executable, "-m", "workbench", *command(folder, tmp_path, "--budget", "9999")]
-    with subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL) as run:
+    search = subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL, text=True)
+    with ending(search) as run:
         deadline = time.monotonic() + 60.0
         while not (tmp_path / "checkpoint.json").exists() and time.monotonic() < deadline:
             time.sleep(0.005)

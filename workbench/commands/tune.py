@@ -238,13 +238,18 @@ def _check(options: argparse.Namespace, cases: Sequence[Case]) -> None:
 
 @contextmanager
 def _one_interruption() -> Iterator[None]:
-    """Let the first Ctrl-C stop the search, and none after it the writing of its result."""
+    """Let the first Ctrl-C stop the search, and none after it the writing of its result.
+
+    What was started in the background to ignore Ctrl-C goes on ignoring it.
+    """
 
     def interrupt(number: int, frame: object) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
     try:
         yield
     finally:
