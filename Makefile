@@ -14,7 +14,7 @@ LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/c
 LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
 	| xargs -0 sha256sum | sha256sum | cut -c 1-64
 
-.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test test-long test-changed check clean
+.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test test-long test-changed clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
