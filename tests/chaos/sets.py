@@ -7,6 +7,7 @@ from pathlib import Path
 from workbench import resources
 from workbench.power import Planting, diagnose_sets
 from workbench.power.diagnosing import library_effects
+from workbench.supervision import supervised
 from workbench.systems import load_system
 from workbench.wheelset.planting import PlantedStops
 from workbench.wheelset.rig import SCENARIOS, Scenario
@@ -43,4 +44,4 @@ def main(out: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(supervised(lambda: main(Path(sys.argv[1]))))  # as every command is

@@ -47,7 +47,7 @@ def _tell(report: Report, name: str, seconds: float) -> None:
     print(f"{name}: {counts.total()} in {seconds:.0f} s: {told}", flush=True)
     seen: set[str] = set()
     for failure in report.failures:
-        if (kind := failure.said[:60]) not in seen:
+        if (kind := failure.said.split(":")[0][:60]) not in seen:
             seen.add(kind)
             print(f"  {failure}", flush=True)
 

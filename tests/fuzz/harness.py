@@ -19,6 +19,8 @@ from random import Random
 from types import FrameType
 from typing import Any
 
+import pytest
+
 from tests.fuzz.mutations import Files, change_one
 from workbench.errors import FMUError, InputError
 
@@ -92,7 +94,7 @@ def fuzz(target: Target, seed: int, numbers: range, keep: Path | None = None) ->
     keep : folder in which those that fail are kept.
     """
     report = Report({target.name: Counter()})
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as scratch, _temporary(Path(scratch) / "tmp"):
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as scratch, _apart(Path(scratch)):
         for number in numbers:
             folder = Path(scratch) / "mutant"
             mutant, mutation = target.change(target.original, generator(target.name, seed, number))
@@ -143,14 +145,13 @@ def _outcome(target: Target, folder: Path, scratch: Path) -> tuple[str, str]:
 
 
 @contextmanager
-def _temporary(folder: Path) -> Iterator[None]:
-    """A temporary folder of its own, in which to see what stays."""
-    folder.mkdir()
-    before, tempfile.tempdir = tempfile.tempdir, str(folder)
-    try:
+def _apart(folder: Path) -> Iterator[None]:
+    """A temporary folder of its own, in which to see what stays, and a cache beside it."""
+    (folder / "tmp").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(folder / "tmp"))
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
         yield
-    finally:
-        tempfile.tempdir = before
 
 
 @contextmanager

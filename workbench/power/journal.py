@@ -100,8 +100,8 @@ def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire)
 class Journal:
     """A file of verdicts: a line that says what they depend on, then one line for each set.
 
-    Each has a checksum; a line that is damaged is left out, so that its set is diagnosed again. The
-    file that an earlier run left is kept beside it.
+    Each has a checksum; a line that is damaged is left out, so that its set is diagnosed again, and
+    so is a second one on a set. The file that an earlier run left is kept beside it.
 
     Parameters
     ----------
@@ -159,7 +159,10 @@ class Journal:
             )
         for number, line in enumerate(lines, start=2):
             try:
-                self.results.append(_result(unsealed(line)))
+                result = _result(unsealed(line))
+                if any(one.planting == result.planting for one in self.results):
+                    raise ValueError("a second verdict on a set")
+                self.results.append(result)
             except (ValueError, KeyError, TypeError, RecursionError):
                 self.damaged.append(number)
 
