@@ -244,5 +244,5 @@ def test_an_fmu_that_does_not_answer_is_neither_fit_nor_unfit(
     monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
     file = tmp_path / "fitness.json"
     assert main(["fmu", "check", str(hostile_path), "--json", str(file)]) == 3
-    assert "evil.fmu (MinimalObserver): not measured" in capsys.readouterr().out
+    assert "evil.fmu (WheelsetRig.MinimalObserver): not measured" in capsys.readouterr().out
     assert json.loads(file.read_text())["fit"] is None

@@ -35,6 +35,20 @@ def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -
     assert [file.name for file in cache.iterdir()] == ["name.fmu"]
 
 
+@pytest.mark.parametrize("content", [b"", b"an FM", b"AN FMU"])
+def test_what_was_damaged_is_built_again(cache: Path, tmp_path: Path, content: bytes) -> None:
+    def make(path: Path) -> None:
+        path.write_bytes(b"an FMU")
+
+    shelf.fetch("name", tmp_path / "one.fmu", make)
+    (cache / "name.fmu").write_bytes(content)
+    shelf.fetch("name", tmp_path / "two.fmu", make)
+    assert (tmp_path / "two.fmu").read_bytes() == b"an FMU"
+    assert shelf.keep("name", make).read_bytes() == b"an FMU"
+    (cache / "name.fmu").write_bytes(content)
+    assert shelf.keep("name", make).read_bytes() == b"an FMU"
+
+
 def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
     package = library / "package.mo"
     before = shelf.key(package, "Model", "model Model end Model;")

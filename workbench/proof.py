@@ -47,8 +47,8 @@ class Limits:
     file : the largest file that is written [bytes].
     """
 
-    processor: float = 5.0
-    answer: float = 12.0
+    processor: float = 3.0
+    answer: float = 10.0
     memory: int = 2 << 30
     file: int = 100 << 20
 

@@ -21,18 +21,26 @@ except ImportError:  # Windows: folders go with their users, but not after a kil
     fcntl = None  # type: ignore[assignment]
 
 _PREFIX = "workbench-"
+# Longer paths leave no room for sockets of processes that start others, PLACE/workbench-12345678/
+# pymp-12345678/listener-12345678, which the system limits to 104 bytes.
+_LONGEST = 104 - 52
+_SHORT = "/tmp"
 
 
 class Scratch:
     """A temporary folder, removed by `close`, at the end of a `with`, or with the process.
+
+    Parameters
+    ----------
+    place : folder that it is made in; the usual one unless another is given.
 
     Attributes
     ----------
     path : of the folder.
     """
 
-    def __init__(self) -> None:
-        place = tempfile.gettempdir()
+    def __init__(self, place: str | None = None) -> None:
+        place = place or tempfile.gettempdir()
         sweep(place)
         lock = None
         while lock is None:
@@ -70,7 +78,8 @@ def scratch_folder() -> Iterator[str]:
 def own_temporary_files() -> Iterator[Path]:
     """Have all temporary files of this process and its children in a folder of ours."""
     before = tempfile.tempdir, os.environ.get("TMPDIR")
-    with Scratch() as scratch:
+    place = tempfile.gettempdir()
+    with Scratch(_SHORT if len(place) > _LONGEST and os.path.isdir(_SHORT) else place) as scratch:
         tempfile.tempdir = os.environ["TMPDIR"] = str(scratch.path)
         try:
             yield scratch.path

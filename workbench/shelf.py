@@ -31,9 +31,10 @@ _MOST = 128  # files, of 0.1 to 0.5 MB: the claims of all libraries, and some mo
 
 def cache_folder() -> Path:
     """Folder of what is kept between runs and can be made anew; it may be out of reach."""
-    folder = Path(platformdirs.user_cache_dir("wheelset-workbench"))
-    # Without a home it is a relative one, which nobody would find again.
-    return folder if folder.is_absolute() else Path(os.devnull) / folder
+    try:
+        return Path(platformdirs.user_cache_dir("wheelset-workbench"))
+    except RuntimeError:  # a user without a home, as in some containers: nothing is kept
+        return Path(os.devnull) / "cache"
 
 
 def folder() -> Path:

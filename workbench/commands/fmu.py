@@ -107,7 +107,7 @@ def _add_check(jobs: Commands) -> None:
         "--limit",
         type=above_zero,
         metavar="SECONDS",
-        help="processor time that a call of the FMU may take (default: 5)",
+        help="processor time that a call of the FMU may take (default: 3)",
     )
     add_isolated(checking)
     checking.set_defaults(run=_check)

@@ -1,0 +1,258 @@
+"""An archive that is damaged, or made to harm, is refused in words before anything is unpacked."""
+
+import re
+import shutil
+import stat
+import struct
+import tempfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from workbench.__main__ import main
+from workbench.archive import unpack
+from workbench.errors import FMUError, InputError
+from workbench.fmu import FMU
+
+from .hostile_fmus import ROOT, rewritten
+
+OWN = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
+XML = "modelDescription.xml"
+LIBRARY = "binaries/linux64/MinimalObserver.so"
+
+
+@pytest.fixture(autouse=True)
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of temporary files of its own."""
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+# --- entries ---
+
+
+def with_entry(path: Path, entry: zipfile.ZipInfo, content: bytes = b"x") -> Path:
+    """Copy of an FMU with one more entry."""
+    shutil.copy(OWN, path)
+    with zipfile.ZipFile(path, "a") as archive:
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        archive.writestr(entry, content)
+    return path
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../outside",
+        "resources/../../outside",
+        "/etc/outside",
+        "C:/outside",
+        "resources\\outside",
+        "resources/./here",
+        "resources//here",
+        "resources/new\nline",
+        "resources/zero\0byte",
+    ],
+)
+def test_a_name_that_leads_elsewhere_is_refused(name: str, tmp_path: Path) -> None:
+    path = with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo("0" * len(name)))
+    raw = path.read_bytes().replace(b"0" * len(name), name.encode())  # zipfile would mend it
+    path.write_bytes(raw)
+    with pytest.raises(InputError, match=r"an archive with the name '.*names inside the FMU"):
+        FMU(path)
+    assert not (tmp_path / "outside").exists()
+
+
+@pytest.mark.parametrize("kind", [stat.S_IFLNK, stat.S_IFIFO, stat.S_IFCHR])
+def test_a_link_or_device_is_refused(kind: int, tmp_path: Path) -> None:
+    entry = zipfile.ZipInfo("resources/link")
+    entry.external_attr = (kind | 0o777) << 16
+    with pytest.raises(InputError, match="'resources/link', which is a link or a device"):
+        FMU(with_entry(tmp_path / "evil.fmu", entry, b"/etc/passwd"))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize("name", [LIBRARY, XML])
+def test_a_name_that_stands_twice_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"the name '{re.escape(name)}' twice"):
+        FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(name)))
+
+
+def test_a_file_that_is_a_folder_too_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="as a file and as a folder"):
+        FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(f"{XML}/inside")))
+
+
+def test_an_archive_that_unpacks_to_much_more_is_refused_at_once(
+    tmp_path: Path, places: Path
+) -> None:
+    path = tmp_path / "bomb.fmu"
+    with_entry(path, zipfile.ZipInfo("resources/zeros"), bytes(64 << 20))
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(InputError, match=r"which unpacks to \d+ times its size"):
+        FMU(path)
+    assert list(places.iterdir()) == []
+
+
+def test_a_size_that_is_not_the_true_one_is_refused(tmp_path: Path, places: Path) -> None:
+    """Where the list of contents says less than is there, no more is unpacked than it says."""
+    path = with_entry(tmp_path / "liar.fmu", zipfile.ZipInfo("resources/zeros"), bytes(1 << 20))
+    size = struct.pack("<I", 1 << 20)
+    path.write_bytes(path.read_bytes().replace(size, struct.pack("<I", 100)))
+    with pytest.raises(InputError, match=r"no FMU \(Bad CRC-32"):
+        FMU(path)
+    assert list(places.iterdir()) == []
+
+
+def test_many_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "many.fmu"
+    shutil.copy(OWN, path)
+    with zipfile.ZipFile(path, "a") as archive:
+        for number in range(10_001):
+            archive.writestr(f"resources/{number}", b"")
+    with pytest.raises(InputError, match="10018 files; expected 10000 at most"):
+        FMU(path)
+
+
+def test_only_what_runs_here_is_unpacked(tmp_path: Path) -> None:
+    path = with_entry(tmp_path / "own.fmu", zipfile.ZipInfo("resources/table.txt"))
+    unpack(path, tmp_path / "in", "binaries/linux64")
+    files = {p.relative_to(tmp_path / "in").as_posix() for p in (tmp_path / "in").rglob("*.*")}
+    assert files == {XML, LIBRARY, "resources/table.txt"}
+
+
+# --- content ---
+
+
+def cut(name: str) -> Callable[[Path], None]:
+    return lambda folder: (folder / name).unlink()
+
+
+def emptied(name: str) -> Callable[[Path], None]:
+    return lambda folder: (folder / name).write_bytes(b"")
+
+
+def halved(folder: Path) -> None:
+    whole = (folder / LIBRARY).read_bytes()
+    (folder / LIBRARY).write_bytes(whole[: len(whole) // 2])
+
+
+def another(folder: Path) -> None:
+    """A library of this machine that is none of FMI."""
+    shutil.copy(next(Path("/lib").glob("*/libm.so.6"), "/lib64/libm.so.6"), folder / LIBRARY)
+
+
+def foreign(folder: Path) -> None:
+    shutil.rmtree(folder / "binaries" / "linux64")
+
+
+def foreign_inside(folder: Path) -> None:
+    shutil.copy(folder / "binaries" / "win64" / "MinimalObserver.dll", folder / LIBRARY)
+
+
+def edited(old: str, new: str) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        text = (folder / XML).read_text()
+        assert old in text
+        (folder / XML).write_text(text.replace(old, new, 1))
+
+    return change
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "no description": (cut(XML), "it holds no modelDescription.xml"),
+    "no XML": (emptied(XML), "no FMU"),
+    "document type": (edited("<fmiModel", "<!DOCTYPE a><fmiModel"), "declares a document type"),
+    "foreign platform": (foreign, r"binaries for .*expected a binary for this machine"),
+    "foreign binary": (foreign_inside, "a binary that cannot be loaded"),
+    "no binary": (cut(LIBRARY), "binaries for |no file binaries/linux64"),
+    "empty binary": (emptied(LIBRARY), "an empty file binaries/linux64"),
+    "half a binary": (halved, "a binary that cannot be loaded|crashed with SIG"),
+    "another library": (another, "a binary that cannot be loaded|a binary without the function"),
+    "identifier elsewhere": (
+        edited('modelIdentifier="', 'modelIdentifier="../../../'),
+        r"the modelIdentifier '\.\./",
+    ),
+    "no identifier": (edited('modelIdentifier="MinimalObserver"', ""), "the modelIdentifier ''"),
+    "no GUID": (edited('guid="', 'was="'), "no guid"),
+    "wrong GUID": (edited('guid="{', 'guid="{0'), "instantiat"),
+    "text for a number": (edited('start="0.0"', 'start="many"'), r"start value of '\w+' = 'many'"),
+    "NaN": (edited('start="0.0"', 'start="nan"'), r"start value of '\w+' = 'nan'"),
+    "endless start": (edited('start="0.0"', 'start="1e999"'), r"start value of '\w+' = '1e999'"),
+    "reference below zero": (edited('valueReference="1"', 'valueReference="-1"'), "reference -1"),
+    "reference too large": (
+        edited('valueReference="1"', 'valueReference="4294967296"'),
+        "reference 4294967296",
+    ),
+    "reference of 5000 digits": (
+        edited('valueReference="1"', f'valueReference="{"9" * 5000}"'),
+        "no FMU",
+    ),
+    "index of nothing": (edited('derivative="', 'derivative="0'), "derivative = '0"),
+    "index too large": (edited('derivative="', 'derivative="99'), "no FMU"),
+    "name twice": (edited('name="tauR"', 'name="pB"'), "two variables 'pB'"),
+    "no name": (edited('name="tauR"', 'name=""'), "a variable without a name"),
+}
+
+
+@pytest.mark.skipif(not Path("/lib").is_dir(), reason="damages binaries of Linux")
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_fmu_is_refused_in_words(damage: str, tmp_path: Path, places: Path) -> None:
+    change, message = DAMAGES[damage]
+    path = rewritten(OWN, tmp_path / "damaged.fmu", change)
+    before = Path.cwd()
+    with pytest.raises((InputError, FMUError), match=message) as refused:
+        FMU(path)
+    assert len(str(refused.value)) < 1000
+    assert list(places.iterdir()) == []
+    assert Path.cwd() == before
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_refused(share: float, tmp_path: Path) -> None:
+    whole = OWN.read_bytes()
+    path = tmp_path / "half.fmu"
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(InputError, match="no FMU"):
+        FMU(path)
+
+
+def test_a_damaged_byte_is_refused(tmp_path: Path, places: Path) -> None:
+    with zipfile.ZipFile(OWN) as archive:
+        begin = archive.getinfo(LIBRARY).header_offset
+    whole = bytearray(OWN.read_bytes())
+    whole[begin + 5000] ^= 0xFF
+    path = tmp_path / "damaged.fmu"
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match=r"no FMU \((Bad CRC-32|Error -3)"):
+        FMU(path)
+    assert list(places.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["fmu", "check"],
+        ["simulate", str(ROOT / "cases" / "01_dry_80_1.5"), "--out", "out", "--fmu"],
+        ["observability", str(ROOT / "cases" / "01_dry_80_1.5"), "--out", "out", "--fmu"],
+        ["diagnose", str(ROOT / "cases"), "--out", "out", "--model"],
+    ],
+)
+@pytest.mark.parametrize("damage", ["foreign binary", "text for a number"])
+def test_every_command_refuses_it_in_words(
+    damage: str,
+    command: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = rewritten(OWN, tmp_path / "damaged.fmu", DAMAGES[damage][0])
+    assert main([*command, str(path)]) == 2
+    error = capsys.readouterr().err
+    assert re.search(DAMAGES[damage][1], error)
+    assert len(error.splitlines()) == 1

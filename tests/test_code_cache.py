@@ -1,0 +1,118 @@
+"""Compiled code is kept whole or made again, whatever happened to the folder it is kept in."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+PROGRAM = """
+import numpy as np
+from workbench import kernel
+a = np.array([[2.0, 0.0, 2.0], [0.0, 4.0, 2.0]])
+assert kernel.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
+print(sum(kernel.solve.stats.cache_hits.values()), "kept")
+"""
+
+
+@pytest.fixture
+def home() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="w-") as folder:
+        yield Path(folder)
+
+
+def started(home: str | Path | None, **more: str) -> "subprocess.Popen[str]":
+    """A program that solves by compiled code."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
+    if home is not None:
+        environment["HOME"] = str(home)
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM],
+        env={**environment, "PYTHONPATH": str(ROOT), **more},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd="/",
+    )
+
+
+def solved(home: str | Path | None, **more: str) -> str:
+    with started(home, **more) as process:
+        out, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors) == (0, "")
+    return out.strip()
+
+
+def files(home: Path) -> list[Path]:
+    return sorted(home.rglob("kernel.solve*.code"))
+
+
+def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
+    assert solved(home) == "0 kept"
+    assert solved(home) == "1 kept"
+    (file,) = files(home)
+    whole = file.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 1
+    for damaged in (whole[:-100], whole[: len(whole) // 2], b"", bytes(flipped), b"x" * 1000):
+        file.write_bytes(damaged)
+        assert solved(home) == "0 kept"
+        assert file.read_bytes() != damaged
+    assert solved(home) == "1 kept"
+
+
+def test_two_processes_at_the_first_compile_leave_whole_code(home: Path) -> None:
+    both = [started(home) for _ in range(2)]
+    for process in both:
+        with process:
+            assert process.communicate(timeout=120) == ("0 kept\n", "")
+    assert solved(home) == "1 kept"
+    assert [file.suffix for file in home.rglob("*") if file.is_file()] == [".code"] * len(
+        [file for file in home.rglob("*") if file.is_file()]
+    )
+
+
+@pytest.mark.parametrize("home", ["/dev/null", "/proc", "", None])
+def test_without_a_place_to_keep_it_code_is_compiled_in_each_process(home: str | None) -> None:
+    """A file, a folder that nothing can be made in, none at all."""
+    cache = {"XDG_CACHE_HOME": "/dev/null/cache"} if not home else {}
+    assert solved(home, **cache) == "0 kept"
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="takes another user's part")
+def test_a_user_without_a_home_keeps_nothing() -> None:
+    program = (
+        "import os, platformdirs, workbench.shelf\n"
+        "os.setuid(54321)\n"  # of nobody
+        "print(workbench.shelf.is_known('name'), workbench.shelf.cache_folder().is_dir())"
+    )
+    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**environment, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd="/",
+    )
+    assert (run.stdout, run.stderr) == ("False False\n", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="confines itself to reading by Landlock")
+def test_a_folder_that_can_only_be_read_is_used(home: Path) -> None:
+    assert solved(home) == "0 kept"
+    confined = f"from workbench.confinement import confine; confine([]); exec({PROGRAM!r})"
+    run = subprocess.run(
+        [sys.executable, "-c", confined],
+        env={**os.environ, "HOME": str(home), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd="/",
+    )
+    assert (run.stdout, run.stderr) == ("1 kept\n", "")

@@ -1,0 +1,222 @@
+"""Whatever ends a command, it is said, and nothing is left: no file, no process."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from workbench import scratch
+from workbench.fmu import FMU
+from workbench.scratch import Scratch
+
+from .hostile_fmus import ROOT, needs_compiler, running, workbench
+from .processes import comes_true, living
+
+CASE = ROOT / "cases" / "01_dry_80_1.5"
+linux_only = pytest.mark.skipif(sys.platform != "linux", reason="Landlock and seccomp are Linux's")
+
+
+@pytest.fixture
+def home() -> Iterator[Path]:
+    """A folder with a short name, in which there is room for the names of sockets."""
+    with tempfile.TemporaryDirectory(prefix="w-", dir="/tmp") as folder:
+        yield Path(folder)
+
+
+def left(folder: Path) -> list[Path]:
+    return list((folder / "tmp").iterdir())
+
+
+# --- models that end the command ---
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", CASE, "--out", "out", "--fmu"),
+        ("observability", CASE, "--out", "out", "--fmu"),
+        ("diagnose", ROOT / "cases", "--out", "out", "--model"),
+    ],
+)
+def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
+    command: tuple[str, ...], hostile_path: Path, home: Path
+) -> None:
+    run = workbench(home, *command, hostile_path, HOSTILE="exit fmi2GetReal 2")
+    assert run.returncode == 1
+    assert "evil.fmu: ended the process with exit status 0 in fmi2GetReal" in run.stderr
+    assert len(run.stderr.splitlines()) <= 10
+    assert left(home) == []
+
+
+@needs_compiler
+@pytest.mark.parametrize(("attack", "how"), [("exit", "status 0"), ("crash", "SIGSEGV")])
+def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
+    attack: str, how: str, hostile_path: Path, home: Path
+) -> None:
+    # Long after the trial, whose calls of this function are few.
+    plan = f"{attack} fmi2SetReal 1000"
+    command = ("simulate", CASE, "--workers", "1", "--out", "out", "--fmu", hostile_path)
+    run = workbench(home, *command, HOSTILE=plan)
+    assert run.returncode == 1
+    assert how in run.stderr
+    assert "before it was done" in run.stderr
+    assert left(home) == []
+
+
+# --- signals ---
+
+
+def waiting(folder: Path, hostile_path: Path) -> "subprocess.Popen[str]":
+    """A check that waits for a model, in the middle of its work."""
+    command = running(folder, "fmu", "check", hostile_path, HOSTILE="wait fmi2Instantiate 10")
+    assert command.stdout is not None
+    while "serialised" not in (line := command.stdout.readline()):
+        assert line, command.communicate()
+    assert comes_true(lambda: len(left(folder)) > 0)
+    return command
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)]
+)
+def test_a_command_that_is_asked_to_end_leaves_nothing(
+    number: int, status: int, hostile_path: Path, home: Path
+) -> None:
+    with waiting(home, hostile_path) as command:
+        command.send_signal(number)
+        command.communicate(timeout=60)
+    assert command.returncode == status
+    assert left(home) == []
+    assert comes_true(lambda: not living(command.pid))
+
+
+@needs_compiler
+def test_what_a_killed_command_left_is_removed_by_the_next(hostile_path: Path, home: Path) -> None:
+    with waiting(home, hostile_path) as command:
+        command.kill()
+    assert comes_true(lambda: not living(command.pid))
+    assert left(home) != []
+    assert workbench(home, "fmu", "info", hostile_path).returncode == 0
+    assert left(home) == []
+
+
+def test_a_command_whose_worker_is_killed_leaves_nothing(home: Path) -> None:
+    cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
+    command = ("simulate", *cases, "--estimator", "open_loop", "--out", "out", "--workers", "2")
+    with running(home, *command) as process:
+        # The two of the command, the server of workers, and at least one of these.
+        assert comes_true(lambda: len(living(process.pid)) > 3)
+        os.kill(max(living(process.pid)), signal.SIGKILL)
+        process.communicate(timeout=120)
+    assert left(home) == []
+    assert comes_true(lambda: not living(process.pid))
+
+
+# --- folders ---
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    scratch.sweep.cache_clear()
+    return tmp_path
+
+
+def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
+    held, linked, other = place / "workbench-held", place / "workbench-link", place / "else"
+    held.mkdir()
+    other.mkdir()
+    linked.symlink_to(other)
+    (other / "file").touch()
+    lock = os.open(held, os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    Scratch().close()
+    assert held.exists()
+    assert (other / "file").exists()
+    os.close(lock)
+    scratch.sweep.cache_clear()
+    Scratch().close()
+    assert not held.exists()
+    assert linked.is_symlink()
+
+
+def test_folders_of_living_processes_stay(place: Path) -> None:
+    with Scratch() as mine:
+        scratch.sweep.cache_clear()
+        with Scratch() as second:
+            assert mine.path.exists()
+            assert second.path != mine.path
+    assert list(place.iterdir()) == []
+
+
+def test_an_fmu_that_is_refused_or_forgotten_leaves_no_folder(
+    place: Path, minimal_path: Path
+) -> None:
+    fmu = FMU(minimal_path)
+    assert len(list(place.iterdir())) == 1
+    del fmu
+    assert list(place.iterdir()) == []
+
+
+# --- confinement ---
+
+
+@needs_compiler
+@linux_only
+def test_an_isolated_model_can_neither_write_elsewhere_nor_reach_a_network(
+    hostile_path: Path, home: Path
+) -> None:
+    place = home / "elsewhere"
+    command = ("fmu", "check", hostile_path, "--instantiations", "5", "--json", "out/fit.json")
+    plan = {"HOSTILE": "touch fmi2Reset 3", "PLACE": str(place)}
+    free = workbench(home, *command, **plan)
+    assert "file open, network open" in free.stderr
+    place.unlink()
+    confined = workbench(home, *command, "--isolated", **plan)
+    assert "file refused, network refused" in confined.stderr
+    assert f"isolated: writing only below {home / 'tmp'}" in confined.stderr
+    assert "; no network" in confined.stderr
+    assert (free.returncode, confined.returncode) == (0, 0)
+    assert not place.exists()
+    assert (home / "out" / "fit.json").exists()
+    assert left(home) == []
+
+
+@linux_only
+def test_an_isolated_command_does_its_work(home: Path) -> None:
+    """With workers, figures and all."""
+    command = ("simulate", CASE, "--estimator", "open_loop", "--workers", "2", "--isolated")
+    run = workbench(home, *command, "--out", "out")
+    assert run.returncode == 0, run.stderr
+    assert (home / "out" / "index.html").exists()
+    assert left(home) == []
+
+
+@linux_only
+def test_a_program_that_asks_for_isolation_stays_free_itself(home: Path) -> None:
+    program = (
+        "from workbench.__main__ import main\n"
+        f"status = main(['fmu', 'check', {str(ROOT / 'fmus' / 'fmi2' / 'MinimalObserver.fmu')!r},"
+        "'--instantiations', '2', '--isolated'])\n"
+        "open('mine', 'w').close()\n"
+        "raise SystemExit(status)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert (home / "mine").exists()
