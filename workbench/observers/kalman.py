@@ -164,15 +164,17 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
 
 @compiled
 def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
-    """Correct mean and covariance by a sample, one output after the other; a status.
+    """Correct mean and covariance by a sample, one output after the other.
 
     The noise of outputs is independent, so that their order does not matter and no matrix is
     inverted. The innovations are those of one linearisation.
     Source: D. Simon, Optimal State Estimation, Wiley 2006, section 6.1.
+
+    Returns the logarithm of the determinant of the innovations' covariance.
     """
     z, P, layout, v = memory.z, memory.P, settings.layout, memory.column
     size, n = z.size, model.x.size
-    fade = fading(layout, y)
+    fade, volume = fading(layout, y), 0.0
     row[row.size - 1] = 0.0
     for i in range(size):
         memory.change[i] = 0.0
@@ -195,6 +197,7 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                 innovation -= model.jacobian[i, n - 1 - at] * memory.change[i]
         noise = variance(settings, fade, y, j)
         total += noise
+        volume += np.log(total)
         inverse = 1.0 / total
         row[row.size - 1] += innovation * innovation * inverse
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
@@ -206,16 +209,13 @@ def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                 P[k, i] = P[i, k]
     for i in range(size):
         z[i] += memory.change[i]
+    return volume
 
 
 @compiled
-def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
-    """Predict by the linearised model, correct by the sample."""
-    layout = settings.layout
-    if h == 0.0:
-        status = begin(model, settings, memory, u, y)
-        return status or finish(model, settings, memory, row)
-    P, size = memory.P, memory.z.size
+def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+    """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
+    layout, P, size = settings.layout, memory.P, memory.z.size
     status = measure(model, u) or predict(model, settings, memory, memory.z, h)
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
@@ -225,6 +225,16 @@ def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-d
     if layout.columns > model.x.size:
         status = status or put(model, memory.z) or read(model)
         status = status or linearise(model, layout.columns)
+    return status
+
+
+@compiled
+def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Predict by the linearised model, correct by the sample."""
+    if h == 0.0:
+        status = begin(model, settings, memory, u, y)
+        return status or finish(model, settings, memory, row)
+    status = forecast(model, settings, memory, h, u, y)
     if status:
         return status
     update(model, settings, memory, y, row)
