@@ -269,6 +269,7 @@ class Condition:
     choices : words or whole numbers that it may be.
     count : of entries, where it is a list; 0: no list.
     parameters : of the model by choice, which it sets.
+    lasts : mean time until another choice takes its place, under way; infinite: never [s].
     sign : whether it is the sign of the recording's signals.
     label : for people.
     agrees : what the recording says of it, or None.
@@ -282,6 +283,7 @@ class Condition:
     choices: tuple[str | int, ...]
     count: int
     parameters: Mapping[str, Mapping[str, float]]
+    lasts: float
     sign: bool
     agrees: Agreement | None
 

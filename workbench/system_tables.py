@@ -175,7 +175,9 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("label unit least above choices count parameters sign agrees")
+        own.refuse_unknown(
+            "label unit least above choices count parameters lasts sign agrees"
+        )
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -203,6 +205,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                     }
                     for choice in parameters.content
                 },
+                lasts=_positive(own, "lasts"),
                 sign="sign" in own and own.take("sign", bool),
                 agrees=_agreement(own) if "agrees" in own else None,
             )
@@ -260,6 +263,14 @@ def read_sampling(table: Table) -> Sampling:
     if likely > possible:
         raise table.wrong("gaps", "the longest likely time before the longest possible one")
     return Sampling(table.number("slowest", "s", math.inf), likely, possible)
+
+
+def _positive(table: Table, key: str) -> float:
+    """A time [s], infinite where none is given."""
+    time = table.number(key, "s", math.inf)
+    if not time > 0.0:
+        raise table.wrong(key, "a time above 0")
+    return time
 
 
 def read_point(points: Table, name: str, system: System) -> OperatingPoint:
