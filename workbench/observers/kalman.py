@@ -54,7 +54,7 @@ class FilterMemory(NamedTuple):
     z: Vector
     P: Matrix
     system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
-    spread: Matrix  # (n, n + n + q) of the covariance
+    spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
     change: Vector
     column: Vector
 
@@ -86,32 +86,53 @@ def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def propagate(model, memory, h):  # type: ignore[no-untyped-def]
-    """P <- F P F', F = (I - hA)^-1 of states and quantities, after `predict`; returns a status.
+def transition(model, system, h):  # type: ignore[no-untyped-def]
+    """Derivatives of the step that `predict` took, by states and quantities; returns a status.
 
-    Quantities stay, so that only rows of states are solved for, with those of quantities on the
-    right-hand side. Each pass gives (F P)', the other half of a symmetric P being left alone.
+    Parameters
+    ----------
+    system : (n, n + n + q) whose last columns take the rows of states, (I - hA)^-1 [I, hB]; the
+        rows of quantities are those of a unit matrix.
     """
-    P, system = memory.P, memory.spread
-    n, size = model.x.size, memory.z.size
-    for _ in range(2):
-        implicit(model, h, system)
+    n, size = model.x.size, model.jacobian.shape[0]
+    implicit(model, h, system)
+    for i in range(n):
+        for j in range(n):
+            system[i, n + j] = 0.0
+        system[i, n + i] = 1.0
+        for j in range(n, size):
+            system[i, n + j] = h * model.jacobian[j, i]
+    return solve(system)
+
+
+@compiled
+def carry(F, P, work):  # type: ignore[no-untyped-def]
+    """P <- F P F' of states and quantities, (s, s), which stays symmetric; work, (s,).
+
+    Parameters
+    ----------
+    F : (n, s) rows of states, see `transition`.
+    """
+    n, size = F.shape
+    for j in range(size):
         for i in range(n):
-            for j in range(size):
-                total = P[i, j]
-                for k in range(n, size):
-                    total += h * model.jacobian[k, i] * P[k, j]
-                system[i, n + j] = total
-        status = solve(system)
-        if status:
-            return status
+            work[i] = 0.0
+            for k in range(size):
+                work[i] += F[i, k] * P[k, j]
         for i in range(n):
-            for j in range(size):
-                P[j, i] = system[i, n + j]
+            P[i, j] = work[i]
+    for i in range(n):
+        for j in range(i + 1):
+            work[j] = 0.0
+            for k in range(size):
+                work[j] += P[i, k] * F[j, k]
+        for j in range(i + 1):
+            P[i, j] = work[j]
     for i in range(n):
         for j in range(n, size):
-            P[i, j] = P[j, i]
-    return 0
+            P[j, i] = P[i, j]
+        for j in range(i):
+            P[j, i] = P[i, j]
 
 
 @inlined
@@ -221,7 +242,8 @@ def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     fade = fading(layout, y)
     for i in range(size):
         P[i, i] += h * (fade * settings.walk[i]) ** 2
-    status = status or propagate(model, memory, h)
+    status = status or transition(model, memory.spread, h)
+    carry(memory.spread[:, model.x.size :], P, memory.change)
     if layout.columns > model.x.size:
         status = status or put(model, memory.z) or read(model)
         status = status or linearise(model, layout.columns)
