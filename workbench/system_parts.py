@@ -122,7 +122,9 @@ class Estimated:
     low, high : range that estimates are kept in [unit].
     prior : range before a measurement, of which any value is as likely [unit].
     walk : how fast it may move, random walk [unit/sqrt(s)].
+    start : where filters begin, NaN: at its nominal value [unit].
     spread : standard deviation of what is known of it at the start [unit].
+    relative_error : share of it by which the model lets an estimate be wrong [1].
     memory : time in which a deviation is forgotten [s].
     useful : standard deviation from which on an estimate serves [unit].
     acts_on : state whose rate shows its effect, or output that shows it at once; a correction is in
@@ -139,7 +141,9 @@ class Estimated:
     high: float
     prior: tuple[float, float]
     walk: float
+    start: float
     spread: float
+    relative_error: float
     memory: float
     useful: float
     acts_on: str

@@ -1,6 +1,6 @@
 """A bank of Kalman filters over the conditions that a system declares, which weigh each other.
 
-What a condition means for the model, such as the law of a wet contact, is one hypothesis of
+What a condition means for the model, such as another law of friction, is one hypothesis of
 several. Each has an extended Kalman filter; samples tell which of them holds, and when it changes.
 """
 
@@ -13,6 +13,8 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, solve
+from workbench.observers.adaptive import reset
+from workbench.observers.correction import update
 from workbench.observers.gains import Gains
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
@@ -21,7 +23,6 @@ from workbench.observers.kalman import (
     begin,
     finish,
     forecast,
-    update,
 )
 from workbench.system import System
 
@@ -182,14 +183,14 @@ def _law(models, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def
     for j in range(memory.probability.size):
         model, own, filter_ = models[j], settings.members[j], memory.members[j]
         if h == 0.0:
+            reset(filter_.levels)
             status = status or begin(model, own, filter_, u, y)
             rows[j, rows.shape[1] - 1] = np.nan
         else:
             status = status or forecast(model, own, filter_, h, u, y)
             if status:
                 return status
-            volume = update(model, own, filter_, y, rows[j])
-            memory.evidence[j] = -0.5 * (rows[j, rows.shape[1] - 1] + volume)
+            memory.evidence[j] = update(model, own, filter_, h, y, rows[j])
         status = status or finish(model, own, filter_, rows[j])
     if h > 0.0:
         _weigh(memory)
@@ -242,8 +243,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
         ]
         self._filters = filters
         self._starts = [
-            np.array([one.parameters.get(name, fmu.defaults[name]) for name in names])
-            - self._layout.nominal
+            np.array([one.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
             for one in found
         ]
         k, size = len(found), len(self._settings.walk)
@@ -272,7 +272,8 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
         """See Estimator; each hypothesis is as likely."""
         for one, quantities in zip(self._filters, self._starts, strict=True):
             one.start(u, y)
-            one._memory.z[len(one.fmu.states) :] = quantities
+            z, known = one._memory.z[len(one.fmu.states) :], np.isfinite(quantities)
+            z[known] = quantities[known]
         self._memory.probability[:] = 1.0 / len(self._filters)
 
 
