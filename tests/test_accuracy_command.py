@@ -71,7 +71,9 @@ CASE = Case(
 TRUTH = Truth(
     Fx=-FORCE,
     slip=-SPEED * np.where(SLIDING, 0.05, 0.005),
+    omegaW=-SPEED / RW,
     omegaR=-SPEED / RR,
+    muWR=np.full(TIME.size, 0.3),
     muDC=np.full(TIME.size, 0.3),
     contact=4.0,
 )

@@ -3,7 +3,7 @@
 import enum
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,9 @@ from workbench.observers import Estimate, Estimator
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+SURE = 0.95  # probability, that of a band
 
 
 class Ending(enum.Enum):
@@ -47,6 +50,7 @@ class Run:
     claimed : (n,) by estimated quantity that is not always shown, whether it is an estimate;
         elsewhere it is a guess that fits as well as any other, or stands in for something that the
         model has not.
+    probability : (n,) by mode of an estimator that weighs models.
     """
 
     case: str
@@ -60,6 +64,7 @@ class Run:
     message: str
     seconds: float
     claimed: Mapping[str, NDArray[np.bool_]]
+    probability: Mapping[str, Vector] = field(default_factory=dict)
 
     def signal(self, name: str) -> Vector:
         """One column of the estimate, (n,)."""
@@ -70,7 +75,10 @@ class Run:
         return self.sigma[:, list(self.columns).index(name)]
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
-        """What is known, (n,) by `signal [unit]`: estimates, `sigma_...`, and `..._claimed`."""
+        """What is known, (n,) by `signal [unit]`.
+
+        Estimates, `sigma_...`, `..._claimed`, and `probability_...` of modes.
+        """
         columns: dict[str, NDArray[Any]] = {}
         for name, unit in self.columns.items():
             if not np.isnan(self.signal(name)).all():
@@ -80,6 +88,8 @@ class Run:
         for name, claimed in self.claimed.items():
             if not np.isnan(self.signal(name)).all():
                 columns[f"{name}_claimed [1]"] = claimed.astype(int)
+        for mode, probability in self.probability.items():
+            columns[f"probability_{mode} [1]"] = probability
         return columns
 
     def to_frame(self) -> pd.DataFrame:
@@ -121,7 +131,9 @@ def replay(case: Case, estimator: Estimator) -> Run:
     begin = time.perf_counter()
     system = estimator.system
     blank = np.full((case.time.size, len(system.columns)), np.nan)
-    estimate = Estimate(blank, blank, blank[:, 0])
+    estimate = Estimate(
+        blank, blank, blank[:, 0], np.full((len(blank), len(estimator.modes)), np.nan)
+    )
     claimed: dict[str, NDArray[np.bool_]] = {}
     ending, message = Ending.OK, ""
     try:
@@ -134,7 +146,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
         elif (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
             ending = Ending.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
-        claimed = _claims(case, estimator, values)
+        claimed = _claims(case, estimator, values, np.asarray(estimate.probability))
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)
@@ -150,6 +162,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
         message=message,
         seconds=seconds,
         claimed=claimed or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
+        probability=dict(zip(estimator.modes, np.asarray(estimate.probability).T, strict=True)),
     )
 
 
@@ -165,14 +178,22 @@ def _doubted(estimator: Estimator) -> list[str]:
     return [one.name for one in estimator.system.estimated if one.claimed or one.name in rules]
 
 
-def _claims(case: Case, estimator: Estimator, values: Matrix) -> dict[str, NDArray[np.bool_]]:
+def _claims(
+    case: Case, estimator: Estimator, values: Matrix, probability: Matrix
+) -> dict[str, NDArray[np.bool_]]:
+    """Where quantities may be claimed; of several models, by those that are hardly wrong."""
     rules, system = _rules(estimator), estimator.system
     claimed = {}
     for name in _doubted(estimator):
         one = next(one for one in system.estimated if one.name == name)
-        met = all(case.conditions[key] == value for key, value in one.claimed.items())
+        met = all(
+            key in estimator.told or case.conditions[key] == value
+            for key, value in one.claimed.items()
+        )
         if met and name in rules:
-            claimed[name] = rules[name](estimator.fmu, system, values)  # type: ignore[operator]
+            shares = [rules[name](fmu, system, values) for fmu in estimator.models]  # type: ignore[operator]
+            weights = probability if estimator.modes else np.ones((case.time.size, 1))
+            claimed[name] = (np.column_stack(shares) * weights).sum(axis=1) > SURE
         else:
             claimed[name] = np.full(case.time.size, met)
     return claimed

@@ -115,6 +115,7 @@ class FMU:
         self._dx = np.zeros(len(self.states))
         self._state_variables = self.variables(self.states)
         self._loaded = Loaded(self.description, self.interface)
+        self._variants: list[FMU] = []
 
     def __enter__(self) -> Self:
         return self
@@ -128,8 +129,16 @@ class FMU:
         self.close()
 
     def close(self) -> None:
-        """Free the instance and the unpacked files."""
+        """Free the instance and the unpacked files, those of variants too."""
+        for one in self._variants:
+            one.close()
         self._loaded.close()
+
+    def variant(self, parameters: Mapping[str, float]) -> "FMU":
+        """Another instance with some parameters changed, which is closed with this one."""
+        other = type(self)(self.path, self.names, {**self._given, **parameters})
+        self._variants.append(other)
+        return other
 
     def renew(self, *, reload: bool) -> None:
         """Free the instance and make a new one; with `reload` of a library loaded anew."""

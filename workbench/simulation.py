@@ -12,7 +12,7 @@ import pandas as pd
 from workbench.case import Case
 from workbench.cosim import Run, replay
 from workbench.fmu import FMU, Vector
-from workbench.objective import Score, low_pass, score
+from workbench.objective import Score, judged_window, low_pass, score
 from workbench.observers import Estimator, Gains
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.pool import Pool
@@ -21,6 +21,10 @@ from workbench.systems import open_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+# A 95 % band of deviations that are too small by the root of this covers 93 %.
+OVERCONFIDENT = (1.960 / 1.812) ** 2
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,12 @@ class CaseResult:
         """Standard deviation of an estimated signal, (n,); None for a method without."""
         sigma = self.runs[name].deviation(signal)
         return None if np.isnan(sigma).all() else sigma
+
+    def surprise(self, name: str) -> float:
+        """Variance of innovations over what a method says, where judged; 0 for one without."""
+        nis = self.runs[name].nis[judged_window(self.case, self.system)]
+        known = nis.size and np.isfinite(nis).all()
+        return float(nis.mean()) / len(self.system.outputs) if known else 0.0
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.

@@ -105,6 +105,7 @@ class System:
     sampling : which times between samples are likely.
     redundancies : what tells the same in a recording.
     cases : folder of recordings that come with the system, or None.
+    learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
     """
@@ -140,6 +141,7 @@ class System:
     fewest: int = 20
     settles: float = 10.0
     sample_time: float = 0.005
+    learns: float = math.inf
     states: tuple[str, ...] | None = None
     cases: Path | None = None
     sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))

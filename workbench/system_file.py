@@ -12,6 +12,7 @@ from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
 from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
+    positive,
     read_condition_kinds,
     read_derived,
     read_estimated,
@@ -170,7 +171,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
 def _placed(file: Table, system: System) -> System:
     """The system with all that names its signals."""
     feedback, tuning = file.table("feedback"), file.table("tuning")
-    feedback.refuse_unknown("fades rolls")
+    feedback.refuse_unknown("fades rolls learns")
     tuning.refuse_unknown("follows")
     points = file.table("points")
     points.refuse_unknown("settles design tested")
@@ -183,6 +184,7 @@ def _placed(file: Table, system: System) -> System:
         comparison=read_comparison(file.table("diagnosis"), system),
         fading=read_fading(feedback.table("fades"), system) if "fades" in feedback else None,
         rolling=read_rolling(feedback.table("rolls")) if "rolls" in feedback else None,
+        learns=positive(feedback, "learns"),
         following=read_following(tuning.table("follows")) if "follows" in tuning else None,
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),

@@ -122,7 +122,9 @@ class Estimated:
     low, high : range that estimates are kept in [unit].
     prior : range before a measurement, of which any value is as likely [unit].
     walk : how fast it may move, random walk [unit/sqrt(s)].
+    start : where filters begin, NaN: at its nominal value [unit].
     spread : standard deviation of what is known of it at the start [unit].
+    relative_error : share of it by which the model lets an estimate be wrong [1].
     memory : time in which a deviation is forgotten [s].
     useful : standard deviation from which on an estimate serves [unit].
     acts_on : state whose rate shows its effect, or output that shows it at once; a correction is in
@@ -139,7 +141,9 @@ class Estimated:
     high: float
     prior: tuple[float, float]
     walk: float
+    start: float
     spread: float
+    relative_error: float
     memory: float
     useful: float
     acts_on: str
@@ -269,6 +273,7 @@ class Condition:
     choices : words or whole numbers that it may be.
     count : of entries, where it is a list; 0: no list.
     parameters : of the model by choice, which it sets.
+    lasts : mean time until another choice takes its place, under way; infinite: never [s].
     sign : whether it is the sign of the recording's signals.
     label : for people.
     agrees : what the recording says of it, or None.
@@ -282,6 +287,7 @@ class Condition:
     choices: tuple[str | int, ...]
     count: int
     parameters: Mapping[str, Mapping[str, float]]
+    lasts: float
     sign: bool
     agrees: Agreement | None
 

@@ -140,7 +140,8 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
         own.refuse_unknown(
-            "correction label unit range prior walk spread memory useful acts_on claimed"
+            "correction label unit range prior walk start spread relative_error memory useful "
+            "acts_on claimed"
         )
         unit = own.unit("unit", "1")
         low, high = own.numbers("range", unit, 2)
@@ -158,7 +159,9 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
                 high=high,
                 prior=(prior[0], prior[1]),
                 walk=own.number("walk", unit),
+                start=own.number("start", unit, math.nan),
                 spread=own.number("spread", unit, reach),
+                relative_error=own.number("relative_error", "1", 0.0),
                 memory=own.number("memory", "s", math.inf),
                 useful=own.number("useful", unit, 0.1 * reach),
                 acts_on=own.text("acts_on", ""),
@@ -175,7 +178,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("label unit least above choices count parameters sign agrees")
+        own.refuse_unknown("label unit least above choices count parameters lasts sign agrees")
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -203,6 +206,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                     }
                     for choice in parameters.content
                 },
+                lasts=positive(own, "lasts"),
                 sign="sign" in own and own.take("sign", bool),
                 agrees=_agreement(own) if "agrees" in own else None,
             )
@@ -260,6 +264,14 @@ def read_sampling(table: Table) -> Sampling:
     if likely > possible:
         raise table.wrong("gaps", "the longest likely time before the longest possible one")
     return Sampling(table.number("slowest", "s", math.inf), likely, possible)
+
+
+def positive(table: Table, key: str) -> float:
+    """A time [s], infinite where none is given."""
+    time = table.number(key, "s", math.inf)
+    if not time > 0.0:
+        raise table.wrong(key, "a time above 0")
+    return time
 
 
 def read_point(points: Table, name: str, system: System) -> OperatingPoint:

@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,6 +110,15 @@ def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[lis
         yield ready
 
 
+def plain_filters(system: System) -> System:
+    """The same system for filters as in a textbook, which what they are measured against are.
+
+    They begin at nominal quantities and learn no noise levels.
+    """
+    estimated = [replace(one, start=math.nan, relative_error=0.0) for one in system.estimated]
+    return replace(system, estimated=tuple(estimated), learns=math.inf)
+
+
 def tuned_names(system: System) -> list[str]:
     """Estimators that are measured: standard ones with gains, the others do little."""
     return [name for name, kind in choose(system, []).items() if kind.tunable]
@@ -123,7 +132,7 @@ def time_observers(case: Case, system: System) -> list[ObserverTimes]:
     names = tuned_names(system)
     kinds = choose(system, names)
     times = []
-    with opened(system, [OpenLoop.name, *names]) as estimators:
+    with opened(plain_filters(system), [OpenLoop.name, *names]) as estimators:
         for one in estimators:
             with by_fmpy(one.name, one.fmu, system, one.gains) as loop:
                 plain = by_c(one.name, one.fmu, system, one.gains)

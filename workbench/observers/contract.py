@@ -24,11 +24,13 @@ class Estimate:
     values : columns as in `System.columns`.
     sigma : standard deviations, NaN where the method has none.
     nis : normalised innovation squared, () or (n,), NaN where the method has none.
+    probability : of each of the estimator's modes, (k,) or (n, k).
     """
 
     values: Vector | Matrix
     sigma: Vector | Matrix
     nis: Vector | float
+    probability: Vector | Matrix
 
 
 class Estimator(ABC):
@@ -55,6 +57,8 @@ class Estimator(ABC):
     meaning : of the gains, with units, for whoever reads their file.
     tuned_as : estimator whose gains it takes; empty: its own.
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
+    modes : what it weighs models by, in columns and figures; none if it runs on one model.
+    told : conditions that it finds by itself.
 
     Raises
     ------
@@ -72,6 +76,8 @@ class Estimator(ABC):
     meaning: ClassVar[str] = ""
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
+    modes: tuple[str, ...] = ()
+    told: frozenset[str] = frozenset()
     _law: ClassVar[Any]
     _loop: ClassVar[Any]
 
@@ -86,7 +92,12 @@ class Estimator(ABC):
         self._model = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
         self._t = 0.0
-        self._row = np.empty(2 * len(system.columns) + 1)
+        self._row = np.empty(2 * len(system.columns) + len(self.modes) + 1)
+
+    @property
+    def models(self) -> tuple[FMU, ...]:
+        """What it runs on: the model, or one of each mode."""
+        return (self.fmu,)
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:
@@ -219,5 +230,6 @@ class Estimator(ABC):
         return self._split(rows)
 
     def _split(self, rows: Any) -> Estimate:
-        width = self._row.size // 2
-        return Estimate(rows[..., :width], rows[..., width:-1], rows[..., -1])
+        width = len(self.system.columns)
+        values, sigma, probability = np.split(rows[..., :-1], [width, 2 * width], axis=-1)
+        return Estimate(values, sigma, rows[..., -1], probability)

@@ -11,7 +11,9 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, evaluate, implicit, inlined, linearise, read, solve
+from workbench.observers.adaptive import Learning, Levels, learning, levels, reset
 from workbench.observers.contract import Estimator
+from workbench.observers.correction import update
 from workbench.observers.gains import Gains, SearchSpace, noise_space
 from workbench.observers.layout import (
     Layout,
@@ -46,6 +48,7 @@ class FilterSettings(NamedTuple):
     floor: Vector
     walk: Vector
     spread: Vector
+    learning: Learning
 
 
 class FilterMemory(NamedTuple):
@@ -54,9 +57,10 @@ class FilterMemory(NamedTuple):
     z: Vector
     P: Matrix
     system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
-    spread: Matrix  # (n, n + n + q) of the covariance
+    spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
     change: Vector
     column: Vector
+    levels: Levels
 
 
 @inlined
@@ -86,32 +90,64 @@ def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def propagate(model, memory, h):  # type: ignore[no-untyped-def]
-    """P <- F P F', F = (I - hA)^-1 of states and quantities, after `predict`; returns a status.
+def transition(model, system, h):  # type: ignore[no-untyped-def]
+    """Derivatives of the step that `predict` took, by states and quantities; returns a status.
 
-    Quantities stay, so that only rows of states are solved for, with those of quantities on the
-    right-hand side. Each pass gives (F P)', the other half of a symmetric P being left alone.
+    Parameters
+    ----------
+    system : (n, n + n + q) whose last columns take the rows of states, (I - hA)^-1 [I, hB]; the
+        rows of quantities are those of a unit matrix.
     """
-    P, system = memory.P, memory.spread
-    n, size = model.x.size, memory.z.size
-    for _ in range(2):
-        implicit(model, h, system)
+    n, size = model.x.size, model.jacobian.shape[0]
+    implicit(model, h, system)
+    for i in range(n):
+        for j in range(n):
+            system[i, n + j] = 0.0
+        system[i, n + i] = 1.0
+        for j in range(n, size):
+            system[i, n + j] = h * model.jacobian[j, i]
+    return solve(system)
+
+
+@compiled
+def carry(F, P, work):  # type: ignore[no-untyped-def]
+    """P <- F P F' of states and quantities, (s, s), which stays symmetric; work, (s,).
+
+    Parameters
+    ----------
+    F : (n, s) rows of states, see `transition`.
+    """
+    n, size = F.shape
+    for j in range(size):
         for i in range(n):
-            for j in range(size):
-                total = P[i, j]
-                for k in range(n, size):
-                    total += h * model.jacobian[k, i] * P[k, j]
-                system[i, n + j] = total
-        status = solve(system)
-        if status:
-            return status
+            work[i] = 0.0
+            for k in range(size):
+                work[i] += F[i, k] * P[k, j]
         for i in range(n):
-            for j in range(size):
-                P[j, i] = system[i, n + j]
+            P[i, j] = work[i]
+    for i in range(n):
+        for j in range(i + 1):
+            work[j] = 0.0
+            for k in range(size):
+                work[j] += P[i, k] * F[j, k]
+        for j in range(i + 1):
+            P[i, j] = work[j]
     for i in range(n):
         for j in range(n, size):
-            P[i, j] = P[j, i]
-    return 0
+            P[j, i] = P[i, j]
+        for j in range(i):
+            P[j, i] = P[i, j]
+
+
+@inlined
+def room(settings, P, i):  # type: ignore[no-untyped-def]
+    """Share of a random walk that is left, where levels are learnt.
+
+    Nothing is known less of a quantity than at the start: a walk within a range. States have none.
+    """
+    if settings.learning.within == np.inf or i < P.shape[0] - settings.layout.nominal.size:
+        return 1.0
+    return max(1.0 - P[i, i] / settings.spread[i] ** 2, 0.0)
 
 
 @inlined
@@ -135,7 +171,9 @@ def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
         at = layout.seen[j]
         row[first + j] = np.sqrt(P[at, at]) if at >= 0 else deviation(model, P, -1 - at)
     for i in range(q):
-        row[first + outputs + i] = row[first + outputs + q + i] = np.sqrt(P[n + i, n + i])
+        doubt = layout.doubt[i] * (layout.nominal[i] + z[n + i])
+        known = np.sqrt(P[n + i, n + i] + doubt * doubt)
+        row[first + outputs + i] = row[first + outputs + q + i] = known
     for i in range(layout.reported):
         row[first + outputs + 2 * q + i] = deviation(model, P, i)
     return status
@@ -163,71 +201,35 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def update(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
-    """Correct mean and covariance by a sample, one output after the other; a status.
-
-    The noise of outputs is independent, so that their order does not matter and no matrix is
-    inverted. The innovations are those of one linearisation.
-    Source: D. Simon, Optimal State Estimation, Wiley 2006, section 6.1.
-    """
-    z, P, layout, v = memory.z, memory.P, settings.layout, memory.column
-    size, n = z.size, model.x.size
+def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+    """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
+    layout, P, size = settings.layout, memory.P, memory.z.size
+    status = measure(model, u) or predict(model, settings, memory, memory.z, h)
+    # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
-    row[row.size - 1] = 0.0
     for i in range(size):
-        memory.change[i] = 0.0
+        P[i, i] += h * room(settings, P, i) * memory.levels.walk[i] * (fade * settings.walk[i]) ** 2
     for j in range(y.size):
-        at = layout.seen[j]
-        if at >= 0:
-            innovation = y[j] - z[at] - memory.change[at]
-            for i in range(size):
-                v[i] = P[i, at]
-            total = v[at]
-        else:
-            innovation = y[j] - model.y[-1 - at]
-            total = 0.0
-            for i in range(size):
-                v[i] = 0.0
-                for k in range(size):
-                    v[i] += P[i, k] * model.jacobian[k, n - 1 - at]
-            for i in range(size):
-                total += model.jacobian[i, n - 1 - at] * v[i]
-                innovation -= model.jacobian[i, n - 1 - at] * memory.change[i]
-        noise = variance(settings, fade, y, j)
-        total += noise
-        inverse = 1.0 / total
-        row[row.size - 1] += innovation * innovation * inverse
-        # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
-        for i in range(size):
-            gain = v[i] * inverse
-            memory.change[i] += gain * innovation
-            for k in range(i + 1):
-                P[i, k] -= gain * v[k]
-                P[k, i] = P[i, k]
-    for i in range(size):
-        z[i] += memory.change[i]
+        memory.levels.noise[j] = variance(settings, fade, y, j)
+    status = status or transition(model, memory.spread, h)
+    carry(memory.spread[:, model.x.size :], P, memory.change)
+    if layout.columns > model.x.size:
+        status = status or put(model, memory.z) or read(model)
+        status = status or linearise(model, layout.columns)
+    return status
 
 
 @compiled
 def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     """Predict by the linearised model, correct by the sample."""
-    layout = settings.layout
     if h == 0.0:
+        reset(memory.levels)
         status = begin(model, settings, memory, u, y)
         return status or finish(model, settings, memory, row)
-    P, size = memory.P, memory.z.size
-    status = measure(model, u) or predict(model, settings, memory, memory.z, h)
-    # Model noise enters before the step, whose implicit form damps it as it damps the state.
-    fade = fading(layout, y)
-    for i in range(size):
-        P[i, i] += h * (fade * settings.walk[i]) ** 2
-    status = status or propagate(model, memory, h)
-    if layout.columns > model.x.size:
-        status = status or put(model, memory.z) or read(model)
-        status = status or linearise(model, layout.columns)
+    status = forecast(model, settings, memory, h, u, y)
     if status:
         return status
-    update(model, settings, memory, y, row)
+    update(model, settings, memory, h, y, row)
     return finish(model, settings, memory, row)
 
 
@@ -274,8 +276,11 @@ class ExtendedKalmanFilter(Estimator):
             floor=np.array([gains[one.name] for one in system.outputs]),
             walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
+            learning=learning(system),
         )
-        self._memory: Any = FilterMemory(*buffers(n, q), np.zeros(n + q))
+        self._memory: Any = FilterMemory(
+            *buffers(n, q), np.zeros(n + q), levels(n + q, len(system.outputs))
+        )
 
     def _spreads(self) -> Vector:
         """What is not known of the states at the start, (n,)."""
@@ -288,6 +293,8 @@ class ExtendedKalmanFilter(Estimator):
         memory = self._memory
         memory.z[:] = 0.0
         memory.z[: len(self.fmu.states)] = self.fmu.get_states()
+        begins = np.array([one.start for one in self.system.estimated]) - self._layout.nominal
+        memory.z[len(self.fmu.states) :] = np.nan_to_num(begins)
         memory.P[:] = np.diag(self._settings.spread**2)
 
     @classmethod

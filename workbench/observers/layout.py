@@ -19,6 +19,7 @@ class Layout(NamedTuple):
     ----------
     seen : (l,) index of the state that is an output, or -1 - index among the model's outputs.
     nominal, low, high : (q,) nominal estimated quantities, and limits of their corrections.
+    doubt : (q,) share of quantities by which the model lets them be wrong [1].
     acts_on : (q,) column of the Jacobian that shows a correction's effect: rate of a state, or an
         output that is none; -1 for none.
     pace : (l,) coefficients of the outputs in the signal with which feedback fades; half of it is
@@ -33,6 +34,7 @@ class Layout(NamedTuple):
     nominal: Vector
     low: Vector
     high: Vector
+    doubt: Vector
     acts_on: NDArray[np.intp]
     pace: Vector
     half: float
@@ -70,6 +72,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         nominal=nominal,
         low=np.array([one.low for one in system.estimated]) - nominal,
         high=np.array([one.high for one in system.estimated]) - nominal,
+        doubt=np.array([one.relative_error for one in system.estimated]),
         acts_on=np.array([_column(fmu, one.acts_on, shown) for one in system.estimated], np.intp),
         pace=pace,
         half=fading.half if fading else 0.0,

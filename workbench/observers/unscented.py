@@ -6,6 +6,7 @@ import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import compiled, read
+from workbench.observers.adaptive import Levels, learn, levels, note, reset, surprises
 from workbench.observers.gains import Gains
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
@@ -15,6 +16,7 @@ from workbench.observers.kalman import (
     finish,
     predict,
     put,
+    room,
     variance,
 )
 from workbench.observers.layout import clip, fading, measure
@@ -38,6 +40,8 @@ class PointsMemory(NamedTuple):
     spread: Matrix
     change: Vector
     column: Vector
+    levels: Levels
+    start: Vector  # z before the step
     root: Matrix
     points: Matrix  # (2 size, size)
     seen: Matrix  # (2 size, l) outputs at the points
@@ -134,7 +138,7 @@ def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-
     triangle holds the root of the innovations' covariance, the gain times it, and the new root.
     Source: M. Morf, T. Kailath (1975), IEEE Trans. Autom. Control 20, 487-497.
     """
-    z, stack, triangle = memory.z, memory.stack, memory.triangle
+    z, stack, triangle, levels = memory.z, memory.stack, memory.triangle, memory.levels
     size, outputs = z.size, y.size
     share = np.sqrt(0.5) / spread
     for j in range(outputs):
@@ -146,11 +150,13 @@ def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-
             stack[i, j] = share * (memory.seen[i, j] - mean)
         for i in range(outputs):
             stack[2 * size + i, j] = 0.0
-        stack[2 * size + j, j] = np.sqrt(variance(settings, fade, y, j))
+        stack[2 * size + j, j] = np.sqrt(levels.sample[j] * variance(settings, fade, y, j))
         memory.column[j] = y[j] - mean
-    for i in range(2 * size):
-        for j in range(size):
+    for j in range(size):
+        memory.change[j] = levels.before[j, j] = 0.0
+        for i in range(2 * size):
             stack[i, outputs + j] = share * (memory.points[i, j] - z[j])
+            levels.before[j, j] += stack[i, outputs + j] ** 2
     for i in range(outputs):
         for j in range(size):
             stack[2 * size + i, outputs + j] = 0.0
@@ -160,11 +166,15 @@ def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-
         white = memory.column[j]
         for i in range(j):
             white -= triangle[i, j] * memory.column[outputs + i]
+        noise = variance(settings, fade, y, j)
+        note(levels, j, white, triangle[j, j] ** 2 - levels.sample[j] * noise, noise)
         white /= triangle[j, j]
         memory.column[outputs + j] = white
         row[row.size - 1] += white * white
         for i in range(size):
-            z[i] += triangle[j, outputs + i] * white
+            memory.change[i] += triangle[j, outputs + i] * white
+    for i in range(size):
+        z[i] += memory.change[i]
     for i in range(size):
         for j in range(size):
             memory.root[i, j] = triangle[outputs + i, outputs + j]
@@ -176,6 +186,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     z, root, stack = memory.z, memory.root, memory.stack
     size, layout = z.size, settings.layout
     if h == 0.0:
+        reset(memory.levels)
         status = begin(model, settings, memory, u, y)
         _covariance_to_root(memory)
         return status or finish(model, settings, memory, row)
@@ -187,16 +198,29 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     status = measure(model, u)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
+        moves = np.sqrt(h * room(settings, memory.P, i) * memory.levels.walk[i]) * fade
+        moves *= settings.walk[i]
+        memory.start[i] = z[i]
         for j in range(size):
             stack[i, j] = root[i, j]
-            stack[size + i, j] = np.sqrt(h) * fade * settings.walk[i] if j == i else 0.0
+            stack[size + i, j] = moves if j == i else 0.0
     triangularise(stack[: 2 * size, :size], root)
     spread = POINT_DISTANCE * np.sqrt(1.0 * size)
     status = status or _spread(model, settings, memory, spread, h)
     if status:
         return status
     _absorb(settings, memory, spread, fade, y, row)
+    if settings.learning.within < np.inf:
+        if surprises(settings, memory.levels, row[row.size - 1]):
+            for i in range(size):
+                z[i] = memory.start[i]
+            status = ekf_law(model, settings, memory, h, u, y, row)
+            _covariance_to_root(memory)
+            return status
+        memory.levels.surprised[0] = 0.0
     _root_to_covariance(memory)
+    if settings.learning.within < np.inf:
+        learn(settings, memory, fade, h)
     return finish(model, settings, memory, row)
 
 
@@ -236,6 +260,8 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
         self._memory = PointsMemory(
             *buffers(len(fmu.states), len(system.estimated)),
             np.zeros(max(size, 2 * outputs)),
+            levels(size, outputs),
+            start=np.zeros(size),
             root=np.zeros((size, size)),
             points=np.zeros((2 * size, size)),
             seen=np.zeros((2 * size, outputs)),

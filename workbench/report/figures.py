@@ -29,7 +29,7 @@ from workbench.report.views import (
     titled,
     views,
 )
-from workbench.simulation import CaseResult
+from workbench.simulation import OVERCONFIDENT, CaseResult
 from workbench.system import View
 
 # On white and on near black; at least 3:1 to the ground as WCAG 2.2 asks of graphics, and
@@ -137,6 +137,7 @@ def case_figure(result: CaseResult) -> CaseFigure:
         panels.append(_seen(result, styles, view))
         if judged in view.signals:
             panels.append(_residual(result, styles, window))
+    panels.append(_probabilities(result.runs.values()))
     return CaseFigure(
         name=case.name,
         title=case.title,
@@ -157,6 +158,7 @@ def run_figure(run: Run) -> CaseFigure:
         if not np.isnan(run.signal(name)).all():
             curve = Curve("2", run.signal(name), _known(run.deviation(name)))
             panels.append(_panel(f"{name} [{unit}]", _claimed(curve, run, name), height=1.0))
+    panels += [panel for panel in [_probabilities([run])] if panel.curves]
     legend = (("2", run.estimator),)
     return CaseFigure(run.case, run.summary(), "", run.time, None, legend, tuple(panels))
 
@@ -289,6 +291,14 @@ def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Pane
     return Panel(title, -reach, reach, 1.1, tuple(curves))
 
 
+def _probabilities(runs: Iterable[Run]) -> Panel:
+    """Probability of each mode of the estimators that weigh models, one line style each."""
+    modes = [one for run in runs for one in run.probability.items()]
+    title = "Probability of " + ", ".join(name.replace("_", " ") for name, _ in modes) + " [1]"
+    curves = [Curve(ESTIMATORS[i % len(ESTIMATORS)], one) for i, (_, one) in enumerate(modes)]
+    return Panel(title, -0.05, 1.05, 0.6, tuple(curves))
+
+
 def _estimated(
     result: CaseResult, styles: dict[str, str], signal: str, factor: float
 ) -> list[Curve]:
@@ -375,7 +385,13 @@ def _finding(result: CaseResult) -> str:
         return f"Estimated, not judged: {'; '.join(reasons)}."
     share, first, rms = judged[0]
     others = ", ".join(f"{name} {percent(value)}" for value, name, _ in judged[1:])
+    trust = "".join(
+        f" The {label(name, system)} is overconfident: its innovations have {ratio:.1f} times the "
+        "variance that it says."
+        for name in result.runs
+        if (ratio := result.surprise(name)) > OVERCONFIDENT
+    )
     return (
         f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "
-        f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".")
+        f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".") + trust
     )

@@ -6,10 +6,20 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from workbench.files import write_json, write_whole
-from workbench.wheelset.accuracy import NOISE, ROWS, Accuracy, Row, StopAccuracy, Worst, worst
+from workbench.wheelset.accuracy import (
+    COVERED,
+    NOISE,
+    ROWS,
+    Accuracy,
+    Row,
+    StopAccuracy,
+    Worst,
+    worst,
+)
 
 _QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
 _CELL = 8  # characters, that of "+100.0 %"
@@ -24,6 +34,7 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
     lines = [
         {"case": stop.name, "estimator": name}
         | {f"{q} [{meta['unit']}]": getattr(result, q) for q, meta in _QUANTITIES.items()}
+        | {f"covers_{q} [1]": result.covers.get(q) for q in COVERED}
         | {"failure": result.failure}
         for stop in stops
         for name, result in stop.estimators.items()
@@ -66,7 +77,8 @@ def _plain(result: Accuracy) -> dict[str, Any]:
     if result.failure:
         return {"failure": result.failure}
     values = {name: getattr(result, name) for name in _QUANTITIES}
-    return {name: _finite(value) for name, value in values.items() if value is not None}
+    plain = {name: _finite(value) for name, value in values.items() if value is not None}
+    return plain | ({"covers": dict(result.covers)} if result.covers else {})
 
 
 def _finite(value: float) -> float | None:
@@ -86,6 +98,13 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
         )
         lines.append(f"{row.text:<{width}}{''.join(cells)}")
     lines.append("-" * len(header))
+    if any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED):
+        lines += [
+            "Share of samples in which a 95 % band holds the truth, mean of all stops",
+            header,
+        ]
+        lines += [f"{q:<{width}}{_covers(stops, names, q)}" for q in COVERED]
+        lines.append("-" * len(header))
     failures = [
         f"{stop.name}, {name}: {result.failure}"
         for stop in stops
@@ -93,6 +112,22 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
         if result.failure
     ]
     return "\n".join(lines + failures)
+
+
+def covered(stops: Sequence[StopAccuracy], name: str, quantity: str) -> float | None:
+    """Share of samples in which bands of an estimator hold a quantity, mean of the stops."""
+    shares = [
+        stop.estimators[name].covers[quantity]
+        for stop in stops
+        if quantity in stop.estimators[name].covers
+    ]
+    return float(np.mean(shares)) if shares else None
+
+
+def _covers(stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str) -> str:
+    shares = {name: covered(stops, name, quantity) for name in names}
+    texts = {name: "" if one is None else f"{100.0 * one:.1f} %" for name, one in shares.items()}
+    return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
 
 
 def _cell(row: Row, found: Worst | None) -> str:

@@ -14,7 +14,7 @@ from workbench.system import System
 from workbench.wheelset.rig import TRUTH
 
 _DISCS = ("muDC1", "muDC2", "muDC3")
-_READ = ("Fx", "slip", "omegaR", "pads", *_DISCS)
+_READ = ("Fx", "slip", "omegaW", "omegaR", "muWR", "pads", *_DISCS)
 _PADS_TOUCH = 25e3  # [Pa] 0.25 bar balance the return springs, data sheet
 BUILT_UP = (3.0, 6.0)  # [s] after the first contact
 
@@ -27,7 +27,8 @@ class Truth:
     ----------
     Fx : (n,) contact force [N].
     slip : (n,) velocity [m/s].
-    omegaR : (n,) speed of the roller [rad/s].
+    omegaW, omegaR : (n,) speeds of the wheelset and of the roller [rad/s].
+    muWR : (n,) friction of the contact at zero slip velocity [1].
     muDC : (n,) friction of the pads [1]. The mean of the discs is what an axle can show; they are
         pressed with the same force.
     contact : [s] when the pads first touch the discs.
@@ -35,7 +36,9 @@ class Truth:
 
     Fx: Vector
     slip: Vector
+    omegaW: Vector
     omegaR: Vector
+    muWR: Vector
     muDC: Vector
     contact: float
 
@@ -74,7 +77,15 @@ def read_truth(case: Case, system: System) -> Truth:
     signals = {name: np.interp(case.time, columns["time"], columns[name]) for name in _READ}
     contact = _first_contact(case, signals, system)
     muDC: Vector = np.mean([signals[name] for name in _DISCS], axis=0)
-    return Truth(signals["Fx"], signals["slip"], signals["omegaR"], muDC, contact)
+    return Truth(
+        Fx=signals["Fx"],
+        slip=signals["slip"],
+        omegaW=signals["omegaW"],
+        omegaR=signals["omegaR"],
+        muWR=signals["muWR"],
+        muDC=muDC,
+        contact=contact,
+    )
 
 
 def _read_si(path: Path) -> dict[str, Vector]:

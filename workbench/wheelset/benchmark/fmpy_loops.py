@@ -126,7 +126,9 @@ def _stick(model: FMPyModel, before: Vector, x: Vector) -> None:
 
 def _without_sigma(values: list[Vector]) -> Estimate:
     rows = np.array(values)
-    return Estimate(rows, np.full_like(rows, np.nan), np.full(len(rows), np.nan))
+    return Estimate(
+        rows, np.full_like(rows, np.nan), np.full(len(rows), np.nan), np.empty((len(rows), 0))
+    )
 
 
 def disturbance_observer(
@@ -274,7 +276,7 @@ def _filter(
         values.append(model.estimate(z[:n], z[n:]))
         sigmas.append(_sigma(model, P))
         nis.append(square)
-    return Estimate(np.array(values), np.array(sigmas), np.array(nis))
+    return Estimate(np.array(values), np.array(sigmas), np.array(nis), np.empty((len(nis), 0)))
 
 
 def extended_kalman_filter(

@@ -1,0 +1,141 @@
+"""Noise levels that follow innovations: what filters learn, leave out, and follow."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from workbench.case import read_cases
+from workbench.cosim import Run, replay
+from workbench.fmu import FMU, Vector
+from workbench.objective import judged_window
+from workbench.observers import Estimate, estimators
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.observers.unscented import UnscentedKalmanFilter
+from workbench.system import System
+from workbench.systems import load_system, open_model
+
+ROOT = Path(__file__).parent.parent
+WHEELSET = load_system("wheelset")
+FILTERS = ("ekf", "ukf", "imm")
+KINDS = (ExtendedKalmanFilter, UnscentedKalmanFilter)
+STEP, BRAKING = 0.005, 2.7e5  # [s], [Pa]
+
+
+@pytest.fixture(scope="module")
+def fmu() -> Iterator[FMU]:
+    with open_model(WHEELSET) as opened:
+        yield opened
+
+
+def stop(fmu: FMU, muDC: Vector, noise: float = 1.0, seed: int = 5) -> tuple[np.ndarray, ...]:
+    """Time, inputs and outputs of a wheelset that brakes at 2.7 bar, with friction by sample.
+
+    Parameters
+    ----------
+    noise : of both speeds, over what the system file says.
+    """
+    rng = np.random.default_rng(seed)
+    speed = 40.0
+    fmu.start({"omegaR": speed / 0.70, "omegaW": speed / 0.46}, {"muWR": 0.40})
+    inputs = fmu.variables(["pB", "tauR", "dmuDC"])
+    rows = []
+    for friction in muDC:
+        fmu.set(inputs, np.array([BRAKING, 8e3, friction - fmu.defaults["muDC"]]))
+        rows.append(fmu.get_states())
+        fmu.step(STEP)
+    y = np.array(rows)[:, [fmu.states.index(name) for name in ("omegaW", "omegaR")]]
+    deviation = np.array([0.002, 0.003]) + np.abs(y) * [1e-3, 0.0]
+    y = y + noise * deviation * rng.standard_normal(y.shape)
+    u = np.tile([BRAKING, 8e3], (len(y), 1))
+    return np.arange(len(y)) * STEP, u, y
+
+
+def estimate(fmu: FMU, kind: type[ExtendedKalmanFilter], system: System, *stop: Vector) -> Estimate:
+    return kind(fmu, system, kind.reasoned(fmu, system)).run(*stop)
+
+
+MUDC = list(WHEELSET.columns).index("muDC")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("noise", [0.3, 1.0, 3.0])
+def test_noise_of_sensors_is_learnt(
+    fmu: FMU, kind: type[ExtendedKalmanFilter], noise: float
+) -> None:
+    """After ten times the time for it, innovations are as large as the filter says."""
+    found = estimate(fmu, kind, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
+    nis = np.asarray(found.nis)[4000:]
+    # Mean of 1000 samples of two outputs: chance makes 2 +- 0.06, levels know 4 % of a deviation.
+    assert nis.mean() == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_friction_that_stays_is_known_the_better_the_longer(
+    fmu: FMU, kind: type[ExtendedKalmanFilter]
+) -> None:
+    held = replace(WHEELSET, learns=np.inf)
+    samples = stop(fmu, np.full(6000, 0.30))
+    learnt, assumed = (estimate(fmu, kind, one, *samples) for one in (WHEELSET, held))
+    assert learnt.sigma[-1, MUDC] < 0.4 * assumed.sigma[-1, MUDC]
+    late = np.abs(learnt.values[3000:, MUDC] - 0.30)
+    assert np.mean(late < 2.0 * learnt.sigma[3000:, MUDC]) > 0.9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_friction_that_moves_again_is_followed(
+    fmu: FMU, kind: type[ExtendedKalmanFilter]
+) -> None:
+    """Still for 15 s, then 0.1 in 5 s, as on a drying disc: the band opens, and holds it."""
+    moving = np.concatenate([np.full(3000, 0.20), np.linspace(0.20, 0.30, 1000)])
+    found = estimate(fmu, kind, WHEELSET, *stop(fmu, moving))
+    error = np.abs(found.values[:, MUDC] - moving)[3200:]
+    assert error.max() < 0.01
+    assert np.mean(error < 2.0 * found.sigma[3200:, MUDC]) > 0.8
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_single_wrong_sample_is_left_out(fmu: FMU, kind: type[ExtendedKalmanFilter]) -> None:
+    time, u, y = stop(fmu, np.full(3000, 0.30))
+    spoilt = y.copy()
+    spoilt[2000] *= 1.5
+    clean, found = (estimate(fmu, kind, WHEELSET, time, u, one) for one in (y, spoilt))
+    # One sample less is known: a small part of a deviation.
+    moved = np.abs(found.values - clean.values)[1999:]
+    assert (moved < 0.5 * np.maximum(clean.sigma, 1e-9)[1999:]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_jump_of_a_friction_is_followed_at_once(
+    fmu: FMU, kind: type[ExtendedKalmanFilter]
+) -> None:
+    """Pads lose half their friction between two samples; held levels take a second to follow."""
+    jumping = np.concatenate([np.full(3000, 0.40), np.full(400, 0.20)])
+    found = estimate(fmu, kind, WHEELSET, *stop(fmu, jumping, 0.3))
+    error = np.abs(found.values[:, MUDC] - jumping)
+    assert error[3060:].max() < 0.02  # 0.3 s
+
+
+@pytest.fixture(scope="module")
+def runs(fmu: FMU) -> dict[str, list[tuple[slice, Run]]]:
+    made = {name: estimators(WHEELSET)[name] for name in FILTERS}
+    ready = {name: kind(fmu, WHEELSET, kind.reasoned(fmu, WHEELSET)) for name, kind in made.items()}
+    cases = read_cases([ROOT / "cases"], WHEELSET)
+    return {
+        name: [(judged_window(case, WHEELSET), replay(case, one)) for case in cases]
+        for name, one in ready.items()
+    }
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_innovations_on_the_rig_are_as_large_as_filters_say(
+    runs: dict[str, list[tuple[slice, Run]]], name: str
+) -> None:
+    """Chi-squared with two degrees of freedom: its mean, and its 95 % bound."""
+    nis = np.concatenate([run.nis[window] for window, run in runs[name]])
+    # Levels lag by two seconds behind speeds that fall, whose noise falls with them.
+    assert nis.mean() == pytest.approx(2.0, abs=0.1)
+    assert np.mean(nis < chi2.ppf(0.95, 2)) == pytest.approx(0.95, abs=0.01)

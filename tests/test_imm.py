@@ -1,0 +1,227 @@
+"""A bank of filters that weigh the conditions of a system: what it is on a linear model, and what
+it finds on rails."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import inv
+
+from workbench.case import Case, read_case, read_cases
+from workbench.cosim import Run, replay
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers.imm import InteractingMultipleModel, changes, hypotheses
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.system import System
+from workbench.systems import load_system, open_model
+
+ROOT = Path(__file__).parent.parent
+WHEELSET = load_system("wheelset")
+
+# --- on a linear model: a vessel that cools, insulated or bare, heated by a source and the sun ---
+
+LIBRARY = """
+package Heat
+  model Vessel
+    parameter Real rate(unit="1/s") = 0.02;
+    parameter Real sun(unit="K/s") = 0.1;
+    input Real heater(unit="K/s");
+    input Real dsun(unit="K/s");
+    output Real warm(unit="K", start=10.0, fixed=true, nominal=10.0);
+  equation
+    der(warm) = heater + sun + dsun - rate*warm;
+  end Vessel;
+end Heat;
+"""
+SYSTEM = """
+title = "Vessel"
+sample_time = "1 s"
+models.observer = { class = "Vessel", fmu = "Vessel.fmu" }
+inputs.heater = { unit = "K/s", noise = "0 K/s", scale = "1 K/s" }
+outputs.warm = { unit = "K", noise = "0.2 K", scale = "10 K" }
+states.warm = { walk = "0.01 K" }
+
+[estimated.sun]
+correction = "dsun"
+unit = "K/s"
+range = ["-1 K/s", "1 K/s"]
+walk = "0.002 K/s"
+spread = "0.05 K/s"
+
+[points]
+design.inputs = { heater = "0.3 K/s" }
+
+[conditions.cover]
+choices = ["on", "off"]
+lasts = "100 s"
+
+[conditions.cover.parameters]
+on = { rate = 0.02 }
+off = { rate = 0.05 }
+"""
+RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
+
+
+@pytest.fixture(scope="module")
+def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
+    pytest.importorskip("casadi")
+    pytest.importorskip("rumoca")
+    from workbench import compiler
+
+    folder = tmp_path_factory.mktemp("vessel")
+    (folder / "package.mo").write_text(LIBRARY)
+    compiler.build(
+        folder / "package.mo", "Heat.Vessel", folder / "Vessel.fmu", platforms=[compiler.native()]
+    )
+    (folder / "system.toml").write_text(SYSTEM)
+    rng, warm, rows = np.random.default_rng(3), 10.0, []
+    for k in range(300):
+        heater = 0.4 if k % 60 < 30 else 0.1
+        rows.append((k * STEP, heater, warm + NOISE * rng.standard_normal()))
+        warm += STEP * (heater + 0.12 - RATES[k > 150] * warm)
+    case = folder / "cases" / "01_cover_lost"
+    case.mkdir(parents=True)
+    title = 'title = "Cover lost"\nconditions.cover = "on"\nmeasurement.file = "measured.csv"\n'
+    (case / "case.toml").write_text(title)
+    table = pd.DataFrame(rows, columns=["time [s]", "heater [K/s]", "warm [K]"])
+    table.to_csv(case / "measured.csv", index=False)
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def fmu(vessel: System) -> Iterator[FMU]:
+    with open_model(vessel) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def case(vessel: System) -> Case:
+    return read_case(vessel.source.parent / "cases" / "01_cover_lost", vessel)
+
+
+def bank(fmu: FMU, system: System, lasts: float) -> InteractingMultipleModel:
+    conditions = tuple(replace(one, lasts=lasts) for one in system.conditions)
+    given = replace(system, conditions=conditions)
+    return InteractingMultipleModel(fmu, given, InteractingMultipleModel.reasoned(fmu, given))
+
+
+def textbook(case: Case, transition: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Blom and Bar-Shalom (1988) in matrices: means, deviations and probabilities, by sample."""
+    first = np.array([case["warm"][0], 0.0])
+    z, P = [first, first], [np.diag([NOISE, 0.05]) ** 2] * 2
+    weight = np.array([0.5, 0.5])
+    found = [(first, np.sqrt(np.diag(P[0])), weight)]
+    for heater, measured in zip(case["heater"][1:], case["warm"][1:], strict=True):
+        before = transition.T @ weight
+        mixed, spread, evidence = [], [], []
+        for j, rate in enumerate(RATES):
+            share = transition[:, j] * weight / before[j]
+            mean = share[0] * z[0] + share[1] * z[1]
+            cov = sum(
+                s * (p + np.outer(a - mean, a - mean)) for s, a, p in zip(share, z, P, strict=True)
+            )
+            Phi = inv(np.array([[1.0 + STEP * rate, -STEP], [0.0, 1.0]]))
+            mean = Phi @ (mean + np.array([STEP * (heater + 0.1), 0.0]))
+            cov = Phi @ (cov + STEP * np.diag(WALK**2)) @ Phi.T
+            S = cov[0, 0] + NOISE**2
+            gain, innovation = cov[:, 0] / S, measured - mean[0]
+            mixed.append(mean + gain * innovation)
+            spread.append(cov - S * np.outer(gain, gain))
+            evidence.append(np.exp(-0.5 * innovation**2 / S) / np.sqrt(S))
+        z, P = mixed, spread
+        weight = before * evidence
+        weight /= weight.sum()
+        mean = weight @ z
+        cov = sum(
+            w * (p + np.outer(a - mean, a - mean)) for w, a, p in zip(weight, z, P, strict=True)
+        )
+        found.append((mean, np.sqrt(np.diag(cov)), weight))
+    return tuple(np.array(column) for column in zip(*found, strict=True))
+
+
+@pytest.mark.parametrize("lasts", [20.0, 100.0, np.inf])
+def test_it_is_the_textbook_where_the_model_is_linear(
+    fmu: FMU, vessel: System, case: Case, lasts: float
+) -> None:
+    """Without changes the mixture is exact: two filters side by side, weighed by Bayes' rule."""
+    case = case.part(slice(0, 140))  # in which no probability vanishes in double precision
+    run = replay(case, bank(fmu, vessel, lasts))
+    rate = STEP / lasts
+    transition = inv(np.array([[1.0 + rate, -rate], [-rate, 1.0 + rate]]))
+    mean, sigma, weight = textbook(case, transition)
+    # Rounding alone, of numbers of 10 and probabilities down to 1e-30.
+    assert_allclose(run.signal("warm"), mean[:, 0], rtol=1e-9)
+    assert_allclose(run.signal("dsun"), mean[:, 1], rtol=1e-9, atol=1e-10)
+    assert_allclose(run.deviation("warm"), sigma[:, 0], rtol=1e-8)
+    assert_allclose(run.deviation("sun"), sigma[:, 1], rtol=1e-8)
+    assert_allclose(run.probability["cover_off"], weight[:, 1], rtol=1e-7, atol=1e-12)
+
+
+def test_a_cover_that_is_lost_under_way_is_noticed(fmu: FMU, vessel: System, case: Case) -> None:
+    run = replay(case, bank(fmu, vessel, 100.0))
+    off = run.probability["cover_off"]
+    assert off[140:150].max() < 0.05
+    assert np.median(off[-100:]) > 0.95
+
+
+def test_rates_of_change_leave_one_choice_for_each_other(vessel: System) -> None:
+    assert_allclose(changes(vessel), [[-0.01, 0.01], [0.01, -0.01]])
+    (cover,) = vessel.conditions
+    second = replace(cover, name="lid", lasts=50.0)
+    both = changes(replace(vessel, conditions=(cover, second)))
+    assert len(hypotheses(replace(vessel, conditions=(cover, second)))) == 4
+    # Rows are on on, on off, off on, off off; a lid changes twice as often as a cover.
+    assert_allclose(both[0], [-0.03, 0.02, 0.01, 0.0])
+    assert_allclose(both.sum(axis=1), 0.0, atol=1e-15)
+
+
+def test_a_time_that_is_none_is_refused(vessel: System, tmp_path: Path) -> None:
+    shutil.copy(vessel.source.parent / "Vessel.fmu", tmp_path)
+    (tmp_path / "system.toml").write_text(SYSTEM.replace('"100 s"', '"0 s"'))
+    with pytest.raises(InputError, match=r"lasts.*a time above 0"):
+        load_system(tmp_path)
+
+
+# --- on the rig ---
+
+
+@pytest.fixture(scope="module")
+def rails() -> dict[str, Run]:
+    """Wet and dry stops of the rig."""
+    found = read_cases([ROOT / "cases"], WHEELSET)
+    with open_model(WHEELSET) as opened:
+        gains = InteractingMultipleModel.reasoned(opened, WHEELSET)
+        own = InteractingMultipleModel(opened, WHEELSET, gains)
+        return {one.name: replay(one, own) for one in found}
+
+
+def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
+    conditions = tuple(replace(one, parameters={}) for one in WHEELSET.conditions)
+    plain = replace(WHEELSET, conditions=conditions)
+    case = read_case(ROOT / "cases" / "09_wet_160_4.2_wsp", plain)
+    with open_model(plain) as opened:
+        gains = ExtendedKalmanFilter.reasoned(opened, plain)
+        kinds = (ExtendedKalmanFilter, InteractingMultipleModel)
+        alone, one = (kind(opened, plain, gains).run(case.time, case.u, case.y) for kind in kinds)
+    assert_allclose(one.values, alone.values, rtol=1e-12, atol=0)
+    assert_allclose(one.sigma, alone.sigma, rtol=1e-12, atol=0)
+    assert_allclose(one.nis, alone.nis, rtol=1e-12, atol=0)
+
+
+def test_the_condition_of_the_rail_is_found_within_a_second(rails: dict[str, Run]) -> None:
+    """Where the wheel rolls: sliding, the laws of wet and dry rails are alike."""
+    for case in read_cases([ROOT / "cases"], WHEELSET):
+        right = rails[case.name].probability[f"wheel_rail_{case.conditions['wheel_rail']}"]
+        pressed = case.time[np.argmax(case["pB"] > 25e3)]  # pads touch, data sheet
+        rolling = 0.70 * np.abs(case["omegaR"]) > 1.0
+        slip = np.abs(0.70 * case["omegaR"] - 0.46 * case["omegaW"])
+        rolling &= slip < 0.02 * 0.70 * np.abs(case["omegaR"])
+        later = (case.time > pressed + 1.0) & rolling
+        # A slide ends with a wheel that rolls, and may leave the wrong idea for some samples.
+        assert np.mean(right[later] > 0.95) > 0.99, case.name
