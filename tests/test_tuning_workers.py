@@ -181,13 +181,13 @@ def test_only_workers_with_the_same_code_get_work(
     warnings: list[str] = []
     with worker(address, lacking), worker(address, other):
         with distributed.Client(address) as client:
-            client.wait_for_workers(2, timeout=60)
+            client.wait_for_workers(2, timeout=120)
         with pytest.raises(InputError, match="code of workbench none, here"):
             DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
         assert len(warnings) == 2
         warnings.clear()
         with worker(address), distributed.Client(address) as client:
-            client.wait_for_workers(3, timeout=60)
+            client.wait_for_workers(3, timeout=120)
             remote = DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
             try:
                 found = run(remote, problem, tmp_path / "remote.json", SMALL)
@@ -215,7 +215,7 @@ def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
 
     path = tmp_path / "checkpoint.json"
     with worker(address):
-        remote = DaskPool(address, Evaluator, problem.job, 60.0)
+        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)  # busy machine
         try:
             part = run(remote, problem, path, SMALL, report=die_in_time, warn=warnings.append)
             with pytest.raises(NoWorkersError, match="does not answer"):
@@ -237,15 +237,15 @@ def test_a_cluster_whose_workers_are_gone_says_so(
 
     address, _ = scheduler
     with worker(address) as process:
-        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=60.0)
+        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)
         remote._patience = 2.0
         process.kill()
         try:
             with pytest.raises(NoWorkersError, match=r"all workers of the cluster .* are gone"):
-                remote.submit(pid).result(timeout=60)
+                remote.submit(pid).result(timeout=120)
             # Another joins too late for this pool.
             with pytest.raises(NoWorkersError):
-                remote.submit(pid).result(timeout=60)
+                remote.submit(pid).result(timeout=120)
         finally:
             remote.close()
 

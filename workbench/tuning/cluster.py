@@ -1,5 +1,6 @@
 """Workers of a Dask cluster; needs the extra [cluster]."""
 
+import asyncio
 import ctypes
 import faulthandler
 import hashlib
@@ -211,16 +212,19 @@ class DaskPool(Generic[State]):
 
     def _attend(self) -> None:
         """Admit who joins, send tasks of those who left to others, and tell when all are lost."""
-        alone = time.monotonic()
+        alone = answered = time.monotonic()
         while not self._closed.wait(_PERIOD):
             try:
                 if self._client.status != "running":
                     raise OSError("no connection")
                 self._admit(self._processes())
-            except Exception as error:  # of many kinds, and whatever it is, it is the scheduler
-                if not self._closed.is_set():
+            except Exception as error:  # of many kinds, and some pass: a machine may be busy
+                silent = time.monotonic() - answered > self._patience
+                if self._client.status == "closed" or silent:
                     self._lose(f"the scheduler at {self._address} does not answer ({error})")
-                return
+                    return
+                continue
+            answered = time.monotonic()
             self._move_tasks()
             if self._ready:
                 alone = time.monotonic()
@@ -289,7 +293,12 @@ class DaskPool(Generic[State]):
                 self._settle(task, NoWorkersError(reason))
 
 
-def _prepare(content: bytes, dask_worker: Worker) -> str:
+async def _prepare(content: bytes, dask_worker: Worker) -> str:
+    """Prepare a worker, in a thread: one that does not answer for half a minute is dropped."""
+    return await asyncio.to_thread(_make_ready, content, dask_worker)
+
+
+def _make_ready(content: bytes, dask_worker: Worker) -> str:
     """Prepare a worker, let it keep its memory, do not look over its shoulder; hash of `content`.
 
     Dask has its workers hand back at once what they free. To get it anew for every piece of a
