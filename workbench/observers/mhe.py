@@ -259,6 +259,12 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
             window=window(round(samples), n, len(system.inputs), outputs, low, high),
         )
 
+    @property
+    def window(self) -> Window:
+        """The problem of the last sample and its solution."""
+        window: Window = self._memory.window
+        return window
+
     def _begin(self, u: Vector, y: Vector) -> None:
         memory, self._memory = self._memory, self._memory.filter
         super()._begin(u, y)
