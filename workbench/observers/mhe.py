@@ -158,21 +158,19 @@ def _move(model, settings, memory, share):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _iterate(model, settings, memory, row):  # type: ignore[no-untyped-def]
-    """One iteration of Gauss and Newton; a status.
+def relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
+    """Move the nodes by the change that was found, as far as it lowers the cost; a status.
 
-    Nodes stay where they are linearised if the change does not lower the cost.
+    Nodes stay where they were linearised if no part of it does.
     """
-    window = memory.window
-    _solve(settings, memory, row)
-    before, share = cost(window), 1.0
+    before, share = cost(memory.window), 1.0
     status = _move(model, settings, memory, share)
-    while not status and not cost(window) <= before + _ROUNDING * (1.0 + before):
+    while not status and share > 0.0:
+        if cost(memory.window) <= before + _ROUNDING * (1.0 + before):
+            break
         less = 0.5 * share if share > _SHORTEST else 0.0
         status = _move(model, settings, memory, less - share)
         share = less
-        if share == 0.0:
-            break
     return status
 
 
@@ -196,7 +194,8 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         window.wider[k, i] = max(1.0, settings.fading * before)
     status = expand(model, settings, memory, k)
     for _ in range(settings.iterations):
-        status = status or _iterate(model, settings, memory, row)
+        _solve(settings, memory, row)
+        status = status or relinearise(model, settings, memory)
     return status or finish(model, settings, memory.filter, row)
 
 

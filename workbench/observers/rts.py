@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
-from workbench.kernel import compiled
+from workbench.kernel import REFUSED, compiled
 from workbench.observers.contract import Estimate
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
@@ -17,8 +17,10 @@ from workbench.observers.kalman import (
     finish,
 )
 from workbench.observers.layout import measure
-from workbench.observers.mhe import append, expand
+from workbench.observers.mhe import append, expand, relinearise
 from workbench.observers.window import Window, assign, assign_rows, end, solve_free, window
+
+_ITERATIONS = 10  # of Gauss and Newton, after that about the filter
 
 
 class SmootherMemory(NamedTuple):
@@ -155,6 +157,10 @@ def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untype
     if status:
         return status
     solve_free(window, settings.layout.seen)
+    for _ in range(_ITERATIONS):
+        if relinearise(model, settings, memory):
+            return REFUSED
+        solve_free(window, settings.layout.seen)
     _smooth(settings, memory)
     return _report(model, settings, memory, u, rows)
 
@@ -163,8 +169,8 @@ class Smoother(ExtendedKalmanFilter):
     """Rauch-Tung-Striebel smoother over a run of the extended filter, with its noise levels.
 
     The recursion of the moving horizon estimator over the whole recording, linearised where the
-    filter was; its way back inverts no covariance. Sample by sample (`step`) nothing is later, and
-    the estimate is that of the filter. NIS is the filter's.
+    filter was and then where it is itself; its way back inverts no covariance. Sample by sample
+    (`step`) nothing is later, and the estimate is that of the filter. NIS is the filter's.
     Sources: H. Rauch, F. Tung, C. Striebel (1965), AIAA J. 3, 1445-1450; G. Bierman (1973),
     Automatica 9, 503-508.
 
