@@ -72,3 +72,16 @@ def test_resampling_keeps_the_recorded_samples(dry_case: Case) -> None:
     _, u, y = resample(dry_case, 1000.0)
     assert_allclose(u[::5], dry_case.u[: len(u[::5])], rtol=1e-9, atol=1e-6)
     assert_allclose(y[::5], dry_case.y[: len(y[::5])], rtol=1e-9, atol=1e-9)
+
+
+def test_a_sample_of_the_moving_horizon_takes_a_twentieth_of_the_same_problem_in_ipopt(
+    system: System, dry_case: Case
+) -> None:
+    """That both find the same cost is part of the measurement; it takes about a thousandth."""
+    pytest.importorskip("casadi")
+    pytest.importorskip("rumoca")
+    from workbench.benchmark.horizon import time_horizon
+
+    times = time_horizon(dry_case, system)
+    assert (times.unknowns, times.samples) == (4, 20)
+    assert times.ratios()["ipopt"] > 20.0

@@ -82,7 +82,7 @@ CASE = 'title = "Pump on and off"\nmeasurement.file = "measured.csv"\n'
 AREA, PIPE, DRAIN = 0.5, 2e-3, 1e-3  # as in the model
 STEP, END, OPENS, SETTLED = 2.0, 6000.0, 2400.0, 4800.0  # [s]
 BEFORE, AFTER = 1e-4, 2.5e-4  # [m3/s] of the leak, which opens
-ESTIMATORS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "imm")
+ESTIMATORS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "mhe", "imm", "rts")
 
 
 def pump(t: float) -> float:
@@ -209,7 +209,7 @@ def test_the_open_loop_model_goes_where_its_own_equations_lead(
     assert_allclose(runs["open_loop"].signal("reading"), expected, rtol=0.01)
 
 
-@pytest.mark.parametrize("name", ["ekf", "ukf"])
+@pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
 def test_filters_are_the_kalman_filter_where_the_model_is_linear(
     fmu: FMU, tanks: System, case: Case, runs: dict[str, Run], name: str
 ) -> None:

@@ -108,7 +108,7 @@ def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
     times = []
     for kind in (kind for kind in choose(system, []).values() if kind.tunable):
         job = tuning_job(kind, system, [case])
-        if not job.gains.design:
+        if kind.adapts:
             continue  # a filter makes its feedback as it goes
         with (
             open_model(system, kind.role) as fmu,

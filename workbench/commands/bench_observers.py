@@ -15,6 +15,7 @@ def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[s
     ----------
     case : of these, on which single observers are timed.
     """
+    from workbench.benchmark.horizon import format_horizon, time_horizon
     from workbench.benchmark.observers import (
         format_observers,
         time_compilation,
@@ -25,10 +26,12 @@ def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[s
     observers = time_observers(case, system)
     processes = time_processes(cases, system)
     compilation = time_compilation(system, case)
-    print(f"\n{format_observers(observers, processes, compilation)}")
+    horizon = time_horizon(case, system)
+    print(f"\n{format_observers(observers, processes, compilation)}\n{format_horizon(horizon)}")
     return {
         "case": case.name,
         "steps": [asdict(row) for row in observers],
         "processes": asdict(processes),
         "compilation": compilation,
+        "horizon": {**asdict(horizon), "ratios": horizon.ratios()},
     }

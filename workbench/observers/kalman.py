@@ -270,7 +270,7 @@ class ExtendedKalmanFilter(Estimator):
         n, q = len(fmu.states), len(system.estimated)
         of_states = gains["model"] * walks(fmu, system)
         initial = [gains["initial"] * one.spread for one in system.estimated]
-        self._settings = FilterSettings(
+        self._settings: Any = FilterSettings(
             layout=self._layout,
             relative=np.array([_share(gains, one.name) for one in system.outputs]),
             floor=np.array([gains[one.name] for one in system.outputs]),

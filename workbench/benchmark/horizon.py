@@ -1,0 +1,155 @@
+"""One sample of the moving horizon estimator beside the same problem in CasADi and IPOPT."""
+
+import statistics
+import time
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from workbench.case import Case
+from workbench.compiler.explicit import StateSpace, make_explicit
+from workbench.compiler.flat import flatten
+from workbench.fmu import FMU, Vector
+from workbench.observers.mhe import MovingHorizonEstimator
+from workbench.observers.window import Window, cost
+from workbench.system import OBSERVER, System
+from workbench.systems import open_model
+
+_SAMPLES = 400  # timed, from the middle of the recording on
+_REPEATS = 7
+_CONVERGED = 50  # iterations
+# IPOPT ends where its conditions hold to 1e-8; costs are sums of about a hundred squares.
+_AGREEMENT = 1e-5
+
+
+@dataclass(frozen=True)
+class HorizonTimes:
+    """Medians over repeats [s].
+
+    Attributes
+    ----------
+    unknowns : states and quantities; samples : of the horizon.
+    ours : of one sample, one iteration.
+    ipopt : of the same problem from its solution on, with exact derivatives of the model.
+    """
+
+    unknowns: int
+    samples: int
+    ours: float
+    ipopt: float
+
+    def ratios(self) -> dict[str, float]:
+        """How many times as long IPOPT takes."""
+        return {"ipopt": self.ipopt / self.ours}
+
+
+def time_horizon(case: Case, system: System) -> HorizonTimes:
+    """Time a window in the middle of a recording, where all bounds are far.
+
+    Raises
+    ------
+    ArithmeticError
+        If IPOPT finds another minimum, because then it solves another problem.
+    """
+    half = case.time.size // 2
+    steps = np.diff(case.time, prepend=case.time[0])
+    with open_model(system) as fmu:
+        estimator = MovingHorizonEstimator(
+            fmu, system, MovingHorizonEstimator.reasoned(fmu, system)
+        )
+        spent = []
+        part = slice(half, half + _SAMPLES)
+        for _ in range(_REPEATS):
+            estimator.start(case.u[0], case.y[0])
+            estimator.advance(steps[:half], case.u[:half], case.y[:half])
+            begin = time.perf_counter()
+            estimator.advance(steps[part], case.u[part], case.y[part])
+            spent.append((time.perf_counter() - begin) / steps[part].size)
+        window = _converged(fmu, system, case)
+        ipopt, value = _solve(window, fmu, system)
+        if not abs(value - cost(window)) <= _AGREEMENT * value:
+            raise ArithmeticError(
+                f"the cost is {cost(window)} by the estimator and {value} by IPOPT, so that their "
+                "times are not those of the same problem"
+            )
+    return HorizonTimes(
+        window.mean.size, int(window.filled[0]), statistics.median(spent), statistics.median(ipopt)
+    )
+
+
+def format_horizon(times: HorizonTimes) -> str:
+    """The measurements in a line."""
+    return (
+        f"moving horizon, {times.samples} samples of {times.unknowns} unknowns: "
+        f"{1e6 * times.ours:.1f} us for a sample; the same problem in CasADi and IPOPT "
+        f"{1e3 * times.ipopt:.1f} ms, {times.ratios()['ipopt']:.0f} times as long"
+    )
+
+
+def _converged(fmu: FMU, system: System, case: Case) -> Window:
+    """The window over the first half of a recording, whose last problem is solved to the end."""
+    gains = MovingHorizonEstimator.reasoned(fmu, system)
+    design = {**gains.design, "iterations": np.array([float(_CONVERGED)])}
+    half = case.time.size // 2
+    estimator = MovingHorizonEstimator(
+        fmu, system, type(gains)(gains.estimator, gains.names, gains.values, design, "")
+    )
+    estimator.run(case.time[:half], case.u[:half], case.y[:half])
+    return estimator.window
+
+
+def _step(space: StateSpace, fmu: FMU, system: System) -> ca.Function:
+    """The linearly implicit step: node, measured inputs and h to where it leads and outputs."""
+    measured, corrections = [one.name for one in system.inputs], list(system.corrections)
+    z = ca.SX.sym("z", len(space.states) + len(corrections))
+    given, h = ca.SX.sym("u", len(measured)), ca.SX.sym("h")
+    n = len(space.states)
+    x, known = z[:n], dict(zip(measured, ca.vertsplit(given), strict=True))
+    known |= dict(zip(corrections, ca.vertsplit(z[n:]), strict=True))
+    u = ca.vertcat(*(known.get(_ours(fmu, v.name), v.start) for v in space.inputs))
+    p = ca.vertcat(*(fmu.defaults.get(_ours(fmu, v.name), v.start) for v in space.parameters))
+    model = ca.Function("model", [space.t, space.x, space.u, space.p], [space.f, space.w])
+    rates, _ = model(0.0, x, u, p)
+    after = x + ca.solve(ca.SX.eye(n) - h * ca.jacobian(rates, x), h * rates)
+    end = ca.vertcat(after, z[n:])
+    _, shown = model(0.0, after, u, p)
+    outputs = {_ours(fmu, v.name): shown[i] for i, v in enumerate(space.outputs)}
+    outputs |= {_ours(fmu, v.name): after[i] for i, v in enumerate(space.states)}
+    seen = ca.vertcat(*(outputs[one.name] for one in system.outputs))
+    return ca.Function("step", [z, given, h], [end, seen])
+
+
+def _ours(fmu: FMU, name: str) -> str:
+    """Name by which the system knows a variable of the model."""
+    ours = {theirs: one for one, theirs in fmu.names.items()}
+    return ours.get(name, name)
+
+
+def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float]:
+    """Times of IPOPT, from the solution on, and the cost that it finds."""
+    model = system.model(OBSERVER)
+    name = f"{system.library.parent.name}.{model.name}"
+    step = _step(make_explicit(flatten(system.library, name)), fmu, system)
+    N, s = int(window.filled[0]), window.mean.size
+    nodes = ca.SX.sym("s", s, N)
+    spread = window.covariance + np.diag(window.noise[0] * window.wider[0])
+    root = np.linalg.cholesky(np.linalg.inv(spread))
+    terms = [root.T @ (nodes[:, 0] - window.mean)]
+    for k in range(N):
+        end, seen = step(nodes[:, k], window.inputs[k], window.steps[k])
+        terms.append((window.samples[k] - seen) / np.sqrt(window.levels[k]))
+        if k + 1 < N:
+            noise = np.sqrt(window.noise[k + 1] * window.wider[k + 1])
+            terms.append((nodes[:, k + 1] - end) / noise)
+    problem = {"x": ca.vec(nodes), "f": ca.sumsqr(ca.vertcat(*terms))}
+    quiet = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+    solver = ca.nlpsol("solver", "ipopt", problem, quiet)
+    low, high = np.tile(window.low, N), np.tile(window.high, N)
+    spent: list[float] = []
+    start: Vector = window.nodes[:N].ravel()
+    for _ in range(_REPEATS):
+        begin = time.perf_counter()
+        found = solver(x0=start, lbx=low, ubx=high)
+        spent.append(time.perf_counter() - begin)
+    return spent, float(found["f"])
