@@ -232,7 +232,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
 
     name = "mhe"
     label = "moving horizon estimator"
-    rank = 47
+    rank = 46
     _law = staticmethod(_law)
     _loop = staticmethod(_loop)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
 from workbench.kernel import REFUSED, compiled
+from workbench.observers.adaptive import reset
 from workbench.observers.contract import Estimate
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
@@ -145,6 +146,7 @@ def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untype
     status = 0
     window, filtered = memory.window, memory.filter
     if steps[0] == 0.0:
+        reset(filtered.levels)
         status = begin(model, settings, filtered, u[0], y[0])
         rows[0, rows.shape[1] - 1] = np.nan
     assign(window.mean, filtered.z)
