@@ -233,6 +233,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
     name = "mhe"
     label = "moving horizon estimator"
     rank = 46
+    standard = False
     _law = staticmethod(_law)
     _loop = staticmethod(_loop)
 
