@@ -132,10 +132,13 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
     held, linked, other = place / "workbench-held", place / "workbench-link", place / "else"
-    held.mkdir()
-    other.mkdir()
+    named = place / "workbench-results"  # by someone who keeps them there
+    for folder in (held, other, named):
+        folder.mkdir()
+        (folder / "file").touch()
+    for folder in (held, other):
+        (folder / ".scratch").touch()
     linked.symlink_to(other)
-    (other / "file").touch()
     lock = os.open(held, os.O_RDONLY)
     fcntl.flock(lock, fcntl.LOCK_EX)
     Scratch().close()
@@ -145,6 +148,8 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
     scratch.sweep.cache_clear()
     Scratch().close()
     assert not held.exists()
+    assert (named / "file").exists()
+    assert (other / "file").exists()
     assert linked.is_symlink()
 
 

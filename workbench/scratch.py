@@ -21,6 +21,7 @@ except ImportError:  # Windows: folders go with their users, but not after a kil
     fcntl = None  # type: ignore[assignment]
 
 _PREFIX = "workbench-"
+_MARK = ".scratch"  # in every folder that is ours: a name alone is no proof
 # Longer paths leave no room for sockets of processes that start others, PLACE/workbench-12345678/
 # pymp-12345678/listener-12345678, which the system limits to 104 bytes.
 _LONGEST = 104 - 52
@@ -47,6 +48,7 @@ class Scratch:
             self.path = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=place))
             if fcntl is None:
                 break
+            (self.path / _MARK).touch()
             # One who sweeps may have been faster; then it is gone.
             lock = _held(self.path, wait=True)
         self._close = weakref.finalize(self, _remove, self.path, lock, os.getpid())
@@ -96,7 +98,7 @@ def sweep(place: str) -> None:
     """Remove folders of ours that nobody holds, once in the life of a process."""
     if fcntl is None:
         return
-    for folder in Path(place).glob(f"{_PREFIX}*"):
+    for folder in (mark.parent for mark in Path(place).glob(f"{_PREFIX}*/{_MARK}")):
         with suppress(OSError):
             lock = _held(folder, wait=False)
             if lock is not None:
