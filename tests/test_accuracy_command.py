@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -269,5 +270,8 @@ def test_command_refuses_a_stop_in_which_no_force_is_built_up(
         lines = (folder / file).read_text().splitlines()
         kept = [lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]
         (folder / file).write_text("\n".join(kept) + "\n")
+    about = folder / "case.toml"  # which would speak of a pressure that the recording never has
+    text = about.read_text()
+    about.write_text(re.sub("brake_pressure = .*", 'brake_pressure = "0.01 bar"', text))
     assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
     assert "ends before its force is built up" in capsys.readouterr().err

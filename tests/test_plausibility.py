@@ -174,12 +174,12 @@ def test_doubts_are_told_by_commands_and_warned_of_in_notebooks(tmp_path, system
 
 def test_a_table_that_cannot_be_is_refused_by_its_column(system, stop):
     _, table = stop
-    frame = pd.DataFrame(cell(table, 10, "pB [bar]", -3.0))
+    frame = pd.DataFrame(cell(table, 10, "pB [bar]", -30.0))
     conditions = {
         **{"initial_speed": "120 km/h", "brake_pressure": "3.6 bar", "wheel_rail": "dry"},
         **{"discs": ["dry"] * 3, "direction": 1},
     }
-    with pytest.raises(InputError, match=r"table 'frame', column 'pB': found -3 bar at 0.05 s"):
+    with pytest.raises(InputError, match=r"table 'frame', column 'pB': found -30 bar at 0.05 s"):
         wb.case_from_frame(system, frame, conditions)
 
 

@@ -126,7 +126,7 @@ def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
         )
     )
     estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
-    cases = {f"case_{k}": {"title": "", "estimators": estimators} for k in range(14)}
+    cases = {f"case_{k}": {"title": "", "estimators": estimators, "doubts": []} for k in range(14)}
     figures = [replace(figure, name=name) for name in cases]
     summary = {"provenance": PROVENANCE, "weights": {"Fx": 1}, "cases": cases}
     write_page(uncertain.system, summary, figures, len(cases), tmp_path / "index.html")

@@ -75,7 +75,14 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 
 def waiting(folder: Path, hostile_path: Path) -> "subprocess.Popen[str]":
     """A check that waits for a model, in the middle of its work."""
-    command = running(folder, "fmu", "check", hostile_path, HOSTILE="wait fmi2Instantiate 10")
+    command = running(
+        folder,
+        "fmu",
+        "check",
+        hostile_path,
+        HOSTILE="wait fmi2Instantiate 10",
+        WORKBENCH_PROOF="answer=300",
+    )
     assert command.stdout is not None
     while "serialised" not in (line := command.stdout.readline()):
         assert line, command.communicate()

@@ -139,7 +139,7 @@ MISTAKES = {
     ),
     # --- what it says of recordings ---
     "range that is none": (
-        ('possible = ["-1 bar", "20 bar"]', 'possible = ["20 bar", "-1 bar"]'),
+        ('possible = ["-20 bar", "20 bar"]', 'possible = ["20 bar", "-20 bar"]'),
         r"\[inputs\.pB\] possible: found .*; expected the lower limit before the upper one",
     ),
     "gaps that are none": (

@@ -259,7 +259,7 @@ def observe_memory(folders: Sequence[Path], system: System) -> TuningMemory:
     with tempfile.TemporaryDirectory() as out:
         where = ["--out", out, "--cases", *map(str, folders)]
         peaks = watch_command([*command, *brief, *where])
-    master, *others = peaks
+    _, master, *others = peaks  # the first is beside the command, to clear up after it
     return TuningMemory(master, max(others), sum(peaks))
 
 

@@ -11,5 +11,5 @@ equation
   assert(abs(hot.T - T - (333.15 - T)*exp(-rate*time/37500.0)) < 1e-4, "Temperature of the disc");
   assert(abs(hot.mu - 0.30*(1.0 - 1e-3*(hot.T - 373.15))) < 1e-12, "Friction at a temperature");
   assert(time < 29.0 or hot.mu < 0.30, "The disc does not get hot");
-  annotation (experiment(StopTime=30.0, Tolerance=1e-8));
+  annotation (experiment(StopTime=30.0, Tolerance=1e-10));
 end FadeFollowsHeat;
