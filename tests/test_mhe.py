@@ -18,7 +18,7 @@ from workbench.observers import Estimate
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.observers.mhe import MovingHorizonEstimator
 from workbench.observers.rts import Smoother
-from workbench.observers.window import cost
+from workbench.observers.window_cost import cost
 from workbench.system import System
 from workbench.systems import load_system, open_model
 

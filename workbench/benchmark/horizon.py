@@ -12,7 +12,8 @@ from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
 from workbench.fmu import FMU, Vector
 from workbench.observers.mhe import MovingHorizonEstimator
-from workbench.observers.window import Window, cost
+from workbench.observers.window import Window
+from workbench.observers.window_cost import cost
 from workbench.system import OBSERVER, System
 from workbench.systems import open_model
 

@@ -23,14 +23,13 @@ from workbench.observers.window import (
     Window,
     assign,
     assign_rows,
-    cost,
     end,
-    reweigh,
     shift,
     solve_free,
     window,
 )
 from workbench.observers.window_bounds import bound
+from workbench.observers.window_cost import cost, reweigh
 from workbench.system import System
 
 HORIZON = 20  # samples
