@@ -15,7 +15,7 @@ from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
 
-_BEGUN = 3  # rounds after which a rival that is far behind is given up
+BEGUN = 3  # rounds after which a rival that is far behind is given up
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
 
@@ -127,18 +127,18 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     begun = [one for one in tried if one is not None]
     if not begun:
         return []
-    misfits = _misfits(begun)
-    near = misfits < fit.decides.behind * misfits.min()
+    left = misfits(begun)
+    near = left < fit.decides.behind * left.min()
 
     def finished(one: Fitted) -> Fitted:
         return fitted(fit, one.linearised, one.active)
 
     ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
     every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
-    return [every[i] for i in np.argsort(_misfits(every)) if _gains(fit, best, every[i])]
+    return [every[i] for i in np.argsort(misfits(every)) if _gains(fit, best, every[i])]
 
 
-def _misfits(fits: Sequence[Fitted]) -> Vector:
+def misfits(fits: Sequence[Fitted]) -> Vector:
     """Chi-squared of each, channels in units of the least that any of them leaves wrong, (f,)."""
     inflation = np.min([one.linearised.inflation for one in fits], axis=0)
     return np.array([one.linearised.weighed(inflation) for one in fits])
@@ -152,7 +152,7 @@ def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | Non
     first, tried = variants[0], []
     halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
     for start in (*variants[:_VARIANTS], *halves):
-        if (one := extended(fit, best, start, _BEGUN)) is None:
+        if (one := extended(fit, best, start, BEGUN)) is None:
             continue
         if _gains(fit, best, one):
             return one

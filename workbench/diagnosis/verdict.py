@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.stats import bootstrap
 
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.search import Fitted, Reporter, Step
+from workbench.diagnosis.search import BEGUN, Fitted, Reporter, Step, extended, misfits
 from workbench.diagnosis.selection import Selection, select
 from workbench.diagnosis.trial import Prospect
 from workbench.fmu import Matrix, Vector
@@ -79,7 +80,7 @@ class Diagnosis:
     ----------
     verdict : see `Verdict`.
     interrupted : whether the search was ended before its end, so that there may be more causes.
-    causes : as found, each explaining most of what those before it leave; empty unless found.
+    causes : that which alone explains most first, of equals the usual one; empty unless found.
     gain : None when nothing was extended.
     partial : effects that explain a part of what remains unexplained.
     base, best : the nominal model and the last one, fitted.
@@ -119,7 +120,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         fast = any(effect.order_locked for effect in best.active)
         before, after = (chosen.validation.squares(one, fast=fast) for one in (base, best))
         gain = _gain(fit.tests, before, after)
-        causes = [_cause(fit, chosen, effect) for effect in best.active]
+        causes = [_cause(fit, chosen, one) for one in _strongest_first(fit, chosen, catalogue)]
     presence = fit.unknowns.presence
     return Diagnosis(
         verdict=verdict,
@@ -135,6 +136,26 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         cosines=chosen.cosines,
         not_visible={one.name: why for one in catalogue if (why := presence.unseen(one))},
     )
+
+
+def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -> Sequence[Effect]:
+    """Causes by what each leaves when it alone is fitted, roughly; of equals the usual one."""
+    causes = chosen.best.active
+    if len(causes) < 2:
+        return causes
+    first, alone = chosen.steps[0], dict[Effect, Fitted]()
+    alone |= {one.active[-1]: one for one in first.rivals}
+    others = [effect for effect in causes if effect not in alone]
+    begun = [next(one for one in first.scores if one.effect is effect) for effect in others]
+    fits = fit.together(partial(extended, fit, chosen.base, rounds=BEGUN), begun)
+    alone |= {effect: one for effect, one in zip(others, fits, strict=True) if one is not None}
+    left = dict(zip(alone, misfits(list(alone.values())), strict=True))
+    ordered = list[Effect]()
+    while rest := [effect for effect in causes if effect not in ordered]:
+        least = min(left.get(effect, np.inf) for effect in rest)
+        equals = [one for one in rest if left.get(one, np.inf) <= least + fit.decides.tied]
+        ordered.append(min(equals, key=catalogue.index))
+    return ordered
 
 
 def _share(before: Fitted, after: Fitted) -> float:
