@@ -103,7 +103,7 @@ def test_a_cluster_finds_the_same_gains(
 
     job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
-    options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
+    options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
     with distributed.LocalCluster(processes=False, **options) as cluster:
         remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
         try:
@@ -129,7 +129,9 @@ def dask(*arguments: str, path: Path | None = None) -> Iterator[subprocess.Popen
     environment = {**os.environ, "PYTHONPATH": str(here)}
     command = [sys.executable, "-m", f"distributed.cli.dask_{arguments[0]}", *arguments[1:]]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen([*command, "--no-dashboard"], env=environment, cwd=here, **quiet)
+    process = subprocess.Popen(
+        [*command, "--dashboard-address", ":0"], env=environment, cwd=here, **quiet
+    )
     try:
         yield process
     finally:

@@ -225,7 +225,7 @@ def _cluster(job: Job) -> Iterator[Workers]:
     # Workers need a third of a gigabyte each, which nobody has to watch ten times a second.
     size = {"n_workers": WORKERS, "threads_per_worker": 1, "memory_limit": 0}
     with (
-        LocalCluster(**size, dashboard_address=None) as cluster,
+        LocalCluster(**size, dashboard_address=":0") as cluster,
         closing(DaskPool(cluster.scheduler_address, Evaluator, job, LIMIT)) as pool,
     ):
         yield pool
