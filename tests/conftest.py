@@ -98,14 +98,16 @@ def published_cases(
 
 @pytest.fixture
 def ctrl_c() -> Iterator[None]:
-    """Programs that a test starts hear Ctrl-C, also where the suite itself does not.
+    """Programs that a test starts hear Ctrl-C and a lost terminal, also where the suite does not.
 
-    A shell without job control has what it starts in the background ignore it, and that is handed
-    on to every program started from there.
+    A shell without job control has what it starts in the background ignore the one, nohup the
+    other, and that is handed on to every program started from there.
     """
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    heard = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in heard.items()}
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 # --- tuning ---

@@ -17,7 +17,6 @@ from workbench.fmu import FMU, Matrix, Vector
 from workbench.observers import Estimate
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.observers.mhe import MovingHorizonEstimator
-from workbench.observers.rts import Smoother
 from workbench.observers.window_cost import cost
 from workbench.system import System
 from workbench.systems import load_system, open_model
@@ -305,27 +304,3 @@ def test_more_iterations_never_raise_the_cost(bent: tuple[FMU, System], seed: in
         costs.append(cost(estimator._memory.window))
     # Rounding of a sum of about a hundred squares; steps are refused beyond 1e-9 of it.
     assert (np.diff(costs) <= 1e-6 * costs[0]).all()
-
-
-def test_the_smoother_is_the_batch_least_squares_solution(linear: tuple[FMU, System]) -> None:
-    """Reference: the dense problem of a linear model, by an orthogonal factorisation."""
-    samples = recording("Linear", 60)
-    unit = np.tile([0.01, 0.01, 1e-5], 59)
-    offset = residuals(np.zeros(unit.size), "Linear", samples)[0]
-    columns = [residuals(column, "Linear", samples)[0] - offset for column in np.diag(unit)]
-    matrix = np.column_stack(columns)
-    best = np.linalg.lstsq(matrix, -offset, rcond=None)[0] * unit
-    factor = np.linalg.qr(matrix, mode="r")
-    spread = np.linalg.norm(np.linalg.inv(factor), axis=1) * unit
-    fmu, known = linear
-    smoother = Smoother(fmu, known, ExtendedKalmanFilter.reasoned(fmu, known))
-    found = smoother.run(*samples)
-    ends = residuals(best, "Linear", samples)[1]
-    h1, dleak = found.values[1:, 1], found.values[1:, 2]
-    # Rounding, grown by a condition number of 1e3.
-    assert_allclose(h1, ends[:, 0], rtol=1e-10)
-    assert_allclose(dleak, ends[:, 2], rtol=0, atol=1e-10 * 1e-4)
-    assert_allclose(found.sigma[1:, 2], spread.reshape(-1, 3)[:, 2], rtol=1e-9)
-    filtered = kalman(*linear, samples)
-    assert (found.sigma[1:] <= filtered.sigma[1:] * (1.0 + 1e-12)).all()
-    assert_allclose(found.values[-1], filtered.values[-1], rtol=1e-12)

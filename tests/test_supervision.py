@@ -91,6 +91,7 @@ def waiting(folder: Path, hostile_path: Path) -> "subprocess.Popen[str]":
 
 
 @needs_compiler
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)]
 )
