@@ -6,11 +6,14 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import fmpy
 import pytest
+
+from .processes import ending
 
 NAME = "MinimalObserver"
 COMPILER = shutil.which("cc") or shutil.which("gcc")
@@ -64,11 +67,14 @@ def workbench(
     return subprocess.CompletedProcess(process.args, process.returncode, out, errors)
 
 
-def running(folder: Path, *arguments: str | Path, **environment: str) -> "subprocess.Popen[str]":
-    """Start the command line; see `workbench`."""
+@contextmanager
+def running(
+    folder: Path, *arguments: str | Path, **environment: str
+) -> "Iterator[subprocess.Popen[str]]":
+    """Run the command line beside the block; see `workbench`."""
     (folder / "tmp").mkdir(exist_ok=True)
     usual = {"TMPDIR": str(folder / "tmp"), "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(
+    command = subprocess.Popen(
         [sys.executable, "-m", "workbench", *map(str, arguments)],
         cwd=folder,
         env={**os.environ, **usual, **environment},
@@ -77,3 +83,5 @@ def running(folder: Path, *arguments: str | Path, **environment: str) -> "subpro
         text=True,
         start_new_session=True,
     )
+    with ending(command):
+        yield command

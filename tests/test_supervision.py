@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -73,21 +74,16 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 # --- signals ---
 
 
-def waiting(folder: Path, hostile_path: Path) -> "subprocess.Popen[str]":
+@contextmanager
+def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]]":
     """A check that waits for a model, in the middle of its work."""
-    command = running(
-        folder,
-        "fmu",
-        "check",
-        hostile_path,
-        HOSTILE="wait fmi2Instantiate 10",
-        WORKBENCH_PROOF="answer=300",
-    )
-    assert command.stdout is not None
-    while "serialised" not in (line := command.stdout.readline()):
-        assert line, command.communicate()
-    assert comes_true(lambda: len(left(folder)) > 0)
-    return command
+    plan = {"HOSTILE": "wait fmi2Instantiate 10", "WORKBENCH_PROOF": "answer=300"}
+    with running(folder, "fmu", "check", hostile_path, **plan) as command:
+        assert command.stdout is not None
+        while "serialised" not in (line := command.stdout.readline()):
+            assert line, command.communicate()
+        assert comes_true(lambda: len(left(folder)) > 0)
+        yield command
 
 
 @needs_compiler
@@ -162,9 +158,9 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
 
 
 def test_folders_of_living_processes_stay(place: Path) -> None:
-    with Scratch() as mine:
+    with closing(Scratch()) as mine:
         scratch.sweep.cache_clear()
-        with Scratch() as second:
+        with closing(Scratch()) as second:
             assert mine.path.exists()
             assert second.path != mine.path
     assert list(place.iterdir()) == []

@@ -24,7 +24,8 @@ _MOST_OF_DESCRIPTION = 64 << 20  # 0.4 kB a variable: 150 000 variables
 _HIGHEST_RATIO, _LITTLE = 100, 16 << 20
 _FORBIDDEN = re.compile(r"[\x00-\x1f\\]|^/|^[A-Za-z]:|(^|/)\.{1,2}(/|$)|//")
 _PIECE = 1 << 20
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError)
+# The last one is of a compression that zipfile does not know, or of a password.
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
 
 
 @contextmanager

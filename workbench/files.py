@@ -71,7 +71,7 @@ def _lock(descriptor: int, folder: Path) -> None:
 
 def _prove_room(folder: Path) -> None:
     with TemporaryFile(dir=folder) as probe:
-        os.posix_fallocate(probe.fileno(), 0, _ROOM)
+        probe.write(bytes(_ROOM))
 
 
 def prove_writable(path: Path) -> None:

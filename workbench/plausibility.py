@@ -83,27 +83,15 @@ def doubts(
     found = list(_ranges(time, signals, system, origin))
     _refuse(found)  # what is out of range has no use in formulas
     with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
-        found += _contradictions(time, signals, conditions, system, origin)
+        for check in (
+            _still(signals, system, origin),
+            _sampling(time, system, origin),
+            _redundancies(time, signals, system, origin),
+            _conditions(signals, conditions, system, origin),
+        ):
+            found += check
     _refuse(found)
     return tuple(str(one.refusal()) for one in found)
-
-
-def _contradictions(
-    time: Vector,
-    signals: Mapping[str, Vector],
-    conditions: Mapping[str, Any],
-    system: System,
-    origin: Origin,
-) -> list[_Finding]:
-    found: list[_Finding] = []
-    for check in (
-        _still(signals, system, origin),
-        _sampling(time, system, origin),
-        _redundancies(time, signals, system, origin),
-        _conditions(signals, conditions, system, origin),
-    ):
-        found += check
-    return found
 
 
 def _refuse(found: list[_Finding]) -> None:

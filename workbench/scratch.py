@@ -9,11 +9,9 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 try:
     import fcntl
@@ -29,7 +27,7 @@ _SHORT = "/tmp"
 
 
 class Scratch:
-    """A temporary folder, removed by `close`, at the end of a `with`, or with the process.
+    """A temporary folder, removed by `close` or with the process.
 
     Parameters
     ----------
@@ -57,22 +55,11 @@ class Scratch:
         """Remove the folder."""
         self._close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
 
 @contextmanager
 def scratch_folder() -> Iterator[str]:
     """Path of a temporary folder of ours, for as long as the context lasts."""
-    with Scratch() as scratch:
+    with closing(Scratch()) as scratch:
         yield str(scratch.path)
 
 
@@ -81,7 +68,8 @@ def own_temporary_files() -> Iterator[Path]:
     """Have all temporary files of this process and its children in a folder of ours."""
     before = tempfile.tempdir, os.environ.get("TMPDIR")
     place = tempfile.gettempdir()
-    with Scratch(_SHORT if len(place) > _LONGEST and os.path.isdir(_SHORT) else place) as scratch:
+    short = len(place) > _LONGEST and os.path.isdir(_SHORT)
+    with closing(Scratch(_SHORT if short else place)) as scratch:
         tempfile.tempdir = os.environ["TMPDIR"] = str(scratch.path)
         try:
             yield scratch.path

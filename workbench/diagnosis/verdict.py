@@ -143,12 +143,12 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     causes = chosen.best.active
     if len(causes) < 2:
         return causes
-    first, alone = chosen.steps[0], dict[Effect, Fitted]()
-    alone |= {one.active[-1]: one for one in first.rivals}
-    others = [effect for effect in causes if effect not in alone]
-    begun = [next(one for one in first.scores if one.effect is effect) for effect in others]
+    first = chosen.steps[0]
+    alone = {one.active[-1]: one for one in first.rivals}
+    best = {one.effect: one for one in reversed(first.scores)}  # of its shapes
+    begun = [best[effect] for effect in causes if effect in best and effect not in alone]
     fits = fit.together(partial(extended, fit, chosen.base, rounds=BEGUN), begun)
-    alone |= {effect: one for effect, one in zip(others, fits, strict=True) if one is not None}
+    alone |= {one.active[-1]: one for one in fits if one is not None}
     left = dict(zip(alone, misfits(list(alone.values())), strict=True))
     ordered = list[Effect]()
     while rest := [effect for effect in causes if effect not in ordered]:

@@ -72,7 +72,7 @@ class HorizonMemory(NamedTuple):
 
 
 @inlined
-def append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     """Add a node where the estimate stands, and the sample that its step leads to."""
     window, held = memory.window, memory.held
     if window.filled[0] == window.steps.size:
@@ -93,11 +93,12 @@ def append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
         window.nodes[k, i] = memory.filter.z[i]
         window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
         window.active[k, i] = 0
-        window.wider[k, i] = 1.0
+        before = window.wider[k - 1, i] if k > 0 else window.older[i]
+        window.wider[k, i] = max(1.0, settings.fading * before)
 
 
 @inlined
-def expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
+def _expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
     """Take and linearise the step from a node, and the outputs there; returns a status."""
     window, layout, n = memory.window, settings.layout, model.x.size
     arrived, h = window.arrived[k], window.steps[k]
@@ -152,12 +153,12 @@ def _move(model, settings, memory, share):  # type: ignore[no-untyped-def]
     for k in range(window.filled[0]):
         for i in range(memory.filter.z.size):
             window.nodes[k, i] += share * window.change[k, i]
-        status = status or expand(model, settings, memory, k)
+        status = status or _expand(model, settings, memory, k)
     return status
 
 
 @compiled
-def relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
+def _relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
     """Move the nodes by the change that was found, as far as it lowers the cost; a status.
 
     Nodes stay where they were linearised if no part of it does.
@@ -186,15 +187,11 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         assign(window.mean, memory.filter.z)
         assign_rows(window.covariance, memory.filter.P)
         return status or finish(model, settings, memory.filter, row)
-    append(settings, memory, h, u, y)
-    k = window.filled[0] - 1
-    for i in range(memory.filter.z.size):
-        before = window.wider[k - 1, i] if k > 0 else window.older[i]
-        window.wider[k, i] = max(1.0, settings.fading * before)
-    status = expand(model, settings, memory, k)
+    _append(settings, memory, h, u, y)
+    status = _expand(model, settings, memory, window.filled[0] - 1)
     for _ in range(settings.iterations):
         _solve(settings, memory, row)
-        status = status or relinearise(model, settings, memory)
+        status = status or _relinearise(model, settings, memory)
     return status or finish(model, settings, memory.filter, row)
 
 
