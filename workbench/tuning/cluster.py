@@ -33,6 +33,7 @@ Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
 
 _ANSWER = 5.0  # [s] for the scheduler to answer
+_SILENCE = 30.0  # [s] after which one that does not is dead: a machine may be busy
 _PATIENCE = 30.0  # [s] in which a cluster starts a worker
 _PERIOD = 0.5  # [s] between two looks at who is there
 _TRIALS = 3  # workers that a task may end, as of Dask's own
@@ -218,8 +219,8 @@ class DaskPool(Generic[State]):
                 if self._client.status != "running":
                     raise OSError("no connection")
                 self._admit(self._processes())
-            except Exception as error:  # of many kinds, and some pass: a machine may be busy
-                silent = time.monotonic() - answered > self._patience
+            except Exception as error:  # of many kinds, and some pass
+                silent = time.monotonic() - answered > _SILENCE
                 if self._client.status == "closed" or silent:
                     self._lose(f"the scheduler at {self._address} does not answer ({error})")
                     return
@@ -234,7 +235,9 @@ class DaskPool(Generic[State]):
 
     def _processes(self) -> dict[str, str]:
         """Process of each worker by address; a worker that is started again has another one."""
-        workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        # Not of `scheduler_info`: what it asks for, the client's own look without workers replaces.
+        asked = partial(self._client.scheduler.identity, n_workers=-1)
+        workers = self._client.sync(asked, callback_timeout=_ANSWER)["workers"]
         return {address: str(one["id"]) for address, one in workers.items()}
 
     def _admit(self, present: Mapping[str, str]) -> None:
@@ -314,7 +317,8 @@ def _make_ready(content: bytes, dask_worker: Worker) -> str:
     threadpool_limits(1)
     before: _Ready | None = getattr(dask_worker, "workbench", None)
     if before is not None:
-        before.stack.close()
+        with before.turn:  # what it works on for another client needs the model
+            before.stack.close()
     begin, given, limit = pickle.loads(content)
     faulthandler.dump_traceback_later(_PREPARATION, exit=True)
     stack = ExitStack()
