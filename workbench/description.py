@@ -200,7 +200,8 @@ def read_description(path: Path) -> Description:
     try:
         _refuse_entities(xml)
         root = ElementTree.fromstring(xml)
-        found = fmpy.read_model_description(str(path), validate=False)
+        with path.open("rb") as stream:  # FMPy leaves a file open that it opened and refused
+            found = fmpy.read_model_description(stream, validate=False)
     except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
         raise damaged(path, error) from None
     if found.fmiVersion not in ("2.0", "3.0"):
