@@ -1,6 +1,7 @@
 """What several test files share: the repository's own FMUs, cases and sources."""
 
 import json
+import multiprocessing.util
 import shutil
 import signal
 import subprocess
@@ -35,6 +36,10 @@ from .recordings import record  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
+
+# Its sockets stay where the first of them was, which may be no folder of one test: that has a long
+# name, and goes.
+multiprocessing.util.get_temp_dir()
 
 
 @pytest.fixture(scope="session")
