@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from workbench import files
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.files import claimed, prove_writable, spared, write_whole
@@ -103,6 +104,14 @@ def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) 
             pass
     finally:
         os.kill(child, signal.SIGKILL)
+
+
+def test_where_folders_cannot_be_locked_results_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files, "fcntl", None)
+    with claimed(tmp_path / "new"):
+        assert list((tmp_path / "new").iterdir()) == []
 
 
 def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> None:

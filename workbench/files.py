@@ -1,6 +1,5 @@
 """Results on the disk: a file is as before or complete, whatever happens while it is written."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -13,6 +12,11 @@ from tempfile import TemporaryFile
 from typing import Any, BinaryIO
 
 from workbench.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows locks no folders: there a second run is not refused
+    fcntl = None  # type: ignore[assignment]
 
 _ROOM = 5_000_000  # [byte] of a page with its curves, the largest of the usual results
 _SEAL = "checksum"  # SHA-256, name of its entry
@@ -34,6 +38,22 @@ def claimed(folder: Path) -> Iterator[None]:
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(0, "a file, and no folder")
         folder.mkdir(parents=True, exist_ok=True)
+    with _locked(folder):
+        with _told(folder):
+            for left in folder.iterdir():
+                if _PART.fullmatch(left.name):
+                    left.unlink()
+            _prove_room(folder)
+        yield
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a folder; the kernel lets go of it after any end of this process."""
+    if fcntl is None:
+        yield
+        return
+    with _told(folder):
         lock = [os.open(folder, os.O_RDONLY)]
 
     def release() -> None:
@@ -44,18 +64,12 @@ def claimed(folder: Path) -> Iterator[None]:
     os.register_at_fork(after_in_child=release)
     try:
         _lock(lock[0], folder)
-        with _told(folder):
-            for left in folder.iterdir():
-                if _PART.fullmatch(left.name):
-                    left.unlink()
-            _prove_room(folder)
         yield
     finally:
         release()
 
 
 def _lock(descriptor: int, folder: Path) -> None:
-    """Lock a folder until its descriptor is closed; the kernel lets go of it after any end."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
