@@ -80,6 +80,18 @@ MISTAKES = {
         ("\nwet = { muWR = 0.28", "\nicy = { muWR = 0.28"),
         r"parameters icy: .* expected one of dry, wet",
     ),
+    "parameter of a choice that is no number": (
+        ("\nwet = { muWR = 0.28", "\nwet = { muWR = [0.28]"),
+        r"parameters wet.* muWR: found \[0\.28\]; expected a number",
+    ),
+    "signal without a size": (
+        ('scale = "3 bar"', 'scale = "-0 bar"'),
+        r"\[inputs\.pB\] scale: found .*; expected a size above 0",
+    ),
+    "name that no file can have": (
+        ("MinimalObserver.fmu", f"{'9' * 300}.fmu"),
+        "9999.fmu: found no such file",
+    ),
     "role without a class": (
         ('{ class = "FullObserver", fmu', "{ fmu"),
         r"\[models\.full\]: found no 'class'; expected a text 'class'",

@@ -184,7 +184,11 @@ def read_description(path: Path) -> Description:
     InputError
         If the file is no FMU of FMI 2.0 or 3.0.
     """
-    if not path.is_file():
+    try:
+        found_one = path.is_file()
+    except OSError:  # of names that no file can have
+        found_one = False
+    if not found_one:
         raise InputError(
             where=str(path),
             found="no such file",

@@ -81,6 +81,9 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
             raise table.wrong(
                 "noise", "a standard deviation above 0; only inputs are exactly known"
             )
+        scale = table.number("scale", unit)
+        if not scale > 0.0:
+            raise table.wrong("scale", "a size above 0")
         found.append(
             Signal(
                 name=name,
@@ -90,7 +93,7 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
                 noise=noise,
                 relative_noise=relative,
                 relative_error=table.number("relative_error", "1", relative),
-                scale=table.number("scale", unit),
+                scale=scale,
                 scale_error=table.number("scale_error", "1", 0.0),
                 reading=table.text("reading", name),
                 mode=read_mode(table.table("mode")) if "mode" in table else None,
@@ -202,7 +205,8 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                 count=own.take("count", int) if "count" in own else 0,
                 parameters={
                     choice: {
-                        key: float(value) for key, value in parameters.take(choice, dict).items()
+                        key: parameters.table(choice).number(key, "1")
+                        for key in parameters.take(choice, dict)
                     }
                     for choice in parameters.content
                 },
