@@ -63,7 +63,7 @@ fmus: $(VENV)/dev.stamp
 	$(RUN) -m workbench fmu build --all --compiler $(COMPILER)
 
 bench: $(VENV)/dev.stamp
-	$(RUN) -m workbench bench --json results/bench/bench.json
+	$(RUN) -m workbench bench --out results/bench
 
 test: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff format --check .
