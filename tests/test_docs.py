@@ -150,6 +150,29 @@ def test_the_citation_names_this_version() -> None:
     )
 
 
+def test_the_readme_says_what_the_table_says() -> None:
+    """The worst of each column, in the digits that the README has."""
+    rows = re.findall(
+        r"^\| \d\d_\S+ \| (.*) \|$", (ROOT / "docs" / "accuracy.md").read_text(), re.M
+    )
+    columns = zip(
+        *([float(cell.removesuffix(" %")) for cell in row.split(" | ")] for row in rows),
+        strict=True,
+    )
+    loop, inversion, *observers = map(max, columns)
+    assert len(rows) == 14
+    text = " ".join((ROOT / "README.md").read_text().split())
+    assert f"open loop up to {loop:.0f} %, direct inversion up to {inversion:.1f} %" in text
+    assert f"observers with fixed gains up to {max(observers[:2]):.1f} %" in text
+    assert f"the Kalman filters up to {max(observers[2:]):.2f} %" in text
+
+
+def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis() -> None:
+    picture = ROOT / "docs" / "pictures" / "diagnosis.svg"
+    assert picture.stat().st_size < 200_000
+    assert "matplotlib" in picture.read_text()
+
+
 def test_calls_are_read_as_a_shell_does() -> None:
     code = "workbench tune ekf \\\n  --budget 2  # quick\nworkbench doctor --json > doctor.json\n"
     assert list(calls(code)) == [["tune", "ekf", "--budget", "2"], ["doctor", "--json"]]
