@@ -14,7 +14,7 @@ LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/c
 LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
 	| xargs -0 sha256sum | sha256sum | cut -c 1-64
 
-.PHONY: help simulate tune diagnose power cases fmus bench fuzz chaos test test-long test-changed clean
+.PHONY: help simulate tune diagnose power cases fmus bench docs fuzz chaos test test-long test-changed clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -26,6 +26,7 @@ help:
 	@echo "make fmus       build the FMUs from modelica/ (Modelica compiler, C cross-compiler);"
 	@echo "                COMPILER=omc: with OpenModelica where it is installed, into build/omc"
 	@echo "make bench      time calls into the FMUs against plain C, results in results/bench"
+	@echo "make docs       the documentation as a site for any static host, in build/site; no network"
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
 	@echo "make test       format, lint, types, import layers, FMUs against sources, tests"
@@ -39,7 +40,7 @@ $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/run.stamp
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[dev,compiler,cluster]"
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[dev,compiler,cluster,completion,docs]"
 	@touch $@
 
 simulate: $(VENV)/run.stamp
@@ -62,8 +63,11 @@ cases: $(VENV)/run.stamp
 fmus: $(VENV)/dev.stamp
 	$(RUN) -m workbench fmu build --all --compiler $(COMPILER)
 
+docs: $(VENV)/dev.stamp
+	$(RUN) -m mkdocs build --strict
+
 bench: $(VENV)/dev.stamp
-	$(RUN) -m workbench bench --json results/bench/bench.json
+	$(RUN) -m workbench bench --out results/bench
 
 test: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff format --check .

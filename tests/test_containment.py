@@ -242,7 +242,7 @@ def test_an_fmu_that_does_not_answer_is_neither_fit_nor_unfit(
 ) -> None:
     plan(f"wait {CALL} 1")
     monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
-    file = tmp_path / "fitness.json"
-    assert main(["fmu", "check", str(hostile_path), "--json", str(file)]) == 3
+    assert main(["fmu", "check", str(hostile_path)]) == 3
     assert "evil.fmu (WheelsetRig.MinimalObserver): not measured" in capsys.readouterr().out
-    assert json.loads(file.read_text())["fit"] is None
+    assert main(["fmu", "check", str(hostile_path), "--json"]) == 3
+    assert json.loads(capsys.readouterr().out)["result"]["fit"] is None

@@ -37,10 +37,10 @@ def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_
     arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
     command = [sys.executable, "-m", "workbench", *arguments]
     searches = 0
-    search = subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True)
+    search = subprocess.Popen(command, cwd=root, stderr=subprocess.PIPE, text=True)
     with ending(search) as run:
-        assert run.stdout is not None
-        for line in run.stdout:
+        assert run.stderr is not None
+        for line in run.stderr:
             searches += "signatures" in line
             if searches == 2 and "signatures" in line:
                 run.send_signal(signal.SIGINT)

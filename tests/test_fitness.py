@@ -254,25 +254,26 @@ def test_command_describes_an_fmu_without_model_exchange(
     assert re.search(r"^pB +input +0\.0 +Pa +Brake cylinder pressure$", printed, re.MULTILINE)
 
 
-def test_command_writes_what_it_describes(minimal_path: Path, tmp_path: Path) -> None:
-    file = tmp_path / "info.json"
-    assert main(["fmu", "info", str(minimal_path), "--json", str(file)]) == 0
-    written = json.loads(file.read_text())
+def test_command_tells_programs_what_it_describes(
+    minimal_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fmu", "info", str(minimal_path), "--json"]) == 0
+    written = json.loads(capsys.readouterr().out)["result"]
     with FMU(minimal_path) as fmu:
         assert written["sha256"] == fmu.sha256
         assert written["states"] == list(fmu.states)
         assert {v["name"]: v["unit"] for v in written["variables"]} == fmu.units
 
 
-def test_command_writes_findings_and_ends_with_0_for_a_fit_fmu(
-    minimal_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_command_tells_findings_and_ends_with_0_for_a_fit_fmu(
+    minimal_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "new" / "fitness.json"
-    arguments = ["fmu", "check", str(minimal_path), "--json", str(file), "--instantiations", "5"]
-    assert main(arguments) == 0
-    written = json.loads(file.read_text())
+    arguments = ["fmu", "check", str(minimal_path), "--instantiations", "5"]
+    assert main([*arguments, "--json"]) == 0
+    written = json.loads(capsys.readouterr().out)["result"]
     assert written["fit"] is True
     assert written["fmu"]["fmi"] == "2.0"
+    assert main(arguments) == 0
     printed = capsys.readouterr().out
     assert all(finding["name"] in printed for finding in written["findings"])
 

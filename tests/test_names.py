@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from workbench.case import Case, read_case
-from workbench.commands.arguments import model_names
+from workbench.commands.inputs import model_names
 from workbench.cosim import Ending, replay
 from workbench.description import read_description
 from workbench.errors import InputError

@@ -43,8 +43,9 @@ def refused(command: str, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """What is said when a command cannot write; nothing of its work is begun."""
     assert main([*COMMANDS[command], "--out", str(out)]) == 2
     told = capsys.readouterr()
-    assert "s left" not in told.out
-    assert "done" not in told.out
+    assert "s left" not in told.err
+    assert "done" not in told.err
+    assert told.out == ""
     return told.err
 
 

@@ -351,8 +351,25 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
 
 
+def test_one_effect_at_one_size_is_one_set() -> None:
+    one = Repertoire(REPERTOIRE.plantables[:1], REPERTOIRE.effects)
+    (group,) = plan(one, 0, [4.0], 1, 5, 1)
+    (planted,) = group
+    assert planted.multiple == 4.0
+    assert list(planted.gains) == [one.plantables[0].name]
+    # What a set is does not depend on how many others there are.
+    assert group in plan(REPERTOIRE, 3, [4.0, 8.0], 2, 5, 1)
+
+
 @pytest.mark.parametrize(
-    "arguments", [["--sizes", "0"], ["--clean", "-1"], ["--case", "16_nowhere"]]
+    "arguments",
+    [
+        ["--sizes", "0"],
+        ["--clean", "-1"],
+        ["--case", "16_nowhere"],
+        ["--effects", "BrakeFadee"],
+        ["--clean", "0", "--pairs", "0", "--repeats", "0"],
+    ],
 )
 def test_command_refuses_what_makes_no_sense(
     arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

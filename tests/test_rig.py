@@ -201,7 +201,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def arguments(out: Path, *more: str) -> list[str]:
     cases = ["--case", "03_dry_120_3.6", "--case", "10_wet_100_2.7_rev"]
-    return ["rig", *cases, "--fmu", str(REFERENCE), "--out", str(out), *more]
+    return ["rig", *cases, "--reference", str(REFERENCE), "--out", str(out), *more]
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -217,7 +217,7 @@ def test_same_seed_gives_the_same_bytes_with_any_number_of_workers(
 
 
 def test_a_case_does_not_depend_on_which_others_are_made(recordings: Path, tmp_path: Path) -> None:
-    alone = ["rig", "--case", "10_wet_100_2.7_rev", "--fmu", str(REFERENCE)]
+    alone = ["rig", "--case", "10_wet_100_2.7_rev", "--reference", str(REFERENCE)]
     assert main([*alone, "--out", str(tmp_path)]) == 0
     name = "10_wet_100_2.7_rev/measured.csv"
     assert files(tmp_path)[name] == files(recordings)[name]
@@ -280,14 +280,14 @@ def test_scenarios_are_named_with_or_without_number() -> None:
         (["--effect", "cylinder_lag=-1"], r"0 or more"),
         (["--effect", "fade=1", "--effect", "fade=2"], r"second gain"),
         (["--rate", "300"], r"divisor of 1000"),
-        (["--fmu", "missing.fmu"], r"missing\.fmu"),
-        (["--fmu", str(ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu")], r"no variable"),
+        (["--reference", "missing.fmu"], r"missing\.fmu"),
+        (["--reference", str(ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu")], r"no variable"),
     ],
 )
 def test_a_users_mistake_gives_status_2_and_a_message(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], match: str
 ) -> None:
-    command = ["rig", "--fmu", str(REFERENCE), "--out", str(tmp_path / "out"), *options]
+    command = ["rig", "--reference", str(REFERENCE), "--out", str(tmp_path / "out"), *options]
     assert main(command) == 2
     message = capsys.readouterr().err
     assert re.search(match, message), message
@@ -314,8 +314,8 @@ def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
         start_new_session=True,
     )
     with ending(process):
-        assert process.stdout is not None
-        first = process.stdout.readline()
+        assert process.stderr is not None
+        first = process.stderr.readline()
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
         rest, errors = process.communicate(timeout=30)
     assert first.startswith("[  1/14]")

@@ -21,7 +21,7 @@ COMMAND = [
     "1",
     "--truth-every",
     "4",
-    "--fmu",
+    "--reference",
     str(ROOT / "fmus" / "fmi2" / "Reference.fmu"),
 ]
 

@@ -168,9 +168,9 @@ def test_results_keep_their_contract(
     monkeypatch.chdir(root)
     arguments = command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")
     assert main(arguments) == 0
-    printed = capsys.readouterr().out
-    assert "evaluations/s" in printed
-    assert "of work saved" in printed
+    printed, told = capsys.readouterr()
+    assert "evaluations/s" in told
+    assert "of work saved" in told
     assert "not seen: 03_dry_120_3.6" in printed
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert set(summary["gains"]) == {f"L{i}{j}" for i in (1, 2) for j in (1, 2, 3, 4)}

@@ -9,11 +9,10 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-import workbench.commands
-from workbench.companion import companion_part
+from workbench.commands.options import command_line
+from workbench.commands.output import Output
 from workbench.confinement import confine
 from workbench.errors import FMUError, InputError, WorkerError
-from workbench.installed import companions
 from workbench.supervision import run_program, supervised
 
 _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(run_confined())"
@@ -46,47 +45,28 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     confined : whether what --isolated asks for is so already.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    options = _parser(given[0] if given else "").parse_args(given)
+    command = next((word for word in given if not word.startswith("-")), "")
+    parser = command_line(version("wheelset-workbench"), command)
+    options = parser.parse_args(given)
+    output = Output(getattr(options, "json", False), getattr(options, "quiet", False))
     try:
         if getattr(options, "isolated", False) and not confined:
             folders = json.dumps([str(folder) for folder in _written(options)])
             return run_program([sys.executable, "-c", _CONFINED, folders, *given])
-        return int(options.run(options))
+        return output.close(command, import_module(options.work).run(options, output))
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        return output.fail(command, 2, error)
     except (FMUError, WorkerError, OSError) as error:
         # OSError: of the machine, such as a full temporary folder.
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+        return output.fail(command, 1, error)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
+        return output.fail(command, 130, "interrupted")
 
 
 def _written(options: argparse.Namespace) -> list[Path]:
     """Folders that a command writes to."""
     chosen = vars(options)
-    out = [chosen["out"] or Path("results")] if "out" in chosen else []
-    return [*out, *([chosen["json"].parent] if chosen.get("json") else [])]
-
-
-def _parser(command: str) -> argparse.ArgumentParser:
-    """Parser of the command line, which knows the arguments of one command only."""
-    parser = argparse.ArgumentParser(
-        prog="workbench",
-        description="Observers, their tuning, and a diagnosis of models, on FMUs.",
-    )
-    parser.add_argument("--version", action="version", version=version("wheelset-workbench"))
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    parts = [companion_part(name, "commands") for name in companions()]
-    for package in (workbench.commands, *(part for part in parts if part)):
-        for name, text in package.COMMANDS.items():
-            if name == command:
-                import_module(f"{package.__name__}.{name}").add(commands)
-            else:
-                commands.add_parser(name, help=text)
-    return parser
+    return [chosen["out"] or Path("results")] if "out" in chosen else []
 
 
 if __name__ == "__main__":

@@ -11,5 +11,7 @@ COMMANDS = {
     "systems": "list the systems that are installed",
     "prepare": "turn published recordings of a system into case folders",
     "new": "write a system of one's own to begin with",
+    "doctor": "say what is installed, what is missing, and what to do",
+    "completion": "print what a shell needs to complete commands",
     "bench": "time calls into the FMUs, the observers, and the tuning",
 }

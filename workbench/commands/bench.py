@@ -2,6 +2,7 @@
 
 import argparse
 import platform
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,80 +10,59 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.benchmark.calls import points
-from workbench.commands.arguments import (
-    Commands,
-    add_isolated,
-    add_system,
-    given_cases,
-    require_compiler,
-)
+from workbench.case import Case
 from workbench.commands.bench_observers import bench_observers
 from workbench.commands.bench_tuning import bench_tuning
-from workbench.files import prove_writable, write_json
+from workbench.commands.extras import require_compiler
+from workbench.commands.inputs import given_cases
+from workbench.commands.output import Done, Output
+from workbench.files import claimed, write_json
 from workbench.system import System
 from workbench.systems import load_system, open_model
 
 if TYPE_CHECKING:
     from workbench.compiler.benchmark import CallTimes
 
+
 _SEED = 1
 _CASE = 2  # of the recordings, on which single observers are timed
+# What is not named here is a time in s, of one call, step, or run.
+_UNITS = {"steps_per_second": "1/s"}
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    bench = commands.add_parser(
-        "bench",
-        description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
-        "sources in one program, and Co-Simulation steps; then the observers beside the same "
-        "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
-        "workers, memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
-        epilog="example:\n  python -m workbench bench --json results/bench/bench.json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    bench.add_argument("--json", type=Path, metavar="FILE", help="write the times to a JSON file")
-    add_system(bench)
-    bench.add_argument(
-        "--cases",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="CASE",
-        help="recordings that observers and tuning are timed on (default: those of the system)",
-    )
-    add_isolated(bench)
-    bench.set_defaults(run=_run)
-
-
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Time all of it."""
     require_compiler()
     system = load_system(options.system)
     cases = given_cases(options.cases, system)
-    if options.json:
-        prove_writable(options.json)
+    with claimed(options.out):
+        return _run(output, system, cases, options.out / "bench.json")
+
+
+def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> Done:
     case = cases[min(_CASE, len(cases) - 1)]
     calls = _time_models(system)
-    print(_format_calls(calls, system.sample_time))
-    observers = bench_observers(system, cases, case)
-    tuning = bench_tuning(system, cases, case)
-    if options.json:
-        content: dict[str, Any] = {
-            "machine": {"processor": platform.machine(), "system": platform.platform()},
-            "seed": _SEED,
-            "calls": {
-                name: {
-                    "unit": "s",
-                    **asdict(times),
-                    "ratios": dict(times.ratios()),
-                    "steps_per_second": 1.0 / times.step,
-                }
-                for name, times in calls.items()
-            },
-            "observers": observers,
-            "tuning": tuning,
-        }
-        write_json(options.json, content)
-    return 0
+    output.result(_format_calls(calls, system.sample_time))
+    observers = bench_observers(system, cases, case, output)
+    tuning = bench_tuning(system, cases, case, output)
+    content: dict[str, Any] = {
+        "machine": {"processor": platform.machine(), "system": platform.platform()},
+        "seed": _SEED,
+        "calls": {
+            name: {
+                "unit": "s",
+                **asdict(times),
+                "ratios": dict(times.ratios()),
+                "steps_per_second": 1.0 / times.step,
+            }
+            for name, times in calls.items()
+        },
+        "observers": observers,
+        "tuning": tuning,
+    }
+    write_json(path, content)
+    output.result(f"written: {path}")
+    return Done(content, _UNITS)
 
 
 def _time_models(system: System) -> "dict[str, CallTimes]":

@@ -5,10 +5,13 @@ from dataclasses import asdict
 from typing import Any
 
 from workbench.case import Case
+from workbench.commands.output import Output
 from workbench.system import System
 
 
-def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[str, Any]:
+def bench_observers(
+    system: System, cases: Sequence[Case], case: Case, output: Output
+) -> dict[str, Any]:
     """Measure, print the table, and return the same as numbers; times in seconds.
 
     Parameters
@@ -27,7 +30,9 @@ def bench_observers(system: System, cases: Sequence[Case], case: Case) -> dict[s
     processes = time_processes(cases, system)
     compilation = time_compilation(system, case)
     horizon = time_horizon(case, system)
-    print(f"\n{format_observers(observers, processes, compilation)}\n{format_horizon(horizon)}")
+    output.result(
+        f"\n{format_observers(observers, processes, compilation)}\n{format_horizon(horizon)}"
+    )
     return {
         "case": case.name,
         "steps": [asdict(row) for row in observers],

@@ -5,10 +5,13 @@ from dataclasses import asdict
 from typing import Any
 
 from workbench.case import Case
+from workbench.commands.output import Output
 from workbench.system import System
 
 
-def bench_tuning(system: System, cases: Sequence[Case], case: Case) -> dict[str, Any]:
+def bench_tuning(
+    system: System, cases: Sequence[Case], case: Case, output: Output
+) -> dict[str, Any]:
     """Measure, print the table, and return the same as numbers; times in seconds.
 
     Parameters
@@ -25,7 +28,7 @@ def bench_tuning(system: System, cases: Sequence[Case], case: Case) -> dict[str,
     evaluations = time_evaluations(case, system)
     workers = time_workers(cases, system)
     memory = observe_memory([one.source.parent for one in cases], system)
-    print(f"\n{format_tuning(evaluations, workers, memory)}")
+    output.result(f"\n{format_tuning(evaluations, workers, memory)}")
     return {
         "case": case.name,
         "evaluations": [{**asdict(row), "ratios": dict(row.ratios())} for row in evaluations],

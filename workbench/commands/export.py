@@ -7,7 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.commands.arguments import Commands, add_isolated, add_system, require_compiler
+from workbench.commands.extras import require_compiler
+from workbench.commands.output import Done, Output
 from workbench.errors import InputError, closest
 from workbench.files import claimed, write_json, write_whole
 from workbench.observers import Estimator, Gains, choose
@@ -19,60 +20,8 @@ if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    export = commands.add_parser(
-        "export",
-        description="Write an observer with its gains as a Co-Simulation FMU for all platforms, "
-        "which runs in any FMI tool without Python, and an SSP 1.0 package in which it observes "
-        "the reference model. One communication step takes one sample. Needs the extra "
-        "[compiler].",
-        epilog="examples:\n"
-        "  python -m workbench export\n"
-        "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
-        "  python -m workbench export --estimator parameter_estimator --fmi 3 --out /tmp/export",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    which = export.add_mutually_exclusive_group()
-    which.add_argument(
-        "--gains",
-        type=Path,
-        metavar="FILE",
-        help="gains.toml of 'workbench tune', which names the observer (default: gains tuned on "
-        "the project's cases)",
-    )
-    which.add_argument(
-        "--estimator",
-        metavar="NAME",
-        help="observer with these tuned gains (default: the first that the system can export)",
-    )
-    add_system(export)
-    export.add_argument(
-        "--fmi",
-        type=int,
-        choices=(2, 3),
-        default=2,
-        help="version of the FMU; SSP 1.0 packages hold FMI 2.0 (default: %(default)s)",
-    )
-    export.add_argument(
-        "--reference",
-        type=Path,
-        metavar="FILE",
-        help="FMU (FMI 2.0) that the package connects the observer to (default: the system's "
-        "reference model)",
-    )
-    export.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results/export"),
-        metavar="DIR",
-        help="where to write (default: %(default)s)",
-    )
-    add_isolated(export)
-    export.set_defaults(run=_export)
-
-
-def _export(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Write the observer as an FMU, and the package."""
     require_compiler()
     from workbench.export import ObserverModel, build_observer, write_package
 
@@ -85,7 +34,9 @@ def _export(options: argparse.Namespace) -> int:
 
         def build(fmi: int) -> "BuiltFMU":
             path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"
-            return build_observer(observer, path, fmi, lambda done: _show(name, fmi, done))
+            return build_observer(
+                observer, path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}")
+            )
 
         packed = build(2)
         built = packed if options.fmi == 2 else build(3)
@@ -102,8 +53,10 @@ def _export(options: argparse.Namespace) -> int:
         for file in (built.path, ssp):
             write_whole(options.out / file.name, file.read_bytes())
         write_json(options.out / "summary.json", summary)
-    print(f"written: {options.out / built.path.name}, {ssp.name} and summary.json beside it")
-    return 0
+    output.result(
+        f"written: {options.out / built.path.name}, {ssp.name} and summary.json beside it"
+    )
+    return Done(summary)
 
 
 def _gains(
@@ -159,10 +112,6 @@ def _summary(system: System, gains: Gains, source: Path, built: "BuiltFMU") -> d
             "gains": source.name,
         },
     }
-
-
-def _show(name: str, fmi: int, platform: str) -> None:
-    print(f"{name}, FMI {fmi}.0: {platform}", flush=True)
 
 
 def _identity(built: "BuiltFMU") -> dict[str, Any]:

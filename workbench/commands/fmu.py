@@ -3,19 +3,15 @@
 import argparse
 import sys
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
-from workbench.commands.arguments import (
-    Commands,
-    above_zero,
-    add_isolated,
-    nearby,
-    positive,
-    require_compiler,
-)
+from workbench.commands.arguments import nearby
+from workbench.commands.extras import require_compiler
+from workbench.commands.output import Done, Output
 from workbench.description import Description, read_description
 from workbench.errors import InputError
-from workbench.files import prove_writable, write_json
+from workbench.files import prove_writable
 from workbench.fitness import Finding, check, is_fit, uses
 from workbench.installed import built_models
 from workbench.proof import usual_limits
@@ -24,96 +20,12 @@ from workbench.resources import CHECKOUT, fmus
 _OMC = Path("build/omc")
 
 
-def add(commands: Commands) -> None:
-    """Add the command and its jobs to the parser."""
-    fmu = commands.add_parser("fmu")
-    jobs = fmu.add_subparsers(required=True, metavar="JOB")
-    _add_build(jobs)
-    _add_info(jobs)
-    _add_check(jobs)
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Build, describe or check FMUs."""
+    return {"build": _build, "info": _info, "check": _check}[options.job](options, output)
 
 
-def _add_build(jobs: Commands) -> None:
-    build = jobs.add_parser(
-        "build",
-        help="compile Modelica models to FMUs",
-        description="Compile Modelica models to FMUs (Model Exchange and Co-Simulation). "
-        "Needs the extra [compiler].",
-        epilog="examples:\n"
-        "  python -m workbench fmu build --all\n"
-        "  python -m workbench fmu build MyRig/package.mo MyRig.Model --fmi 3 --out model.fmu\n"
-        "  python -m workbench fmu build --all --check\n"
-        "  python -m workbench fmu build --all --compiler omc",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    build.add_argument("package", nargs="?", type=Path, help="package.mo of the library")
-    build.add_argument("model", nargs="?", help="dotted name of the model")
-    build.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI")
-    build.add_argument(
-        "--compiler",
-        choices=("workbench", "omc"),
-        default="workbench",
-        help="omc: OpenModelica, where it is installed; FMI 2.0 (default: %(default)s)",
-    )
-    build.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="FMU to write (default: MODEL.fmu); with omc a folder (default: build/omc)",
-    )
-    build.add_argument(
-        "--all",
-        action="store_true",
-        help="every model whose FMU comes with the package, into fmus/",
-    )
-    build.add_argument("--check", action="store_true", help="with --all: compare, write nothing")
-    build.set_defaults(run=_build)
-
-
-def _add_info(jobs: Commands) -> None:
-    info = jobs.add_parser(
-        "info",
-        help="say what an FMU is and offers",
-        description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
-        epilog="example:\n  python -m workbench fmu info model.fmu",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
-    info.add_argument("--json", type=Path, metavar="FILE", help="write it to a JSON file, too")
-    info.set_defaults(run=_info)
-
-
-def _add_check(jobs: Commands) -> None:
-    checking = jobs.add_parser(
-        "check",
-        help="say whether an FMU is fit for observers",
-        description="Try what an observer needs: replay after reset, states set from outside, "
-        "rollback, derivatives, Co-Simulation against Model Exchange, many instances, memory, "
-        "time per call. A crash of the FMU is a finding. Exit status: 0 fit, 1 not fit, 2 no FMU "
-        "to check, 3 not measured, because the FMU did not answer in time.",
-        epilog="example:\n  python -m workbench fmu check my_model.fmu --json fitness.json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    checking.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
-    checking.add_argument("--json", type=Path, metavar="FILE", help="write findings to a JSON file")
-    checking.add_argument(
-        "--instantiations",
-        type=positive,
-        default=2000,
-        metavar="N",
-        help="instances to make, one after the other (default: %(default)s)",
-    )
-    checking.add_argument(
-        "--limit",
-        type=above_zero,
-        metavar="SECONDS",
-        help="processor time that a call of the FMU may take (default: 3)",
-    )
-    add_isolated(checking)
-    checking.set_defaults(run=_check)
-
-
-def _build(options: argparse.Namespace) -> int:
+def _build(options: argparse.Namespace, output: Output) -> Done:
     require_compiler()
     from workbench import compiler  # an extra: everything else runs without it
 
@@ -125,25 +37,29 @@ def _build(options: argparse.Namespace) -> int:
             remedy="leave one of the two out",
         )
     if options.compiler == "omc":
-        return _build_with_omc(options)
+        return _build_with_omc(options, output)
     if options.all and options.check:
         found = compiler.differences(built_models(), fmus())
-        print("\n".join(found) or f"{nearby(fmus())} matches its sources")
-        return 1 if found else 0
+        output.result("\n".join(found) or f"{nearby(fmus())} matches its sources")
+        return Done({"differences": found}, status=1 if found else 0)
     if options.all:
         _require_checkout()
-        for built in compiler.build_all(built_models(), nearby(fmus())):
-            print(f"{built.path}  {built.sha256}")
-        return 0
+        all_built = compiler.build_all(built_models(), nearby(fmus()))
+        return Done({"fmus": [_built(output, built.path, built.sha256) for built in all_built]})
     _require_model(options)
     out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
     prove_writable(out)
     built = compiler.build(options.package, options.model, out, fmi=options.fmi)
-    print(f"{built.path}  {built.sha256}")
-    return 0
+    return Done({"fmus": [_built(output, built.path, built.sha256)]})
 
 
-def _build_with_omc(options: argparse.Namespace) -> int:
+def _built(output: Output, path: Path, sha256: str) -> dict[str, str]:
+    """What is told of an FMU that was built."""
+    output.result(f"{path}  {sha256}")
+    return {"file": str(path), "sha256": sha256}
+
+
+def _build_with_omc(options: argparse.Namespace, output: Output) -> Done:
     from workbench.compiler.openmodelica import build_with_omc
 
     if options.fmi != 2 or options.check:
@@ -156,10 +72,12 @@ def _build_with_omc(options: argparse.Namespace) -> int:
     if not options.all:
         _require_model(options)
     jobs = built_models() if options.all else {options.package: [options.model]}
+    written = []
     for package, models in jobs.items():
         for path in build_with_omc(package, models, options.out or _OMC):
-            print(path)
-    return 0
+            output.result(str(path))
+            written.append({"file": path})
+    return Done({"fmus": written})
 
 
 def _require_checkout() -> None:
@@ -182,45 +100,43 @@ def _require_model(options: argparse.Namespace) -> None:
         )
 
 
-def _info(options: argparse.Namespace) -> int:
+def _info(options: argparse.Namespace, output: Output) -> Done:
     description = read_description(options.fmu)
-    print(_format_description(description))
-    if options.json:
-        write_json(options.json, asdict(description) | {"path": description.path.name})
-    return 0
+    output.result(_format_description(description))
+    return Done(asdict(description) | {"path": description.path.name})
 
 
-def _check(options: argparse.Namespace) -> int:
+def _check(options: argparse.Namespace, output: Output) -> Done:
     description = read_description(options.fmu)
-    if options.json:
-        prove_writable(options.json)
     limits = usual_limits()
     if options.limit is not None:
         limits = replace(limits, processor=options.limit, answer=max(limits.answer, options.limit))
-    print(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit", flush=True)
-    findings = check(options.fmu, options.instantiations, limits, _show_begin, _show_finding)
+    output.result(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit")
+    found = partial(_show_finding, output)
+    findings = check(
+        options.fmu, options.instantiations, limits, partial(_show_begin, output), found
+    )
     unknown = any(finding.unknown for finding in findings)
     fit = None if unknown and is_fit(findings) else is_fit(findings)
     verdict = {True: "fit for observers", False: "not fit for observers", None: "not measured"}
-    print(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
+    output.result(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
     if fit is False:
         for use, failed in uses(findings).items():
-            print(f"    {use}: " + (f"no, for {', '.join(failed)}" if failed else "it would do"))
-    if options.json:
-        identity = {
-            "file": description.path.name,
-            "model": description.name,
-            "fmi": description.version,
-            "sha256": description.sha256,
-        }
-        listed = [asdict(finding) for finding in findings]
-        told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
-        write_json(options.json, told)
-    return {True: 0, False: 1, None: 3}[fit]
+            reason = f"no, for {', '.join(failed)}" if failed else "it would do"
+            output.result(f"    {use}: {reason}")
+    identity = {
+        "file": description.path.name,
+        "model": description.name,
+        "fmi": description.version,
+        "sha256": description.sha256,
+    }
+    listed = [asdict(finding) for finding in findings]
+    told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
+    return Done(told, status={True: 0, False: 1, None: 3}[fit])
 
 
-def _show_begin(name: str) -> None:
-    if sys.stderr.isatty():  # overwritten by what is found
+def _show_begin(output: Output, name: str) -> None:
+    if sys.stderr.isatty() and not output.quiet:  # overwritten by what is found
         print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
 
 
@@ -248,12 +164,12 @@ def _format_description(description: Description) -> str:
     return "\n".join(lines)
 
 
-def _show_finding(finding: Finding) -> None:
+def _show_finding(output: Output, finding: Finding) -> None:
     value, limit = (f"{n:.4g}" if n is not None else "" for n in (finding.value, finding.limit))
     if finding.passed is None:
-        print(f"{finding.name:<38} -       {finding.reason}", flush=True)
+        output.result(f"{finding.name:<38} -       {finding.reason}")
         return
     result = "passed" if finding.passed else "FAILED"
-    print(f"{finding.name:<38} {result:<7} {value:>9} {limit:>9}  {finding.unit}", flush=True)
+    output.result(f"{finding.name:<38} {result:<7} {value:>9} {limit:>9}  {finding.unit}")
     if finding.reason:
-        print(f"    {finding.reason}", flush=True)
+        output.result(f"    {finding.reason}")

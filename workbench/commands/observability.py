@@ -5,19 +5,11 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 from workbench.case import Case
-from workbench.commands.arguments import (
-    Commands,
-    add_isolated,
-    add_models,
-    add_recordings,
-    add_system,
-    add_workers,
-    chosen_system,
-    example_case,
-    show_progress,
-)
+from workbench.commands.inputs import chosen_system
+from workbench.commands.output import Done, Output, read_result
 from workbench.files import claimed
 from workbench.fmu import Vector
 from workbench.observability import CaseObservability, case_observability, linear_test
@@ -33,35 +25,16 @@ from workbench.system import FULL, OBSERVER, System
 from workbench.systems import open_model
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    own = example_case()
-    observability = commands.add_parser(
-        "observability",
-        description="Show what the measured outputs can tell: a linear test of the observer "
-        "models, and for each recording how well half a second of samples can know the estimated "
-        "quantities (Cramer-Rao bound). Writes windows (CSV), observability.json and figures.",
-        epilog="examples:\n"
-        "  python -m workbench observability\n"
-        f"  python -m workbench observability {own} --out /tmp/one\n"
-        "  python -m workbench observability my_cases --system my/system.toml",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_recordings(observability, out="results/observability")
-    add_system(observability)
-    add_models(observability)
-    add_workers(observability)
-    add_isolated(observability)
-    observability.set_defaults(run=_observability)
-
-
-def _observability(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Show what the outputs of the recordings tell."""
     system, cases = chosen_system(options)
     with claimed(options.out):
-        return _run(options, system, cases)
+        return _run(options, output, system, cases)
 
 
-def _run(options: argparse.Namespace, system: System, cases: Sequence[Case]) -> int:
+def _run(
+    options: argparse.Namespace, output: Output, system: System, cases: Sequence[Case]
+) -> Done:
     linear = {}
     for role in (role for role in (OBSERVER, FULL) if role in system.models):
         with open_model(system, role) as fmu:
@@ -79,17 +52,29 @@ def _run(options: argparse.Namespace, system: System, cases: Sequence[Case]) -> 
         try:
             for _, one in pool.completed(_test_case, cases):
                 done.append(one)
-                show_progress(len(done), len(cases), one.case.name, begin)
+                output.step(len(done), len(cases), one.case.name, begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
+    summary: dict[str, Any] = {}
     if done:
         done.sort(key=lambda one: one.case.name)
         tests = list(linear.values())
-        print(format_observability(system, tests, done))
-        write_observability(system, tests, done, provenance, options.out / "observability.json")
-        print(f"{len(done)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
-    return 130 if interrupted else 0
+        output.result(format_observability(system, tests, done))
+        path = options.out / "observability.json"
+        write_observability(system, tests, done, provenance, path)
+        output.result(f"{len(done)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
+        summary = read_result(path)
+    return Done(summary, _units(system), 130 if interrupted else 0)
+
+
+def _units(system: System) -> dict[str, str]:
+    """Of windows and signals; quantities and corrections have that of the quantity."""
+    signals = {one.name: one.unit for one in (*system.inputs, *system.outputs)}
+    quantities = {
+        key: one.unit for one in system.estimated for key in (one.correction, f"median_{one.name}")
+    }
+    return {"window_s": "s", "stride_s": "s", **signals, **quantities}
 
 
 def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:

@@ -9,17 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from workbench.case import Case
-from workbench.commands.arguments import (
-    Commands,
-    add_isolated,
-    add_models,
-    add_recordings,
-    add_system,
-    add_workers,
-    chosen_system,
-    example_case,
-    show_progress,
-)
+from workbench.commands.inputs import chosen_system
+from workbench.commands.output import Done, Output
 from workbench.cosim import Ending
 from workbench.errors import InputError
 from workbench.files import claimed, write_json
@@ -38,67 +29,24 @@ from workbench.simulation import CaseResult, Simulation, prepare, simulate
 from workbench.system import OBSERVER, System
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    own = example_case()
-    parser = commands.add_parser(
-        "simulate",
-        description="Run all estimators on recordings; write a page to read (index.html), and "
-        "beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
-        epilog="examples:\n"
-        "  python -m workbench simulate\n"
-        f"  python -m workbench simulate {own} --out /tmp/one\n"
-        "  python -m workbench simulate my_cases --system my/system.toml\n"
-        "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        f"  python -m workbench simulate {own} --live\n"
-        "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_recordings(parser, out="results/simulate")
-    add_system(parser)
-    add_models(parser)
-    parser.add_argument(
-        "--gains",
-        type=Path,
-        metavar="FILE",
-        help="gains.toml of 'workbench tune', for the estimator that it names (default: gains "
-        "tuned for the system's models, else gains reasoned from the linearised models)",
-    )
-    parser.add_argument(
-        "--untuned",
-        action="store_true",
-        help="gains reasoned from the linearised models, to compare tuned ones with",
-    )
-    parser.add_argument(
-        "--estimator",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="run this one, may be repeated (default: the standard ones of the system)",
-    )
-    add_workers(parser)
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="show each run in a window as it goes, one after the other",
-    )
-    add_isolated(parser)
-    parser.set_defaults(run=_simulate)
-
-
-def _simulate(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Run all estimators on the recordings."""
     system, cases = chosen_system(options)
     window = LiveWindow(system) if options.live else None
     with claimed(options.out):
-        return _run(options, system, cases, window)
+        return _run(options, output, system, cases, window)
 
 
 def _run(
-    options: argparse.Namespace, system: System, cases: Sequence[Case], window: LiveWindow | None
-) -> int:
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    cases: Sequence[Case],
+    window: LiveWindow | None,
+) -> Done:
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
-    print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
+    output.stage("preparing the observers' loops (compiled once, up to a minute)")
     provenance = {**_models(simulation), **_settings(simulation, cases[0])}
     if window is None:
         runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
@@ -111,32 +59,42 @@ def _run(
     try:
         for result in runs:
             done.append(result)
-            show_progress(len(done), len(cases), result.case.name, begin)
+            output.step(len(done), len(cases), result.case.name, begin)
     except KeyboardInterrupt:
         interrupted = True
-        print("interrupted", flush=True)
+        output.progress("interrupted")
     except InputError as error:  # such as a full disk: what was estimated is told all the same
         failure = error
+    summary: dict[str, Any] = {}
     if done:
         done.sort(key=lambda result: result.case.name)
-        print(format_table(system, done))
+        output.result(format_table(system, done))
         summary = summarise_runs(system, done, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(system, summary, [case_figure(result) for result in done], len(cases), page)
-        print(f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it")
+        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(told)
     if window is not None and not interrupted:
         window.wait()
     if failure is not None:
         raise failure
+    units = _units(system)
     if interrupted:
-        return 130
+        return Done(summary, units, 130)
     idle = _idle(done)
     for name in idle:
         print(
             f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
         )
-    return 1 if idle else 0
+    return Done(summary, units, 1 if idle else 0)
+
+
+def _units(system: System) -> dict[str, str]:
+    """Of the numbers in a summary that are not plain; gains have those of their file."""
+    judged = system.objective.judged
+    unit = system.signals[judged].unit
+    return {f"{judged}_rms_{unit}": unit, "seconds": "s"}
 
 
 def _idle(results: Sequence[CaseResult]) -> list[str]:

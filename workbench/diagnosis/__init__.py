@@ -21,6 +21,7 @@ from workbench.diagnosis.evidence import Simulations, delay, simulating
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
+from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
 from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
@@ -96,7 +97,9 @@ def diagnose(
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, effects, everything)
         given = _given(everything, system)
-        with Simulations(everything, system, given, cases, workers) as simulations:
+        with Simulations(
+            *(everything, system, given, cases, workers), report=report
+        ) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
             extension = _extend(
@@ -293,6 +296,7 @@ def _observers(
             except InputError as refused:  # a model may be fit for this, and for no observer
                 report(f"no {kind.label}: {refused.found}")
     errors: dict[str, dict[str, list[float]]] = {}
+    counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
     for one in (system, with_model(system, OBSERVER, extension.fmu)):
         with open_model(one) as fmu:
             for kind in (kind for kind in _TRIED if kind.name in gains):
@@ -301,6 +305,7 @@ def _observers(
                 for case in cases:
                     error = score(case, replay(case, estimator), one).nrmse
                     by_case.setdefault(case.name, []).append(np.nan if error is None else error)
+                    counted(case)
     return {
         name: {case: (pair[0], pair[1]) for case, pair in by_case.items()}
         for name, by_case in errors.items()

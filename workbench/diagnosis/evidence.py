@@ -17,6 +17,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.motion import motion
+from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.samples import Samples, compared, prepare
 from workbench.diagnosis.thresholds import SOUND, Soundness, Thresholds
@@ -235,6 +236,7 @@ class Simulations:
     path : FMU with all effects that may be asked for.
     given : values of its variables that the diagnosed model has instead of the defaults.
     sound : which samples count.
+    report : takes a line now and then on how many simulations were made.
 
     Attributes
     ----------
@@ -252,7 +254,9 @@ class Simulations:
         cases: Sequence[Case],
         workers: int,
         sound: Soundness = SOUND,
+        report: Callable[[str], None] = lambda line: None,
     ) -> None:
+        self._pace = Pace(report, "simulations")
         with FMU(path, None, given) as fmu:
             self.nominal = dict(fmu.defaults)
             self.units = dict(fmu.units)
@@ -345,8 +349,12 @@ class Simulations:
         """Results of tasks, by their names."""
         if self._interrupted.is_set():
             raise CancelledError
-        under_way = {name: self._pool.submit(*task) for name, task in tasks.items()}
+        counted = self._pace.part(len(tasks))
+        under_way = {}
         try:
+            for name, task in tasks.items():
+                under_way[name] = self._pool.submit(*task)
+                under_way[name].add_done_callback(counted)
             return {name: one.result() for name, one in under_way.items()}
         finally:
             # After Ctrl-C nobody waits for the others.

@@ -102,6 +102,12 @@ class Repertoire:
         """Effects of the library that recordings cannot show."""
         return frozenset(one.name for one in self.effects if one.hidden)
 
+    @property
+    def able(self) -> tuple[Plantable, ...]:
+        """What can be planted of the library's, and be shown by recordings."""
+        known = (one for one in self.plantables if one.effect)
+        return tuple(one for one in known if one.effect not in self.hidden)
+
 
 @dataclass(frozen=True)
 class Planting:
@@ -149,10 +155,11 @@ def plan(
     clean : number of sets without an effect.
     sizes : multiples of the size that matters.
     repeats : sets of each effect at each size.
-    pairs : sets with two effects, at the largest size.
+    pairs : sets with two effects, at the largest size; none where there are no two.
     """
     largest_first = sorted(sizes, reverse=True)
     known = [one for one in repertoire.plantables if one.effect]
+    pairs = pairs if len(repertoire.able) > 1 else 0
     unknown = [one for one in repertoire.plantables if not one.effect]
     kinds: list[list[Group]] = [
         [(Planting("clean", _seed(seed, "clean", n), 0.0, {}, ()),) for n in range(clean)],
@@ -215,8 +222,7 @@ def _single(repertoire: Repertoire, one: Plantable, multiple: float, seed: int) 
 def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
     """Two effects, drawn from those that recordings can show."""
     rng = np.random.default_rng(seed)
-    hidden = repertoire.hidden
-    able = [one for one in repertoire.plantables if one.effect and one.effect not in hidden]
+    able = repertoire.able
     both = [able[i] for i in rng.choice(len(able), 2, replace=False)]
     gains = {one.name: _gain(one, multiple * repertoire.size(one), rng) for one in both}
     return Planting("pair", seed, multiple, gains, tuple(one.effect for one in both))

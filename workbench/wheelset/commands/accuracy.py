@@ -5,13 +5,8 @@ import time
 from contextlib import ExitStack
 from importlib.metadata import version
 
-from workbench.commands.arguments import (
-    Commands,
-    add_recordings,
-    add_system,
-    example_case,
-    given_cases,
-)
+from workbench.commands.inputs import given_cases
+from workbench.commands.output import Done, Output, read_result
 from workbench.files import claimed
 from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
@@ -21,35 +16,8 @@ from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies
 from workbench.wheelset.truth import read_truth
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    own = example_case()
-    accuracy = commands.add_parser(
-        "accuracy",
-        description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
-        "beside each recording and no estimator reads: force in the contact, a slide, friction of "
-        "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "
-        "writes every stop (accuracy.csv) and the same with the worst (accuracy.json).",
-        epilog="examples:\n"
-        "  python -m workbench accuracy\n"
-        "  python -m workbench rig --seed 1 --out /tmp/rig\n"
-        "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
-        f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_recordings(accuracy, out="results/accuracy")
-    accuracy.add_argument(
-        "--estimator",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="judge this one, may be repeated (default: all)",
-    )
-    add_system(accuracy)
-    accuracy.set_defaults(run=_accuracy)
-
-
-def _accuracy(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Judge the estimators."""
     system = load_system(options.system)
     chosen = choose(system, options.estimator or list(estimators(system)))
     cases = given_cases(options.cases, system)
@@ -71,16 +39,13 @@ def _accuracy(options: argparse.Namespace) -> int:
             ],
             "gains": {name: one.source for name, one in gains.items() if one.names},
         }
-        print("preparing the observers' loops (compiled once, up to a minute)", flush=True)
+        output.stage("preparing the observers' loops (compiled once, up to a minute)")
         for case, truth in zip(cases, truths, strict=True):
             stops.append(stop_accuracy(observe_stop(case, truth, ready, system)))
-            print(
-                f"[{len(stops):>3}/{len(cases)}] {case.name:<28} "
-                f"{time.perf_counter() - begin:5.1f} s",
-                flush=True,
-            )
-        print(format_accuracy(stops))
+            output.step(len(stops), len(cases), case.name, begin)
+        output.result(format_accuracy(stops))
         write_accuracies(stops, options.out / "accuracy.csv")
         write_accuracy(stops, provenance, options.out / "accuracy.json")
-    print(f"every stop: {options.out / 'accuracy.csv'}, accuracy.json beside it")
-    return 0
+    output.result(f"every stop: {options.out / 'accuracy.csv'}, accuracy.json beside it")
+    summary = read_result(options.out / "accuracy.json")
+    return Done(summary, {name: one["unit"] for name, one in summary["quantities"].items()})

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, add_system, add_workers, positive
+from workbench.commands.output import Done, Output
 from workbench.files import claimed
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
@@ -30,78 +30,8 @@ from workbench.wheelset.rig import (
 )
 
 
-def add(commands: Commands) -> None:
-    """Add the command to the parser."""
-    rig = commands.add_parser(
-        "rig",
-        description="Make recordings by co-simulation of the multibody model with drive, brake, "
-        "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
-        "truth.json, which no estimator reads. The same seed gives the same bytes.",
-        epilog=_epilog(),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    rig.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="where to write the case folders"
-    )
-    rig.add_argument(
-        "--case",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="scenario, may be repeated (default: the fourteen standard ones)",
-    )
-    rig.add_argument(
-        "--seed",
-        type=_seed,
-        default=1,
-        metavar="N",
-        help="of tolerances and noise (default: %(default)s)",
-    )
-    rig.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="plant an effect, or change one of the pads; may be repeated",
-    )
-    rig.add_argument(
-        "--pads",
-        choices=("ordinary", "constant"),
-        default="ordinary",
-        help="friction of dry pads: with speed, temperature and force, or constant as in the "
-        "nominal model (default: %(default)s)",
-    )
-    _add_making(rig)
-    rig.set_defaults(run=_rig)
-
-
-def _add_making(rig: argparse.ArgumentParser) -> None:
-    """Add what says how recordings are made and written."""
-    rig.add_argument(
-        "--rate",
-        type=positive,
-        default=200,
-        metavar="HZ",
-        help="of the recording, a divisor of 1000 (default: %(default)s)",
-    )
-    rig.add_argument(
-        "--truth-every",
-        type=positive,
-        default=1,
-        metavar="N",
-        help="write the truth of every Nth sample only (default: %(default)s)",
-    )
-    rig.add_argument(
-        "--fmu",
-        type=Path,
-        metavar="FILE",
-        help="multibody model, with Co-Simulation (default: the reference model of the system)",
-    )
-    add_system(rig)
-    add_workers(rig)
-
-
-def _epilog() -> str:
+def _listed() -> str:
+    """Scenarios and effects, for people."""
     effects = "\n".join(
         f"  {field.name:<18} [{field.metadata['unit']}]".ljust(28) + field.metadata["text"]
         for field in dataclasses.fields(Effects)
@@ -111,11 +41,6 @@ def _epilog() -> str:
     )
     scenarios = "\n".join(f"  {name:<26} {scenario.title}" for name, scenario in SCENARIOS.items())
     return f"""\
-examples:
-  python -m workbench rig --out /tmp/rig
-  python -m workbench rig --case locked_wheel --out /tmp/rig
-  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig
-
 scenarios, of which the first {len(STANDARD)} are standard:
 {scenarios}
 
@@ -125,29 +50,35 @@ effects, zero if not given:
   Ordinary pads have {pads}."""
 
 
-def _seed(text: str) -> int:
-    """Type of an argument that is a whole number of 0 or more."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{value} is below 0")
-    return value
-
-
-def _rig(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Make the recordings, or list what can be made."""
+    if options.list:
+        output.result(_listed())
+        return Done(
+            {
+                "scenarios": {name: one.title for name, one in SCENARIOS.items()},
+                "effects": {one.name: dict(one.metadata) for one in dataclasses.fields(Effects)},
+            }
+        )
     scenarios = select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     with claimed(options.out):
-        return _recorded(options, scenarios, effects)
+        return _recorded(options, output, scenarios, effects)
 
 
-def _recorded(options: argparse.Namespace, scenarios: Sequence[Scenario], effects: Effects) -> int:
+def _recorded(
+    options: argparse.Namespace,
+    output: Output,
+    scenarios: Sequence[Scenario],
+    effects: Effects,
+) -> Done:
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
-    fmu = options.fmu or model_path(load_system(options.system), REFERENCE)
+    fmu = options.reference or model_path(load_system(options.system), REFERENCE)
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
-    done = 0
+    made: list[str] = []
     interrupted = False
     order = _Order(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
     # A stop that is under way at Ctrl-C is finished and kept, in a process even if it is alone.
@@ -156,20 +87,15 @@ def _recorded(options: argparse.Namespace, scenarios: Sequence[Scenario], effect
         tasks = [pool.submit(_make, scenario) for scenario in scenarios]
         try:
             for task in as_completed(tasks):
-                line = task.result()
-                done += 1
-                elapsed = time.perf_counter() - begin
-                left = elapsed / done * (len(tasks) - done)
-                print(
-                    f"[{done:>3}/{len(tasks)}] {line}  {elapsed:5.1f} s, about {left:.0f} s left",
-                    flush=True,
-                )
+                made.append(task.result())
+                output.step(len(made), len(tasks), made[-1], begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
     kept = sum(task.done() and not task.cancelled() for task in tasks)
-    print(f"{kept} of {len(tasks)} cases in {options.out}")
-    return 130 if interrupted else 0
+    output.result(f"{kept} of {len(tasks)} cases in {options.out}")
+    status = 130 if interrupted else 0
+    return Done({"out": options.out, "cases": kept, "of": len(tasks)}, status=status)
 
 
 @dataclass(frozen=True)

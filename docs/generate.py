@@ -1,0 +1,345 @@
+"""Pages of the site that say what the code says: a hook of MkDocs, see `mkdocs.yml`.
+
+Commands are read from their parsers, the Python API from docstrings, effects from Modelica classes,
+thresholds from the values that decide, schemas from system files. Nothing of it is committed.
+"""
+
+import argparse
+import dataclasses
+import inspect
+import json
+import re
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+import workbench
+from workbench.commands.options import command_line, parsers
+from workbench.diagnosis import Effect, read_effects
+from workbench.diagnosis.thresholds import RATE, Soundness, Thresholds, thresholds
+from workbench.installed import system_files
+from workbench.modelica import Library, read_library
+from workbench.system import OBSERVER, System
+from workbench.system_parts import Condition
+from workbench.systems import load_system
+
+ROOT = Path(__file__).resolve().parents[1]
+_WRITTEN = {"README.md": "index.md", "CHANGELOG.md": "changelog.md"}
+_WRITTEN |= {"CONTRIBUTING.md": "contributing.md", "tutorials/README.md": "tutorials.md"}
+
+
+def pages() -> dict[str, str]:
+    """All generated pages, and files beside them, by their place in the site."""
+    systems = [load_system(name) for name in system_files()]
+    return {
+        **{to: (ROOT / source).read_text(encoding="utf-8") for source, to in _WRITTEN.items()},
+        **{f"tutorial-{path.stem}.md": tutorial(path) for path in _tutorials()},
+        "commands.md": commands(),
+        "python.md": python_api(),
+        "effects-catalogue.md": catalogue(systems),
+        "thresholds.md": decisions(),
+        **{f"schemas/{one.name}.case.json": _json(case_schema(one)) for one in systems},
+        "case-file.md": case_files(systems),
+    }
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages; called by MkDocs."""
+    for place, content in pages().items():
+        files.append(File.generated(config, place, content=content))
+    for picture in (ROOT / "docs" / "pictures").glob("*.svg"):
+        name = f"docs/pictures/{picture.name}"  # as the README names it
+        files.append(File.generated(config, name, content=picture.read_text(encoding="utf-8")))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Let links that are right in the repository be right in the site; called by MkDocs."""
+
+    def moved(link: re.Match[str]) -> str:
+        target, anchor = link[1], link[2] or ""
+        name = re.sub(r"^(\.\./|docs/)+", "", target)
+        known = {
+            **_WRITTEN,
+            **{f"{path.stem}.py": f"tutorial-{path.stem}.md" for path in _tutorials()},
+        }
+        name = known.get(name, name)
+        return f"]({name}{anchor})"
+
+    return re.sub(r"\]\(((?!https?:|#)[^)#\s]+\.(?:md|py))(#[^)]*)?\)", moved, markdown)
+
+
+def _tutorials() -> list[Path]:
+    return sorted((ROOT / "tutorials").glob("*.py"))
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2) + "\n"
+
+
+def _cell(text: str) -> str:
+    """Text as a cell of a table."""
+    return " ".join(text.split()).replace("|", r"\|")
+
+
+def tutorial(path: Path) -> str:
+    """A script with cells as a page: comments at the head of a cell are its text."""
+    parts = []
+    for cell in path.read_text(encoding="utf-8").split("# %%")[1:]:
+        lines = cell.removeprefix(" [markdown]").strip().splitlines()
+        code = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+        parts.append("\n".join(line.removeprefix("#").removeprefix(" ") for line in lines[:code]))
+        if rest := "\n".join(lines[code:]).strip():
+            parts.append(f"```python\n{rest}\n```")
+    return "\n\n".join(parts) + "\n"
+
+
+# --- commands ---
+
+
+def commands() -> str:
+    """Every command with its options, from the parsers that read them."""
+    text = ["# Commands", "", *textwrap.dedent(_COMMANDS).strip().splitlines()]
+    for one in parsers(command_line(""))[1:]:
+        if one.description is None:  # one that only has jobs
+            continue
+        text += ["", f"## {one.prog}", "", _cell(one.description), ""]
+        text += ["| option | default | meaning |", "| --- | --- | --- |"]
+        for action in one._actions:
+            if {"--help", "--json", "--quiet"} & set(action.option_strings):
+                continue
+            text.append(_option(one, action))
+        if one.epilog:
+            text += ["", "```console", textwrap.dedent(one.epilog.partition("\n")[2]), "```"]
+    return "\n".join(text) + "\n"
+
+
+_COMMANDS = """
+Every command takes `--json`, `--quiet` and `--help`, before its name or after it. With `--json`
+standard output is one document: `command`, `status` (that of the process), `units` (by key of the
+result; what is not named has a unit beside it, or 1), and either `result`, which is what the
+command writes into its JSON file, or `error` with `where`, `found`, `expected` and `remedy`.
+Progress goes to standard error; `--quiet` leaves it out, errors and warnings stay. Status: 0 done,
+1 failed, 2 wrong input, 130 interrupted.
+"""
+
+
+def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    formatter = parser._get_formatter()
+    names = [f"`{name}`" for name in action.option_strings] or [
+        f"`{action.metavar or action.dest}`"
+    ]
+    takes = ""
+    if action.option_strings and action.nargs != 0:
+        takes = f" {formatter._format_args(action, action.dest.upper())}"
+        names[-1] = f"{names[-1][:-1]}{takes}`"
+    meaning = formatter._expand_help(action) if action.help else ""
+    meaning, default = re.subn(r" ?\(default: (.*?)\)$", "", meaning, flags=re.DOTALL)[0], ""
+    if found := re.search(
+        r"\(default: (.*)\)$", formatter._expand_help(action) if action.help else ""
+    ):
+        default = found[1]
+    if "one per processor" in default:
+        default = "one per processor"
+    return f"| {', '.join(names).replace('|', '&#124;')} | {_cell(default)} | {_cell(meaning)} |"
+
+
+# --- Python ---
+
+
+def python_api() -> str:
+    """The public names, from their docstrings."""
+    text = [
+        "# Python",
+        "",
+        "`import workbench as wb`. Arrays are in SI units unless said otherwise.",
+    ]
+    public = {name: getattr(workbench, name) for name in workbench.__all__}
+    for name, one in sorted(public.items(), key=lambda item: (inspect.isclass(item[1]), item[0])):
+        text += ["", f"## {name}", "", f"```text\n{_signature(name, one)}\n```", "", _prose(one)]
+        if inspect.isclass(one):
+            for member, value in vars(one).items():
+                function = value.fget if isinstance(value, property) else value
+                if member.startswith("_") or not inspect.isfunction(function):
+                    continue
+                heading = member if isinstance(value, property) else _signature(member, function)
+                text += [
+                    "",
+                    f"### {name}.{member}",
+                    "",
+                    f"```text\n{heading}\n```",
+                    "",
+                    _prose(function),
+                ]
+    return "\n".join(text) + "\n"
+
+
+def _signature(name: str, one: Callable[..., Any]) -> str:
+    if inspect.isclass(one) and issubclass(one, Exception):
+        return name
+    whole = f"{name}{inspect.signature(one)}".replace("workbench.", "")
+    return re.sub(r"<factory>", "...", whole)
+
+
+def _prose(one: Any) -> str:
+    """A docstring in numpy style as Markdown."""
+    lines = (inspect.getdoc(one) or "").splitlines()
+    out: list[str] = []
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if re.fullmatch(r"-{3,}", line):
+            continue
+        entry = re.match(r"^([\w, .*]+?) : (.*)", line)
+        if re.fullmatch(r"-{3,}", below):
+            out += ["", f"**{line}**", ""]
+        elif entry:
+            out.append(f"- `{entry[1]}`: {entry[2]}")
+        elif line.startswith(">>>"):
+            out.append(f"    {line}")
+        else:
+            out.append(f"  {line.strip()}" if line.startswith("    ") else line)
+    return "\n".join(out)
+
+
+# --- effects ---
+
+
+def catalogue(systems: list[System]) -> str:
+    """Effects of every system that comes along, from their Modelica classes."""
+    text = ["# Catalogue of effects", ""]
+    text += [
+        "What `workbench diagnose` knows of each machine. A size of zero is the nominal model."
+    ]
+    for system in systems:
+        library = read_library(system.library)
+        effects = read_effects(library, system.models[OBSERVER].name)
+        text += ["", f"## {system.name}", "", f"{system.title}.", ""]
+        text += ["| effect | what it is | size | matters from | what tells it from its twins |"]
+        text += ["| --- | --- | --- | --- | --- |"]
+        for one in effects:
+            unit = _unit(library, one)
+            cells = (
+                f"`{one.name}`",
+                one.text,
+                one.label,
+                f"{one.matters:g} {unit}",
+                one.separation,
+            )
+            text.append(f"| {' | '.join(map(_cell, cells))} |")
+        for one in effects:
+            text += ["", f"### {system.name}: {one.name}", "", *_effect(library, one)]
+    return "\n".join(text) + "\n"
+
+
+def _unit(library: Library, effect: Effect) -> str:
+    unit = library.unit(library.components(effect.model)[effect.sizes[0]])
+    return "" if unit == "1" else unit
+
+
+def _effect(library: Library, effect: Effect) -> Iterator[str]:
+    """Equations and documentation of a class, as they are written."""
+    source = _source(library, effect.model)
+    equations = re.search(r"^ *equation\n(.*?)(?=^ *annotation|^ *end )", source, re.S | re.M)
+    extends = re.findall(r"^ *extends (.*?);", source, re.S | re.M)
+    if equations:
+        yield f"```modelica\n{textwrap.dedent(equations[1]).rstrip()}\n```"
+    elif extends:
+        bases = "\n".join(" ".join(one.split()) for one in extends)
+        yield f"Law of the class that it extends:\n\n```modelica\n{bases}\n```"
+    if info := re.search(r'info="<html>(.*?)</html>"', source, re.S):
+        yield "\n" + re.sub(r"h4>", "h5>", info[1].replace('\\"', '"')).strip()
+    if effect.hidden:
+        yield f"\nRecordings cannot show it: {effect.hidden}."
+
+
+def _source(library: Library, model: str) -> str:
+    """The text of a class."""
+    file = re.sub(r"(, line \d+|:\d+)$", "", library.find(model).where)
+    text = Path(file).read_text(encoding="utf-8")
+    name = model.rpartition(".")[2]
+    return text[text.index(f"model {name} ") : text.index(f"end {name};")]
+
+
+# --- thresholds ---
+
+
+def decisions() -> str:
+    """What every threshold is, and why."""
+    usual = thresholds(28)
+    text = ["# Thresholds of the diagnosis", ""]
+    text += [f"Rate of false alarms: {RATE:g} of clean sets. For a catalogue of 28 effects:", ""]
+    for kind, value in ((Thresholds, usual), (Soundness, usual.samples)):
+        meanings = dict(
+            re.findall(r"^(\w+) : (.*?)(?=^\w+ :|\Z)", inspect.getdoc(kind) or "", re.S | re.M)
+        )
+        text += ["| threshold | value | meaning and reason |", "| --- | --- | --- |"]
+        for field in dataclasses.fields(kind):
+            if not dataclasses.is_dataclass(getattr(value, field.name)):
+                number = f"{getattr(value, field.name):.4g}"
+                text.append(f"| `{field.name}` | {number} | {_cell(meanings[field.name])} |")
+        text.append("")
+    return "\n".join([*text, _prose(thresholds)]) + "\n"
+
+
+# --- file formats ---
+
+
+def case_files(systems: list[System]) -> str:
+    """What a `case.toml` of each system says, and its schema."""
+    text = ["# case.toml", "", *textwrap.dedent(_CASE).strip().splitlines(), ""]
+    text += ["| system | conditions | schema |", "| --- | --- | --- |"]
+    for one in systems:
+        conditions = ", ".join(f"`{c.name}`" for c in one.conditions) or "none"
+        name = f"{one.name}.case.json"
+        text.append(f"| `{one.name}` | {conditions} | [{name}](schemas/{name}) |")
+    return "\n".join(text) + "\n"
+
+
+_CASE = """
+A recording is a folder with this file and a CSV; see [Your recordings](recordings.md). What is
+asked for beyond `title` and `[measurement]` follows from the conditions of the
+[system](system-file.md#conditions). Editors that know JSON Schema for TOML (such as Even Better
+TOML) complete and check it with `#:schema FILE` in the first line:
+"""
+
+
+def case_schema(system: System) -> dict[str, Any]:
+    """JSON Schema (2020-12) of the `case.toml` of a system."""
+    conditions = {one.name: _condition(one) for one in system.conditions}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"case.toml of {system.name}: {system.title}",
+        "type": "object",
+        "required": ["title", "measurement", *(["conditions"] if conditions else [])],
+        "properties": {
+            "title": {"type": "string", "minLength": 1},
+            "measurement": {
+                "type": "object",
+                "required": ["file"],
+                "properties": {
+                    "file": {"type": "string", "description": "CSV in this folder"},
+                    "counts_from": {"type": "string", "description": "time with unit"},
+                },
+            },
+            "conditions": {
+                "type": "object",
+                "required": list(conditions),
+                "properties": conditions,
+            },
+        },
+    }
+
+
+def _condition(one: Condition) -> dict[str, Any]:
+    """Schema of what was set before a recording."""
+    about = {"description": one.label}
+    if not one.choices:
+        return about | {"type": "string", "pattern": r"^\s*[-+0-9.eE]+ \S+", "$comment": one.unit}
+    choice: dict[str, Any] = {"enum": list(one.choices)}
+    if not one.count:
+        return about | choice
+    return about | {"type": "array", "items": choice, "minItems": one.count, "maxItems": one.count}

@@ -1,0 +1,209 @@
+"""Every command says its result in one way, and begins at once."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from workbench.__main__ import main
+from workbench.commands.extras import PURPOSES
+from workbench.commands.options import command_line, parsers
+
+HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
+PARSERS = [one for one in parsers(command_line("")) if " " in one.prog]
+
+
+@pytest.fixture(autouse=True)
+def _from_the_checkout(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(root)
+
+
+def document(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
+    """What a command prints with --json: one document, and nothing else."""
+    status = main([*arguments, "--json"])
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["status"] == status
+    assert printed["command"] == arguments[0]
+    return printed
+
+
+# --- one way to say what was found ---
+
+
+def test_json_is_all_that_standard_output_takes_and_what_the_file_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = "cases/01_dry_80_1.5"
+    arguments = ["simulate", case, "--estimator", "ekf", "--workers", "1", "--out", str(tmp_path)]
+    printed = document(arguments, capsys)
+    assert printed["result"] == json.loads((tmp_path / "summary.json").read_text())
+    assert printed["units"] == {"Fx_rms_N": "N", "seconds": "s"}
+
+
+def test_progress_goes_to_standard_error_unless_nobody_asks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = "cases/01_dry_80_1.5"
+    arguments = ["simulate", case, "--estimator", "ekf", "--workers", "1", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    said, progress = capsys.readouterr()
+    assert re.search(r"^\[  1/1\] 01_dry_80_1\.5 .* s, about 0 s left$", progress, re.MULTILINE)
+    assert "s left" not in said
+    assert main(["--quiet", *arguments]) == 0
+    assert capsys.readouterr() == (said, "")
+
+
+def test_a_mistake_is_a_document_too(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = document(["simulate", "cases/nowhere"], capsys)
+    error = printed["error"]
+    assert isinstance(error, dict)
+    assert error["where"] == "cases/nowhere"
+    assert error["found"] == "no such folder"
+    assert set(error) == {"message", "where", "found", "expected", "remedy"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["systems"],
+        ["prepare", "cascaded_tanks"],
+        ["rig", "--list"],
+        ["diagnose", "--list"],
+        ["fmu", "info", "fmus/fmi2/MinimalObserver.fmu"],
+        ["completion", "bash"],
+    ],
+    ids=" ".join,
+)
+def test_what_lists_or_describes_tells_programs_the_same(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    if arguments[0] == "completion":
+        pytest.importorskip("shtab")
+    assert document(arguments, capsys)["result"]
+    assert main(["--json", *arguments]) == 0
+    json.loads(capsys.readouterr().out)
+
+
+# --- the same option means the same everywhere ---
+
+
+def test_an_option_takes_the_same_everywhere() -> None:
+    """Kind of value and number of values by option; only files and folders differ by command."""
+    meant: dict[str, set[tuple[object, ...]]] = {}
+    for one in PARSERS:
+        for action in one._actions:
+            for option in action.option_strings:
+                kind = (type(action).__name__, action.type, action.nargs)
+                meant.setdefault(option, set()).add(kind)
+    twice = {option: kinds for option, kinds in meant.items() if len(kinds) > 1}
+    # An exported observer is one; a run has several.
+    assert set(twice) == {"--estimator"}
+    assert {kind[1:] for kind in twice["--estimator"]} == {(None, None)}
+
+
+@pytest.mark.parametrize("parser", PARSERS, ids=lambda one: one.prog)
+def test_every_command_knows_json_and_quiet(parser: object) -> None:
+    options = {option for action in parser._actions for option in action.option_strings}
+    assert {"--json", "--quiet", "--help"} <= options
+
+
+# --- it begins at once ---
+
+
+@pytest.mark.parametrize(
+    "asked", [["--version"], ["--help"], *([*one.prog.split()[1:], "--help"] for one in PARSERS)]
+)
+def test_help_imports_nothing_that_takes_time(root: Path, asked: list[str]) -> None:
+    """numba and what it needs take two seconds; half a second is what people wait for."""
+    script = f"""
+import sys
+from workbench.__main__ import main
+try:
+    main({asked})
+except SystemExit as end:
+    print(end.code, sorted(set(sys.modules) & set({HEAVY})), file=sys.stderr)
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert run.stderr == "0 []\n"
+
+
+# --- completion ---
+
+
+def test_the_script_completes_commands_options_and_choices(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In bash itself: what it offers after each beginning of a line."""
+    pytest.importorskip("shtab")
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "workbench.bash"
+    script.write_text(capsys.readouterr().out)
+
+    def offered(*words: str) -> set[str]:
+        line = " ".join(f"'{word}'" for word in words)
+        ask = f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
+        ask += 'COMP_LINE="${COMP_WORDS[*]}"; COMP_POINT=${#COMP_LINE}; '
+        ask += "_shtab_workbench; printf '%s\\n' \"${COMPREPLY[@]}\""
+        run = subprocess.run(
+            ["bash", "-c", ask], cwd=root, capture_output=True, text=True, check=False, timeout=60
+        )
+        return set(run.stdout.split())
+
+    assert {"simulate", "diagnose", "rig", "doctor"} <= offered("workbench", "")
+    assert offered("workbench", "diag") == {"diagnose"}
+    assert {"--held-out", "--json"} <= offered("workbench", "diagnose", "--")
+    assert offered("workbench", "diagnose", "--platforms", "") == {"native", "all"}
+
+
+# --- doctor ---
+
+
+def test_every_extra_has_a_purpose(root: Path) -> None:
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    assert set(project["optional-dependencies"]) == set(PURPOSES)
+
+
+def test_a_sound_installation_has_nothing_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    found = {one["name"]: one for one in document(["doctor"], capsys)["result"]["findings"]}
+    assert {one["state"] for one in found.values()} <= {"ok", "missing"}
+    assert found["fmus/fmi2/Reference.fmu"]["state"] == "ok"
+    if found["extra [compiler]"]["state"] == "ok":
+        assert found["compiler"]["found"] == "compiled and ran a model with the state x"
+
+
+def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from workbench.commands import doctor
+
+    kept = tmp_path / "fmus"
+    (kept / "fmi2").mkdir(parents=True)
+    (kept / "manifest.json").write_bytes((root / "fmus" / "manifest.json").read_bytes())
+    (kept / "fmi2" / "Reference.fmu").write_bytes(b"another")
+    monkeypatch.setattr(doctor, "fmus", lambda: kept)
+    monkeypatch.setattr(doctor, "missing_packages", lambda extra: ["casadi"] * bool(extra))
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    assert main(["doctor"]) == 1
+    said = capsys.readouterr().out
+    assert re.search(
+        r"^wrong +fmus/fmi2/Reference.fmu +its SHA-256 is not that", said, re.MULTILINE
+    )
+    assert re.search(r"^wrong +fmus/fmi3/Reference.fmu +no such file$", said, re.MULTILINE)
+    assert re.search(r"^ +to do: make fmus$", said, re.MULTILINE)
+    assert re.search(r"^missing +extra \[compiler\] +for .*; without casadi$", said, re.MULTILINE)
+    assert re.search(r"^wrong +cache +/dev/null/", said, re.MULTILINE)
+    assert "set XDG_CACHE_HOME to a folder that can be written" in said

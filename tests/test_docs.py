@@ -1,0 +1,178 @@
+"""The documentation is true: its examples run, its site builds without network, its schemas fit."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+
+from .pages import blocks, calls, check_calls, run_page
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES.append(ROOT / "tutorials" / "README.md")
+RUN = [
+    page for page in PAGES if any(one.kind in ("sh", "python", "modelica") for one in blocks(page))
+]
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
+def test_the_examples_of_a_page_run_and_print_what_it_says(page: Path, tmp_path: Path) -> None:
+    run_page(page, tmp_path, ROOT, long=False)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "page",
+    [page for page in RUN if any(one.mark == "long" for one in blocks(page))],
+    ids=lambda page: page.name,
+)
+def test_the_long_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    run_page(page, tmp_path, ROOT, long=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_example_is_in_a_block_that_says_what_it_is(page: Path) -> None:
+    text = page.read_text()
+    assert not re.findall(r"^    (?:python -m workbench|workbench|make|pip) .*", text, re.MULTILINE)
+    assert {one.kind for one in blocks(page)} <= {
+        "sh",
+        "python",
+        "toml",
+        "text",
+        "modelica",
+        "console",
+    }
+    for one in blocks(page):
+        check_calls(one.code, page.name, ROOT)
+
+
+def test_a_wrong_example_is_found(tmp_path: Path) -> None:
+    for name, block, match in (
+        ("status", "```sh\nworkbench simulate nowhere\n```", "status 2"),
+        ("print", "```sh\necho one\n```\n\n```text\ntwo\n```", "'two' is not in"),
+        (
+            "parse",
+            "<!-- parsed: hours -->\n```sh\nworkbench power --sices 2\n```",
+            "power --sices 2",
+        ),
+        ("make", "<!-- parsed: hours -->\n```sh\nmake powder\n```", "make powder"),
+    ):
+        page, folder = tmp_path / f"{name}.md", tmp_path / name
+        page.write_text(block + "\n")
+        folder.mkdir()
+        with pytest.raises(AssertionError, match=match):
+            run_page(page, folder, ROOT, long=False)
+
+
+# --- the site ---
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built as `make docs` does, where no network can be reached."""
+    pytest.importorskip("material", reason="needs the extra [docs]")
+    out = tmp_path_factory.mktemp("site")
+    nowhere = {f"{kind}_proxy": "http://127.0.0.1:9" for kind in ("http", "https")}
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(out)]
+    run = subprocess.run(
+        command,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1", **nowhere},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert run.returncode == 0, run.stderr
+    return out
+
+
+def test_the_site_is_built_strictly_and_needs_no_network(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        loaded = re.findall(
+            r'<(?:script|link|img)[^>]+(?:src|href)="(https?://[^"]+)', page.read_text()
+        )
+        assert not [one for one in loaded if 'rel="canonical"' not in one], page
+
+
+def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -> None:
+    import workbench as wb
+    from workbench.commands.options import command_line, parsers
+    from workbench.diagnosis.thresholds import Thresholds
+
+    commands = (site / "commands.html").read_text()
+    for one in parsers(command_line(""))[1:]:
+        if one.description is not None:
+            assert f"{one.prog}<" in commands
+            for action in one._actions:
+                for option in action.option_strings[:1]:
+                    assert option in commands
+    python = (site / "python.html").read_text()
+    assert all(f'id="{name.lower()}"' in python for name in wb.__all__)
+    assert "WheelsetRig.Effects" not in (site / "python.html").read_text()
+    effects = (site / "effects-catalogue.html").read_text()
+    assert "J. Topczewska et al. (2022)" in effects  # of the class BrakeFade
+    thresholds = (site / "thresholds.html").read_text()
+    assert all(f"<code>{name}</code>" in thresholds for name in ("significant", "fall", "twin"))
+    assert Thresholds.__dataclass_fields__["form"].default == 40.0
+
+
+def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads((site / "schemas" / "wheelset.case.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    for path in sorted((ROOT / "cases").glob("*/case.toml")):
+        validator.validate(tomllib.loads(path.read_text()))
+    good = tomllib.loads((ROOT / "cases" / "01_dry_80_1.5" / "case.toml").read_text())
+    for key, value in (("wheel_rail", "icy"), ("initial_speed", 80), ("discs", ["dry"])):
+        wrong = {**good, "conditions": {**good["conditions"], key: value}}
+        assert not validator.is_valid(wrong), key
+    assert not validator.is_valid({key: value for key, value in good.items() if key != "title"})
+
+
+def test_the_citation_names_this_version() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"version: {version}\n" in citation
+    assert "10.1177" not in citation  # the paper's text has no number that could be checked
+    assert re.search(
+        rf"^## {re.escape(version)} \(\d{{4}}-\d\d-\d\d\)",
+        (ROOT / "CHANGELOG.md").read_text(),
+        re.M,
+    )
+
+
+def test_the_readme_says_what_the_table_says() -> None:
+    """The worst of each column, in the digits that the README has."""
+    rows = re.findall(
+        r"^\| \d\d_\S+ \| (.*) \|$", (ROOT / "docs" / "accuracy.md").read_text(), re.M
+    )
+    columns = zip(
+        *([float(cell.removesuffix(" %")) for cell in row.split(" | ")] for row in rows),
+        strict=True,
+    )
+    loop, inversion, *observers = map(max, columns)
+    assert len(rows) == 14
+    text = " ".join((ROOT / "README.md").read_text().split())
+    assert f"open loop up to {loop:.0f} %, direct inversion up to {inversion:.1f} %" in text
+    assert f"observers with fixed gains up to {max(observers[:2]):.1f} %" in text
+    assert f"the Kalman filters up to {max(observers[2:]):.2f} %" in text
+
+
+def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis() -> None:
+    picture = ROOT / "docs" / "pictures" / "diagnosis.svg"
+    assert picture.stat().st_size < 200_000
+    assert "matplotlib" in picture.read_text()
+
+
+def test_calls_are_read_as_a_shell_does() -> None:
+    code = "workbench tune ekf \\\n  --budget 2  # quick\nworkbench doctor --json > doctor.json\n"
+    assert list(calls(code)) == [["tune", "ekf", "--budget", "2"], ["doctor", "--json"]]

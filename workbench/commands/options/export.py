@@ -1,0 +1,48 @@
+"""What `workbench export` may be told."""
+
+import argparse
+from pathlib import Path
+
+from workbench.commands.arguments import Commands, add_isolated, add_out, add_reference, add_system
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    export = commands.add_parser(
+        "export",
+        help=text,
+        description="Write an observer with its gains as a Co-Simulation FMU for all platforms, "
+        "which runs in any FMI tool without Python, and an SSP 1.0 package in which it observes "
+        "the reference model. One communication step takes one sample. Needs the extra "
+        "[compiler].",
+        epilog="examples:\n"
+        "  python -m workbench export\n"
+        "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
+        "  python -m workbench export --estimator parameter_estimator --fmi 3 --out /tmp/export",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    which = export.add_mutually_exclusive_group()
+    which.add_argument(
+        "--gains",
+        type=Path,
+        metavar="FILE",
+        help="gains.toml of 'workbench tune', which names the observer (default: gains tuned on "
+        "the project's cases)",
+    )
+    which.add_argument(
+        "--estimator",
+        metavar="NAME",
+        help="observer with these tuned gains (default: the first that the system can export)",
+    )
+    add_system(export)
+    export.add_argument(
+        "--fmi",
+        type=int,
+        choices=(2, 3),
+        default=2,
+        help="version of the FMU; SSP 1.0 packages hold FMI 2.0 (default: %(default)s)",
+    )
+    add_reference(export, "(FMI 2.0) that the package connects the observer to")
+    add_out(export, "results/export")
+    add_isolated(export)
+    return export

@@ -1,0 +1,103 @@
+"""What a command says: its result on standard output, everything else on standard error."""
+
+import json
+import math
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from workbench.errors import InputError
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended.
+
+    Attributes
+    ----------
+    result : what it found, which --json prints; also the values that stand in its files.
+    units : by key of `result`, at any depth; what is not named has the unit 1.
+    status : of the process.
+    """
+
+    result: Mapping[str, Any] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    status: int = 0
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where a command says what.
+
+    Attributes
+    ----------
+    json : whether standard output takes one JSON document, and nothing else.
+    quiet : whether nothing is said of progress.
+    begin : of the command, by `time.perf_counter` [s].
+    """
+
+    json: bool
+    quiet: bool
+    begin: float = field(default_factory=time.perf_counter)
+
+    def result(self, text: str) -> None:
+        """What was found, for people."""
+        if not self.json:
+            print(text, flush=True)
+
+    def progress(self, line: str) -> None:
+        """What is being done."""
+        if not self.quiet:
+            print(line, file=sys.stderr, flush=True)
+
+    def stage(self, line: str) -> None:
+        """What is being done, with the time since the command began."""
+        self.progress(f"{time.perf_counter() - self.begin:6.1f} s  {line}")
+
+    def step(self, done: int, total: int, name: str, begin: float) -> None:
+        """One of a known number of steps is done, since `begin`: with the time left."""
+        elapsed = time.perf_counter() - begin
+        left = elapsed / done * (total - done)
+        self.progress(f"[{done:>3}/{total}] {name:<28} {elapsed:5.1f} s, about {left:.0f} s left")
+
+    def close(self, command: str, done: Done) -> int:
+        """Print the document, if it is asked for; returns the status."""
+        if self.json:
+            told = {"units": done.units, "result": done.result}
+            self._print(command, done.status, told)
+        return done.status
+
+    def fail(self, command: str, status: int, error: Exception | str) -> int:
+        """Say what went wrong, on standard error and in the document; returns the status."""
+        print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
+        if self.json:
+            parts = ("where", "found", "expected", "remedy")
+            known = isinstance(error, InputError)
+            told = {part: getattr(error, part) for part in parts} if known else {}
+            self._print(command, status, {"error": {"message": str(error), **told}})
+        return status
+
+    @staticmethod
+    def _print(command: str, status: int, told: Mapping[str, Any]) -> None:
+        document = _plain({"command": command, "status": status, **told})
+        print(json.dumps(document, indent=2, allow_nan=False), flush=True)
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """The content of a JSON file that a command has written, so that both say the same."""
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def _plain(value: Any) -> Any:
+    """The same without what JSON lacks: paths are text, and what is no number is null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

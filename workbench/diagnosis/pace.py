@@ -1,0 +1,47 @@
+"""How far work is whose end is open: what was done, and what is left of the part under way."""
+
+import threading
+import time
+from collections.abc import Callable
+
+_EVERY = 5.0  # [s] between two lines: seldom enough to be read, often enough to be seen alive
+
+
+class Pace:
+    """Says now and then how far work is, from any thread.
+
+    Parameters
+    ----------
+    report : takes a line.
+    noun : what is counted, in the plural.
+    every : least time between two lines [s].
+    """
+
+    def __init__(self, report: Callable[[str], None], noun: str, every: float = _EVERY) -> None:
+        self._report, self._noun, self._every = report, noun, every
+        self._lock = threading.Lock()
+        self._count, self._told = 0, time.perf_counter()
+
+    def part(self, total: int) -> Callable[[object], None]:
+        """Begin a part of so many; what is returned is called, with anything, after each.
+
+        The time left is that of the part, since nobody knows how many parts there will be.
+        """
+        begin, done = time.perf_counter(), 0
+
+        def count(_: object) -> None:
+            nonlocal done
+            now = time.perf_counter()
+            with self._lock:
+                done += 1
+                self._count += 1
+                if now - self._told < self._every:
+                    return
+                self._told = now
+                line = f"{self._count} {self._noun}"
+                if total > done and now - begin >= self._every:
+                    left = (now - begin) / done * (total - done)
+                    line += f", about {left:.0f} s left of these {total}"
+            self._report(line)
+
+        return count

@@ -1,0 +1,1 @@
+"""What the commands for the wheelset alone may be told, one module each."""

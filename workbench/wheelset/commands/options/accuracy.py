@@ -1,0 +1,39 @@
+"""What `workbench accuracy` may be told."""
+
+import argparse
+
+from workbench.commands.arguments import (
+    Commands,
+    add_recordings,
+    add_system,
+    example_case,
+)
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    own = example_case()
+    accuracy = commands.add_parser(
+        "accuracy",
+        help=text,
+        description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
+        "beside each recording and no estimator reads: force in the contact, a slide, friction of "
+        "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "
+        "writes every stop (accuracy.csv) and the same with the worst (accuracy.json).",
+        epilog="examples:\n"
+        "  python -m workbench accuracy\n"
+        "  python -m workbench rig --seed 1 --out /tmp/rig\n"
+        "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
+        f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_recordings(accuracy, out="results/accuracy")
+    accuracy.add_argument(
+        "--estimator",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="judge this one, may be repeated (default: all)",
+    )
+    add_system(accuracy)
+    return accuracy
