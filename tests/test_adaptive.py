@@ -12,7 +12,7 @@ from workbench.case import read_cases
 from workbench.cosim import Run, replay
 from workbench.fmu import FMU, Vector
 from workbench.objective import judged_window
-from workbench.observers import Estimate, estimators
+from workbench.observers import Estimate, adaptive, estimators
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.observers.unscented import UnscentedKalmanFilter
 from workbench.system import System
@@ -139,3 +139,15 @@ def test_innovations_on_the_rig_are_as_large_as_filters_say(
     # Levels lag by two seconds behind speeds that fall, whose noise falls with them.
     assert nis.mean() == pytest.approx(2.0, abs=0.1)
     assert np.mean(nis < chi2.ppf(0.95, 2)) == pytest.approx(0.95, abs=0.01)
+
+
+def test_one_sample_speaks_for_three_standard_deviations_at_most() -> None:
+    """Else a wrong sample that is still possible would widen all bands after it."""
+    levels = adaptive.levels(2, 1)
+    adaptive.reset(levels)
+    noise, explained = 4.0, 5.0  # variances; an innovation scatters by 3
+    told = []
+    for innovation in (3.0, 9.0, 90.0):
+        adaptive.note(levels, 0, innovation, explained, noise)
+        told.append(levels.scatter[0])
+    assert told == pytest.approx([1.0, (81.0 - 5.0) / 4.0, (81.0 - 5.0) / 4.0])
