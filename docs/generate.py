@@ -28,6 +28,7 @@ from workbench.system import OBSERVER, System
 from workbench.system_parts import Condition
 from workbench.systems import load_system
 
+_WIDE = 90  # characters of a line of code on a page
 ROOT = Path(__file__).resolve().parents[1]
 _WRITTEN = {"README.md": "index.md", "CHANGELOG.md": "changelog.md"}
 _WRITTEN |= {"CONTRIBUTING.md": "contributing.md", "tutorials/README.md": "tutorials.md"}
@@ -146,7 +147,7 @@ def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
         default = found[1]
     if "one per processor" in default:
         default = "one per processor"
-    return f"| {', '.join(names).replace('|', '&#124;')} | {_cell(default)} | {_cell(meaning)} |"
+    return f"| {', '.join(names)} | {_cell(default)} | {_cell(meaning)} |"
 
 
 # --- Python ---
@@ -182,20 +183,39 @@ def python_api() -> str:
 def _signature(name: str, one: Callable[..., Any]) -> str:
     if inspect.isclass(one) and issubclass(one, Exception):
         return name
-    whole = f"{name}{inspect.signature(one)}".replace("workbench.", "")
-    return re.sub(r"<factory>", "...", whole)
+    said = inspect.signature(one)
+    whole = _short(f"{name}{said}")
+    if len(whole) <= _WIDE:
+        return whole
+    inside = [_short(str(part)) for part in said.parameters.values()]
+    keyword = [part.kind is inspect.Parameter.KEYWORD_ONLY for part in said.parameters.values()]
+    if any(keyword):
+        inside.insert(keyword.index(True), "*")
+    returned = whole.rpartition(") -> ")[2] if ") -> " in whole else ""
+    lines = "".join(f"    {part},\n" for part in inside)
+    return f"{name}(\n{lines})" + f" -> {returned}" * bool(returned)
+
+
+def _short(text: str) -> str:
+    """Types without their modules."""
+    plain = text.replace("<factory>", "...")
+    return re.sub(r"\b[a-z_]+(?:\.[a-z_]+)*\.(?=[A-Z])", "", plain)
 
 
 def _prose(one: Any) -> str:
     """A docstring in numpy style as Markdown."""
     lines = (inspect.getdoc(one) or "").splitlines()
     out: list[str] = []
+    errors = False
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
         if re.fullmatch(r"-{3,}", line):
             continue
         entry = re.match(r"^([\w, .*]+?) : (.*)", line)
         if re.fullmatch(r"-{3,}", below):
             out += ["", f"**{line}**", ""]
+            errors = line in ("Raises", "Warns")
+        elif errors and re.fullmatch(r"\w+", line):
+            out.append(f"- `{line}`:")
         elif entry:
             out.append(f"- `{entry[1]}`: {entry[2]}")
         elif line.startswith(">>>"):
