@@ -29,7 +29,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         epilog="examples:\n"
         "  python -m workbench power\n"
         "  python -m workbench power --clean 5 --sizes 4 --repeats 1 --pairs 5 --out /tmp/quick\n"
-        "  python -m workbench power --effects BrakeFade --sizes 4 --repeats 1 --clean 0\n"
+        "  python -m workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
         "  python -m workbench power --clean 200 --resume\n"
         "  python -m workbench power --thresholds --sets 8\n"
         "  python -m workbench power --sheet-error --repeats 2",
