@@ -256,7 +256,8 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
 
 def test_every_key_that_is_read_stands_in_the_documentation() -> None:
     """Keys as the readers name them: refuse_unknown("..."), and the top level."""
-    sources = [ROOT / "workbench" / f"{name}.py" for name in ("system_file", "system_tables")]
+    readers = ("system_file", "system_tables", "comparison_tables", "experiment_tables")
+    sources = [ROOT / "workbench" / f"{name}.py" for name in readers]
     read = set()
     for source in sources:
         for call in re.findall(r"refuse_unknown\(\s*((?:\"[^\"]*\"\s*)+)\)", source.read_text()):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
+    from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
     from workbench.api import prepare_cases as prepare_cases
     from workbench.api import read_cases as read_cases
@@ -20,6 +21,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.diagnosis import Outcome as Outcome
     from workbench.errors import FMUError as FMUError
     from workbench.errors import InputError as InputError
+    from workbench.experiments import NextStop as NextStop
     from workbench.fmu import FMU as FMU
     from workbench.observers import Gains as Gains
     from workbench.system import System as System

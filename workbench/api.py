@@ -23,6 +23,8 @@ from workbench.cosim import Run, replay
 from workbench.diagnosis import Outcome, choose, read_effects
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
+from workbench.experiments import NextStop
+from workbench.experiments import next_stop as next_experiment
 from workbench.installed import usual_system
 from workbench.modelica import read_library
 from workbench.observers import Gains
@@ -249,3 +251,31 @@ def diagnose(
     return diagnose_system(
         *(system, cases, library, chosen, folder, number, report), held_out=held_out
     )
+
+
+def next_stop(
+    found: Outcome, *, workers: int | None = None, report: Callable[[str], None] = print
+) -> NextStop:
+    """Find the recording that tells apart what a diagnosis could not.
+
+    See `workbench.experiments.next_stop`.
+
+    Parameters
+    ----------
+    found : a diagnosis that found a cause.
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If nothing was found, or the system does not say what may be varied.
+    """
+    if found.rivals is None:
+        raise InputError(
+            where="the diagnosis",
+            found=f"the verdict '{found.diagnosis.verdict}'",
+            expected="a cause that was found, whose rivals or size are to be told better",
+            remedy="diagnose more recordings first",
+        )
+    return next_experiment(found.system, found.rivals, workers or os.cpu_count() or 1, report)

@@ -58,7 +58,7 @@ class Expression:
     def __post_init__(self) -> None:
         self.names  # noqa: B018  read once, so that a mistake shows where it stands
 
-    @property
+    @cached_property
     def _tree(self) -> ast.expr:
         try:
             return ast.parse(self.text, mode="eval").body

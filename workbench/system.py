@@ -23,6 +23,7 @@ from workbench.system_comparison import (
     Level,
     Rest,
 )
+from workbench.system_experiments import Experiments
 from workbench.system_parts import (
     Condition,
     Derived,
@@ -105,6 +106,7 @@ class System:
     sampling : which times between samples are likely.
     redundancies : what tells the same in a recording.
     cases : folder of recordings that come with the system, or None.
+    experiments : what may be run next, or None where nobody said so.
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -146,6 +148,7 @@ class System:
     cases: Path | None = None
     sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))
     redundancies: tuple[Redundancy, ...] = ()
+    experiments: Experiments | None = None
 
     @property
     def signals(self) -> dict[str, Signal]:

@@ -101,6 +101,24 @@ def _formulas(system: System) -> Iterator[_Reference]:
         for formula in point.held.values():
             for name in sorted(formula.names):
                 yield formula.where, name, system.values, "a parameter of the model"
+    yield from _of_experiments(system)
+
+
+def _of_experiments(system: System) -> Iterator[_Reference]:
+    """Names in formulas of what may be run next."""
+    asked = system.experiments
+    if asked is None:
+        return
+    numbers = {one.name for one in system.conditions if one.name in asked.settings}
+    state = "a continuous state of the model"
+    for name, formula in asked.start.items():
+        yield formula.where, name, system.states or (), state
+        for key in sorted(formula.names):
+            expected = "a parameter of the model, or a condition that is set"
+            yield formula.where, key, {*system.values, *numbers}, expected
+    for key in sorted(asked.cost.formula.names):
+        expected = "duration, or a condition that is set"
+        yield asked.cost.formula.where, key, {"duration", *numbers}, expected
 
 
 def _parameters(system: System) -> Iterator[_Reference]:
@@ -141,6 +159,15 @@ def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference
     for point in (system.design, system.tested, system.export.start):
         for name, formula in point.held.items():
             yield formula.where, name, states, state
+    if asked := system.experiments:
+        ends = [] if asked.ends is None else [asked.ends.formula]
+        for formula in (*asked.driven.values(), *ends):
+            known = {*variables, *system.values, *asked.settings}
+            for name in sorted(formula.names):
+                yield formula.where, name, known, f"{output}, or a condition that is set"
+        for sensor in asked.sensors:
+            where = f"{system.source}, [next.sensors.{sensor.name}] reading"
+            yield where, sensor.reading, variables, output
     if rest := compared.rest:
         yield f"{system.source}, [diagnosis] rest output", rest.output, variables, output
     for name in compared.leading.together if compared.leading else ():

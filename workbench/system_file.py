@@ -7,6 +7,7 @@ from pathlib import Path
 from workbench.comparison_tables import read_comparison
 from workbench.description import Description, read_description
 from workbench.errors import InputError
+from workbench.experiment_tables import read_experiments
 from workbench.system import OBSERVER, System
 from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
@@ -45,7 +46,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases sampling redundancies"
+        "export shortest fewest sample_time cases sampling redundancies next"
     )
     return _read(file, path, _models(file, path))
 
@@ -189,4 +190,5 @@ def _placed(file: Table, system: System) -> System:
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),
         redundancies=tuple(read_redundancy(table, system) for table in file.tables("redundancies")),
+        experiments=read_experiments(file.table("next"), system) if "next" in file else None,
     )

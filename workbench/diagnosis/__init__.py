@@ -23,6 +23,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.rivals import gathered
 from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
@@ -149,6 +150,9 @@ def _outcome(
         extension=extension,
         errors=tuple(errors),
         starts=starts,
+        rivals=gathered(simulations, fit, diagnosis.base, diagnosis.rivals)
+        if diagnosis.rivals
+        else None,
     )
 
 

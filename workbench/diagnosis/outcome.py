@@ -12,6 +12,7 @@ import pandas as pd
 from workbench.case import Case
 from workbench.diagnosis.counting import FAULTY, MISSING
 from workbench.diagnosis.residuals import Dependence, Residuals
+from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.sample_errors import Errors
 from workbench.diagnosis.search import Step
 from workbench.diagnosis.trial import Prospect
@@ -60,6 +61,8 @@ class Outcome:
         effects that turn with a shaft, whose phase an observer does not know.
     errors : of the nominal and of the last model, by recording and channel.
     starts : see `start_values`, by recording.
+    rivals : the model that was named, and those that these recordings do not tell from it; None
+        unless a cause was found.
     """
 
     system: System
@@ -74,6 +77,7 @@ class Outcome:
     extension: Extension | None
     errors: tuple[Errors, ...]
     starts: Mapping[str, Mapping[str, float]]
+    rivals: Rivals | None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -218,6 +222,7 @@ class Outcome:
                 }
                 for name, errors in self.observers.items()
             },
+            "rivals": None if self.rivals is None else self.rivals.to_dict(),
             "cases": [case.name for case in self.cases],
         }
 

@@ -38,7 +38,7 @@ class Selection:
     less : the best fit without each of the effects.
     steps : how they were found.
     trial : of all other effects about the best point.
-    twins : names of effects that explain the data as well as each of them.
+    twins : fits of effects that explain the data as well as each of them, by name.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
     interrupted : whether the search was ended before its end.
     validation : of the fits.
@@ -49,7 +49,7 @@ class Selection:
     less: Mapping[Effect, Fitted]
     steps: tuple[Step, ...]
     trial: Trial
-    twins: Mapping[Effect, tuple[str, ...]]
+    twins: Mapping[Effect, Mapping[str, Fitted]]
     names: tuple[str, ...]
     cosines: Matrix
     interrupted: bool
@@ -89,7 +89,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Selection
         report(f"{better.active[-1].name} explains more than what it replaces")
         best = better
     twins = {
-        one: tuple(name for name, other in fits.items() if _close(fit, less[one], other, best))
+        one: {name: other for name, other in fits.items() if _close(fit, less[one], other, best)}
         for one, fits in alike.items()
     }
     return Selection(

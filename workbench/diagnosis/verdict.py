@@ -84,6 +84,7 @@ class Diagnosis:
     gain : None when nothing was extended.
     partial : effects that explain a part of what remains unexplained.
     base, best : the nominal model and the last one, fitted.
+    rivals : `best`, and fits that these data do not tell from it; empty unless found.
     steps : how the causes were found.
     scores : of the candidates about the nominal model, best first.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
@@ -97,6 +98,7 @@ class Diagnosis:
     partial: tuple[str, ...]
     base: Fitted
     best: Fitted
+    rivals: tuple[Fitted, ...]
     steps: tuple[Step, ...]
     scores: tuple[Prospect, ...]
     names: tuple[str, ...]
@@ -114,6 +116,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     if not clean and not (best.active and (chosen.interrupted or explained)):
         verdict = "unexplained"
     causes: list[Cause] = []
+    rivals: tuple[Fitted, ...] = ()
     gain = None
     if verdict == "found":
         report("held-out recordings")
@@ -121,6 +124,8 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         before, after = (chosen.validation.squares(one, fast=fast) for one in (base, best))
         gain = _gain(fit.tests, before, after)
         causes = [_cause(fit, chosen, one) for one in _strongest_first(fit, chosen, catalogue)]
+        twins = [fits.values() for fits in chosen.twins.values()]
+        rivals = (best, *(one for fits in twins for one in fits))
     presence = fit.unknowns.presence
     return Diagnosis(
         verdict=verdict,
@@ -130,6 +135,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         partial=tuple(effect.name for effect in best.active) if not causes else (),
         base=base,
         best=best,
+        rivals=rivals,
         steps=chosen.steps,
         scores=chosen.steps[0].scores if chosen.steps else tuple(chosen.trial.scores()),
         names=chosen.names,
@@ -202,7 +208,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
     return Cause(
         effect=effect,
         parameters=parameters,
-        confusable_with=chosen.twins[effect],
+        confusable_with=tuple(chosen.twins[effect]),
         explained=chosen.validation.explained(chosen.less[effect], best, fast=fast)[0],
         phases=best.point.phases.get(effect.name),
     )

@@ -1,0 +1,322 @@
+"""The next experiment: criteria against closed forms, predictions against what is then recorded."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import workbench as wb
+from workbench.__main__ import main
+from workbench.case import Case
+from workbench.diagnosis import Outcome
+from workbench.diagnosis.quadratic import Quadratic, RecordingSystem
+from workbench.diagnosis.rivals import read_rivals
+from workbench.diagnosis.thresholds import thresholds
+from workbench.errors import InputError
+from workbench.experiments import NextStop, Proposal, next_stop
+from workbench.experiments.candidates import Profile
+from workbench.experiments.separation import precision, refitted, told_apart
+from workbench.system import System
+from workbench.system_experiments import SINE, STAIRCASE, STEP, Varied
+from workbench.systems import load_system
+
+from .distances import parted
+from .heater import NOISE, cases, diagnosed
+from .heater import system as heater
+
+# --- criteria ---
+
+
+def test_what_is_left_is_the_criterion_of_buzzi_ferraris_and_forzatti() -> None:
+    """Reference: d' (I + J N^-1 J')^-1 d, with the covariance of the rival's prediction."""
+    rng = np.random.default_rng(1)
+    d, J = rng.standard_normal(12), rng.standard_normal((12, 3))
+    root = rng.standard_normal((3, 3))
+    N = root @ root.T + np.eye(3)
+    covariance = np.eye(12) + J @ np.linalg.inv(N) @ J.T
+    new = Quadratic(J.T @ J, J.T @ d, float(d @ d), 12)
+    left, z = refitted(new, N)
+    # Both are double precision on well-conditioned matrices.
+    assert_allclose(left, d @ np.linalg.solve(covariance, d), rtol=1e-9)
+    assert_allclose(left, np.sum((d + J @ z) ** 2) + z @ N @ z, rtol=1e-9)
+
+
+def test_a_line_and_a_parabola_part_where_their_best_fits_do() -> None:
+    """T-optimality by hand: x^2 less its best line in -1, 0, 0, 1 is 1/2 in size everywhere."""
+    x = np.array([-1.0, 0.0, 0.0, 1.0])
+    J, d = np.column_stack([np.ones(4), x]), 6.0 * x**2
+    left, _ = refitted(Quadratic(J.T @ J, J.T @ d, float(d @ d), 4), np.zeros((2, 2)))
+    assert_allclose(left, 4 * 3.0**2, rtol=1e-9)
+
+
+def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
+    """Reference: d' (I + P P')^-1 d, the covariance of noise and of a tolerance of one sigma."""
+    rng = np.random.default_rng(2)
+    d, P = rng.standard_normal(9), rng.standard_normal((9, 2))
+    one = RecordingSystem(d, np.zeros((9, 0)), P, np.zeros(2), 1)
+    left, _ = refitted(one.eliminated(), np.zeros((0, 0)))
+    # The elimination adds 1e-9 to what is known of each, so that unknown ones can be solved for.
+    assert_allclose(left, d @ np.linalg.solve(np.eye(9) + P @ P.T, d), rtol=1e-7)
+
+
+def test_the_chance_is_the_share_of_simulated_decisions() -> None:
+    """Two directions in noise, nearly alike: what the wrong one leaves beyond the right one."""
+    rng, decides, count = np.random.default_rng(3), thresholds(28), 4000
+    cosine, apart = 0.98, 49.0
+    right = np.array([1.0, 0.0])
+    wrong = np.array([cosine, np.sqrt(1.0 - cosine**2)])
+    y = np.sqrt(apart / (1.0 - cosine**2)) * right + rng.standard_normal((count, 2))
+    left = [np.sum(y**2, axis=1) - (y @ one) ** 2 for one in (wrong, right)]
+    share = np.mean(left[0] - left[1] > decides.form)
+    # Four standard deviations of a share of 4000, and 0.01 for the noise that the right one leaves.
+    expected = told_apart(apart, 0.0, decides)
+    assert abs(share - expected) < 4.0 * np.sqrt(expected * (1.0 - expected) / count) + 0.01
+    assert 0.6 < expected < 0.9
+
+
+def test_precision_of_one_unknown_is_its_standard_deviation() -> None:
+    """Reference: information adds up, 1/9 and 1/16 make 1/5.76, whatever another unknown does."""
+    known, new = np.diag([1.0 / 9.0, 5.0]), np.diag([1.0 / 16.0, 2.0])
+    assert_allclose(precision(new, known, [0]), (3.0, 2.4), rtol=1e-12)
+
+
+# --- experiments ---
+
+
+@pytest.mark.parametrize("kind", [STEP, STAIRCASE, SINE])
+def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
+    varied = Varied("u", 2.0, 5.0, (kind,), 3.0, 4.0, ())
+    time = np.arange(0.0, 60.0, 0.1)
+    levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[kind]
+    demand = Profile(varied, kind, levels, 4.0).demand(time)
+    assert not demand[time < 3.0].any()
+    begun = demand[time >= 3.0]
+    # Sampled each 0.1 s, a sine of 4 s misses its ends by up to 0.05 rad: 0.1 % of its amplitude.
+    assert begun.max() == pytest.approx(5.0, abs=0.01)
+    assert begun.min() >= 2.0
+
+
+def test_a_lag_is_of_first_order() -> None:
+    varied = Varied("u", 0.5, 1.0, (STEP,), 1.0, 4.0, (0.7,))
+    time = np.arange(0.0, 6.0, 0.01)
+    expected = np.where(time >= 1.0, 1.0 - np.exp(-(time - 1.0) / 0.7), 0.0)
+    # The filter is exact at samples, one of which the demand may come earlier.
+    found = Profile(varied, STEP, (1.0,), 4.0).signal(time)
+    assert np.abs(found - expected).max() < 0.01 / 0.7 + 1e-9
+
+
+# --- a heated block, whose recordings solve the equations by SciPy ---
+
+NEXT = """
+[next]
+lasts = "300 s"
+cost = { is = "0.5*duration/60", unit = "Euro" }
+
+[next.start]
+T = "42.9"
+Tc = "34.3"
+
+[next.inputs.P]
+range = ["25 W", "35 W"]
+every = "60 s"
+"""
+G = 0.3  # planted [W/K]
+WARM = 30.0 / (G + 0.4)  # [K] at 30 W, the casing at four fifths of it
+
+
+def heated(seed: int, power: np.ndarray, begin: float) -> pd.DataFrame:
+    """Temperature of a block that loses heat to a draught, at one power each second."""
+    rng = np.random.default_rng(seed)
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        into = 2.0 * (x[0] - x[1])
+        given = power[min(int(t), power.size - 1)]
+        return [(given - into - G * x[0]) / 100.0, (into - 0.5 * x[1]) / 200.0]
+
+    time = np.arange(power.size, dtype=float)
+    # A step of a second meets each change of the power.
+    run = solve_ivp(rates, (0.0, time[-1]), [begin, 0.8 * begin], t_eval=time, max_step=1.0)
+    measured = run.y[0] + NOISE * rng.standard_normal(time.size)
+    return pd.DataFrame({"time [s]": time, "P [W]": power, "T [K]": measured})
+
+
+@pytest.fixture(scope="module")
+def block(tmp_path_factory: pytest.TempPathFactory) -> System:
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    folder = tmp_path_factory.mktemp("heater") / "block"
+    heater(folder)
+    file = folder / "system.toml"
+    file.write_text(file.read_text() + NEXT)
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def mild(block: System) -> list[Case]:
+    """Powers so near each other that heat lost by temperature and by its square look alike."""
+    rng = np.random.default_rng(0)
+    powers = [np.repeat(rng.uniform(29.0, 31.0, 4), 50) for _ in range(3)]
+    return cases(block, [heated(k, power, WARM) for k, power in enumerate(powers)])
+
+
+@pytest.fixture(scope="module")
+def undecided(block: System, mild: list[Case], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    return diagnosed(block, mild, tmp_path_factory.mktemp("undecided"))
+
+
+@pytest.fixture(scope="module")
+def proposed(undecided: Outcome) -> NextStop:
+    return wb.next_stop(undecided, workers=1, report=lambda _: None)
+
+
+def made(block: System, one: Proposal) -> list[Case]:
+    """A recording of an experiment, by SciPy."""
+    power = one.prediction.candidate.profiles[0].demand(one.prediction.case.time)
+    return cases(block, [heated(9, power, WARM)])
+
+
+def test_the_first_proposal_parts_what_the_recordings_before_did_not(
+    block: System, mild: list[Case], undecided: Outcome, proposed: NextStop, tmp_path: Path
+) -> None:
+    (cause,) = undecided.diagnosis.causes
+    assert cause.confusable_with == ("Radiation",)
+    assert proposed.parts
+    assert "parts Draught from Radiation" in proposed.sentence
+    new = named_anew(made(block, proposed.tried[0]))
+    (cause,) = diagnosed(block, [*mild, *new], tmp_path).diagnosis.causes
+    assert (cause.effect.name, cause.confusable_with) == ("Draught", ())
+
+
+def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed: NextStop) -> None:
+    likely = [one.prediction.right > 0.5 for one in proposed.tried]
+    assert likely[0]
+    assert np.mean(likely) <= 0.5
+
+
+def test_the_last_experiment_of_the_list_leaves_them_together(
+    block: System, mild: list[Case], proposed: NextStop, tmp_path: Path
+) -> None:
+    assert proposed.tried[-1].prediction.right < 0.01
+    new = named_anew(made(block, proposed.tried[-1]))
+    (cause,) = diagnosed(block, [*mild, *new], tmp_path).diagnosis.causes
+    assert "Radiation" in (cause.effect.name, *cause.confusable_with)
+
+
+def test_the_separation_is_what_recordings_then_show(
+    block: System, mild: list[Case], proposed: NextStop
+) -> None:
+    """Of every experiment, within 20 %: noise moves it by one standard deviation."""
+    for one in proposed.tried:
+        expected = np.sqrt(one.prediction.apart[0, 1])
+        shown = parted(block, [*mild, *named_anew(made(block, one))], "Draught", "Radiation")
+        assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
+
+
+def test_the_cost_is_what_the_file_says(proposed: NextStop) -> None:
+    """Half a Euro a minute, five minutes."""
+    assert {one.cost for one in proposed.tried} == {2.5}
+    assert proposed.to_dict()["tried"][0]["cost"] == {"value": 2.5, "unit": "Euro"}
+
+
+def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
+    block: System, mild: list[Case], undecided: Outcome, tmp_path: Path
+) -> None:
+    assert undecided.rivals is not None
+    alone = replace(undecided.rivals, models=undecided.rivals.models[:1])
+    found = next_stop(block, alone, 1, lambda _: None)
+    deviations = [one.prediction.precision[1] for one in found.tried]
+    assert deviations == sorted(deviations)
+    assert "times as sure" in found.sentence
+    both = [*mild, *named_anew(made(block, found.tried[0]))]
+    rivals = diagnosed(block, both, tmp_path).rivals
+    assert rivals is not None
+    shown = rivals.models[0].information[0, 0] ** -0.5
+    # Of information that adds up, the draw of noise moves the derivatives by little.
+    assert shown == pytest.approx(deviations[0], rel=0.2)
+
+
+def test_rivals_are_read_as_they_were_written(undecided: Outcome) -> None:
+    assert undecided.rivals is not None
+    said = json.loads(json.dumps(undecided.rivals.to_dict()))
+    assert read_rivals(said).to_dict() == undecided.rivals.to_dict()
+
+
+def test_the_command_writes_what_it_prints(
+    block: System,
+    mild: list[Case],
+    undecided: Outcome,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    summary = {**undecided.to_dict(), "provenance": {"system": block.name}}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    out = tmp_path / "next"
+    options = ["--system", str(block.source), "--out", str(out), "--workers", "1"]
+    assert main(["next", str(tmp_path), *options]) == 0
+    said = json.loads((out / "next.json").read_text())
+    assert said["sentence"] in capsys.readouterr().out
+    assert said["rivals"] == ["Draught", "Radiation"]
+    assert len(pd.read_csv(out / "experiments.csv")) == len(said["tried"])
+    assert (out / "responses.png").stat().st_size > 0
+
+
+# --- what is refused ---
+
+
+@pytest.mark.parametrize(
+    ("summary", "said"),
+    [
+        ("nonsense", "no summary of a diagnosis"),
+        (
+            {"verdict": "found", "provenance": {"system": "wheelset"}},
+            "diagnose the recordings anew",
+        ),
+        ({"verdict": "nothing", "provenance": {"system": "wheelset"}}, "diagnose more recordings"),
+    ],
+)
+def test_what_is_no_undecided_diagnosis_is_refused(
+    summary: object, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert main(["next", str(tmp_path)]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_system_that_does_not_say_what_may_be_varied_is_refused(
+    block: System, undecided: Outcome
+) -> None:
+    assert undecided.rivals is not None
+    silent = replace(block, experiments=None)
+    with pytest.raises(InputError, match=r"no table \[next\]"):
+        next_stop(silent, undecided.rivals, 1, lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('range = ["25 W", "35 W"]', 'range = ["35 W", "25 W"]', r"\[low, high\]"),
+        ('every = "60 s"', 'every = "0 s"', "a time above 0"),
+        ('every = "60 s"', 'every = "60 s"\nprofiles = ["ramp"]', "step, staircase, sine"),
+        ("[next.inputs.P]", "[next.inputs.Q]", "unknown key 'Q'"),
+        ('T = "42.9"', 'T = "42.9 + begin"', "'begin'"),
+        ('T = "42.9"', 'Tx = "42.9"', "a continuous state of the model"),
+    ],
+)
+def test_a_mistake_in_what_may_be_varied_is_refused(
+    block: System, old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    for name in ("package.mo", "system.toml"):
+        text = (block.source.parent / name).read_text()
+        (tmp_path / name).write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=said):
+        load_system(tmp_path)
+
+
+def named_anew(recordings: Sequence[Case]) -> list[Case]:
+    """Under other names than those before."""
+    return [replace(one, name=f"new {one.name}") for one in recordings]

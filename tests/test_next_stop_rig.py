@@ -1,0 +1,101 @@
+"""The next stop on the virtual rig: it parts what stops that are all alike did not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import workbench as wb
+from workbench.case import Case, read_case
+from workbench.diagnosis import Outcome
+from workbench.experiments import NextStop, Proposal
+from workbench.system import System
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Conditions, Scenario, plant
+
+from .distances import parted
+from .recordings import record
+
+EFFECTS = ["PressureDependentPadFriction", "BeddingIn"]
+PLANTED = plant(CONSTANT_PADS, ["pressure_exponent=0.04"])
+
+
+@pytest.fixture(scope="module")
+def one_speed(system: System) -> System:
+    """The rig where only the pressure may be varied."""
+    assert system.experiments is not None
+    settings = {name: values[:1] for name, values in system.experiments.settings.items()}
+    return replace(system, experiments=replace(system.experiments, settings=settings))
+
+
+@pytest.fixture(scope="module")
+def alike(system: System, tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+    """Two stops from 80 km/h at 2.7 bar."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    usual, folder = SCENARIOS["02_dry_100_2.7"], tmp_path_factory.mktemp("alike")
+    conditions = replace(usual.conditions, initial_speed=80 / 3.6)
+    for number in (20, 21):
+        stop = replace(usual, name=f"{number}_alike", conditions=conditions)
+        record(stop, number, PLANTED, folder / stop.name)
+    return [read_case(one, system) for one in sorted(folder.iterdir())]
+
+
+@pytest.fixture(scope="module")
+def undecided(
+    one_speed: System, alike: list[Case], tmp_path_factory: pytest.TempPathFactory
+) -> Outcome:
+    out = tmp_path_factory.mktemp("undecided")
+    return wb.diagnose(one_speed, alike, effects=EFFECTS, out=out, workers=1, report=lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def proposed(undecided: Outcome) -> NextStop:
+    return wb.next_stop(undecided, workers=1, report=lambda _: None)
+
+
+def made(one: Proposal, system: System, folder: Path) -> Case:
+    """The stop as the rig makes it: pressure is asked for anew every 50 ms."""
+    said, (profile,) = one.prediction.case.conditions, one.prediction.candidate.profiles
+    time = np.arange(0.0, 60.0, 0.05)
+    demand = profile.demand(time + profile.input.begins)
+    steps = [
+        (float(time[k]), float(demand[k]))
+        for k in range(1, time.size)
+        if demand[k] != demand[k - 1]
+    ]
+    conditions = Conditions(
+        float(said["initial_speed"]),  # type: ignore[arg-type]
+        float(demand[0]),
+        "dry",
+        ("dry",) * 3,
+        1,
+    )
+    stop = Scenario("30_next", conditions, 0.40, None, True, tuple(steps))
+    record(stop, 30, PLANTED, folder / stop.name)
+    return read_case(folder / stop.name, system)
+
+
+def test_the_proposed_stop_parts_what_stops_alike_did_not(
+    one_speed: System, alike: list[Case], undecided: Outcome, proposed: NextStop, tmp_path: Path
+) -> None:
+    (cause,) = undecided.diagnosis.causes
+    assert {cause.effect.name, *cause.confusable_with} == set(EFFECTS)
+    cases = [*alike, made(proposed.tried[0], one_speed, tmp_path)]
+    then = wb.diagnose(
+        one_speed, cases, effects=EFFECTS, out=tmp_path, workers=1, report=lambda _: None
+    )
+    (cause,) = then.diagnosis.causes
+    assert (cause.effect.name, cause.confusable_with) == (EFFECTS[0], ())
+
+
+@pytest.mark.parametrize("rank", [0, -1])
+def test_the_separation_is_what_the_stop_then_shows(
+    rank: int, one_speed: System, alike: list[Case], proposed: NextStop, tmp_path: Path
+) -> None:
+    """Of the best stop and of the last, within 20 %; noise moves it by one standard deviation."""
+    one = proposed.tried[rank]
+    true, other = (proposed.names.index(name) for name in EFFECTS)
+    expected = np.sqrt(one.prediction.apart[true, other])
+    shown = parted(one_speed, [*alike, made(one, one_speed, tmp_path)], *EFFECTS)
+    assert shown == pytest.approx(expected, rel=0.2, abs=2.0)
+    assert (one.prediction.right > 0.5) == (rank == 0)

@@ -1,0 +1,117 @@
+"""What may be run next, one by one: conditions, and profiles of the inputs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.signal import lfilter
+
+from workbench.fmu import Vector
+from workbench.system import System
+from workbench.system_experiments import SINE, STAIRCASE, STEP, Experiments, Setting, Varied
+from workbench.units import si_factor
+
+_STAIRS = 3  # from the least to the largest demand
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Demand on an input.
+
+    Attributes
+    ----------
+    levels : of a step or staircase, one after the other and again; of a sine its ends [unit].
+    every : [s] that a stair lasts, and the period of a sine.
+    """
+
+    input: Varied
+    kind: str
+    levels: tuple[float, ...]
+    every: float
+
+    def demand(self, time: Vector) -> Vector:
+        """What is asked for, (n,) [unit]."""
+        begun = time - self.input.begins
+        if self.kind == SINE:
+            low, high = self.levels
+            wave = np.sin(2.0 * np.pi * begun / self.every)
+            return np.where(begun >= 0.0, 0.5 * (low + high) + 0.5 * (high - low) * wave, 0.0)
+        stair = np.floor(np.maximum(begun, 0.0) / self.every).astype(int) % len(self.levels)
+        return np.where(begun >= 0.0, np.array(self.levels)[stair], 0.0)
+
+    def signal(self, time: Vector) -> Vector:
+        """What the input then is, (n,) [unit]: behind its lags."""
+        values, h = self.demand(time), float(time[1] - time[0])
+        for lag in self.input.lags:
+            pole = np.exp(-h / lag)
+            values = lfilter([1.0 - pole], [1.0, -pole], values)
+        return values
+
+    def text(self, system: System) -> str:
+        """For people, in the unit of figures."""
+        signal = system.signals[self.input.name]
+        factor = si_factor(signal.shown, signal.unit, signal.name)
+        unit = "" if signal.shown == "1" else f" {signal.shown}"
+        shown = [f"{level / factor:.3g}" for level in self.levels]
+        if self.kind == SINE:
+            return f"{signal.name} sine {shown[0]} to {shown[1]}{unit}, period {self.every:g} s"
+        if self.kind == STEP:
+            return f"{signal.name} step to {shown[0]}{unit}"
+        return f"{signal.name} staircase {', '.join(shown)}{unit}, {self.every:g} s each"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One recording that could be made.
+
+    Attributes
+    ----------
+    settings : of conditions, by name.
+    profiles : of the inputs that are varied.
+    """
+
+    settings: Mapping[str, Setting]
+    profiles: tuple[Profile, ...]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Conditions that are numbers, SI."""
+        values = {name: one.value for name, one in self.settings.items()}
+        return {name: v for name, v in values.items() if isinstance(v, int | float)}
+
+    def text(self, system: System) -> str:
+        """For people."""
+        said = [
+            f"{system.condition(name).label} {setting.text}"
+            for name, setting in self.settings.items()
+        ]
+        return "; ".join([*said, *(one.text(system) for one in self.profiles)])
+
+
+def candidates(experiments: Experiments) -> list[Candidate]:
+    """All that are tried: every setting of the conditions with every profile of each input."""
+    names = list(experiments.settings)
+    chosen = list(product(*experiments.settings.values()))
+    profiles = list(product(*(_profiles(one) for one in experiments.varied)))
+    return [
+        Candidate(dict(zip(names, settings, strict=True)), followed)
+        for settings in chosen
+        for followed in profiles
+    ]
+
+
+def _profiles(one: Varied) -> list[Profile]:
+    """Steps to the ends of the range and between them; stairs begun at either end; sines."""
+    low, high = one.low, one.high
+    rising = np.linspace(low, high, _STAIRS + 1).tolist()
+    stairs = (*rising, *rising[-2:0:-1])
+    found = []
+    if STEP in one.profiles:
+        found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
+    if STAIRCASE in one.profiles:
+        falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
+        found += [Profile(one, STAIRCASE, levels, one.every) for levels in (stairs, falling)]
+    if SINE in one.profiles:
+        found += [Profile(one, SINE, (low, high), times * one.every) for times in (1.0, 2.0)]
+    return found

@@ -1,0 +1,315 @@
+"""What every rival predicts of every experiment, and what that would tell them apart by."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from workbench.case import Case
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.counting import count
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.extension import variables
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Point
+from workbench.diagnosis.quadratic import (
+    Joint,
+    Key,
+    Quadratic,
+    RecordingSystem,
+    covariance,
+    minimum,
+)
+from workbench.diagnosis.rivals import Rival, Rivals
+from workbench.diagnosis.thresholds import SOUND, Thresholds
+from workbench.errors import InputError
+from workbench.experiments.candidates import Candidate
+from workbench.experiments.recorded import recorded, start_of
+from workbench.experiments.separation import precision, refitted, told_apart
+from workbench.fmu import CoSimulation, Matrix, Vector
+from workbench.pool import Pool
+from workbench.system import System
+from workbench.system_experiments import Experiments
+
+LIKELY = 0.5  # a chance that is more likely than not
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What one experiment would tell.
+
+    Attributes
+    ----------
+    candidate, case : the experiment, and a recording of it as the first rival predicts it.
+    apart : (r, r) chi-squared that the second leaves beyond the first where the first is true, in
+        all recordings with this one.
+    chance : (r, r) that a diagnosis then tells them apart.
+    precision : mean deviation of the sizes of the first rival, before and after.
+    block_time : (b,) [s].
+    left : (r, b, c) what each leaves of the first one's response, by block and channel, in units of
+        its noise.
+    """
+
+    candidate: Candidate
+    case: Case
+    apart: Matrix
+    chance: Matrix
+    precision: tuple[float, float]
+    block_time: Vector
+    left: NDArray[np.float64]
+
+    @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Rivals that it likely leaves together, by number."""
+        together = np.minimum(self.chance, self.chance.T) <= LIKELY
+        np.fill_diagonal(together, True)
+        _, of = connected_components(together)
+        return tuple(tuple(np.flatnonzero(of == g).tolist()) for g in dict.fromkeys(of))
+
+    @property
+    def _between(self) -> NDArray[np.bool_]:
+        """(r, r) pairs that it parts; all of them where it parts none."""
+        count = len(self.apart)
+        pairs = ~np.eye(count, dtype=bool)
+        if len(self.groups) > 1:
+            for group in self.groups:
+                pairs[np.ix_(group, group)] = False
+        return pairs
+
+    @property
+    def separation(self) -> float:
+        """Least distance of two rivals that it parts [standard deviations]; of any, if none."""
+        least = self.apart[self._between].min(initial=np.inf)
+        return float(np.sqrt(max(0.0, least))) if np.isfinite(least) else 0.0
+
+    @property
+    def right(self) -> float:
+        """Chance that the true rival, or the group that it leaves it in, is then named alone.
+
+        At least that, each rival being as likely: chances of being mistaken for another add up
+        (Bonferroni).
+        """
+        missed = np.where(self._between, 1.0 - self.chance, 0.0).sum(axis=1)
+        return float(np.maximum(0.0, 1.0 - missed).mean())
+
+
+@contextmanager
+def _modelled(path: Path) -> Iterator[CoSimulation]:
+    with CoSimulation(path) as model:
+        yield model
+
+
+def predicted_cases(
+    everything: Path,
+    system: System,
+    experiments: Experiments,
+    rivals: Rivals,
+    effects: Mapping[str, Effect],
+    plan: Sequence[Candidate],
+    workers: int,
+) -> list[tuple[Candidate, Case]]:
+    """Recordings of all experiments as the first rival predicts them; of those that count."""
+    added = {one.name for one in experiments.sensors}
+    judged = tuple(one.name for one in system.judged if one.name in {*rivals.signals, *added})
+    with Pool(min(workers, len(plan)), _modelled, everything) as pool:
+        under_way = [
+            pool.submit(
+                recorded,
+                *(system, experiments, one, _values(system, rivals, effects, one)),
+                *(f"{number:03}", judged, number),
+            )
+            for number, one in enumerate(plan, 1)
+        ]
+        cases = [one.result() for one in under_way]
+    return [pair for pair in zip(plan, cases, strict=True) if _counts(pair[1], system)]
+
+
+def _counts(case: Case, system: System) -> bool:
+    """Whether a recording has enough that counts."""
+    try:
+        count(case, system, tuple(case.signals), SOUND)
+    except InputError:
+        return False
+    return True
+
+
+def _values(
+    system: System, rivals: Rivals, effects: Mapping[str, Effect], candidate: Candidate
+) -> dict[str, float]:
+    """Parameters of the first rival in an experiment."""
+    first, values = rivals.models[0], dict(rivals.given)
+    for condition in system.conditions:
+        setting = candidate.settings.get(condition.name)
+        usual = condition.choices[0] if condition.choices else ""
+        values |= condition.parameters.get(str(setting.value if setting else usual), {})
+    for (name, choice), level in first.levels.items():
+        if name in system.comparison.levels and choice in _choices(system, name, candidate):
+            values[name] = level
+    for (name, parameter), size in first.sizes.items():
+        part = "cosine" if parameter == "amplitude" else parameter
+        for variable in variables(effects[name], part):
+            start = rivals.given.get(variable, 0.0) if part in effects[name].sizes else 0.0
+            values[variable] = start + size
+    return values
+
+
+def _choices(system: System, level: str, candidate: Candidate) -> set[str]:
+    """What the level of a parameter may be called in an experiment."""
+    by = system.comparison.levels[level].by
+    if not by:
+        return {"all"}
+    setting = candidate.settings.get(by)
+    if setting is None:
+        return {str(system.condition(by).choices[0])}
+    said = setting.value if isinstance(setting.value, tuple) else (setting.value,)
+    return set(map(str, said))
+
+
+def predictions(
+    everything: Path,
+    system: System,
+    experiments: Experiments,
+    rivals: Rivals,
+    effects: Mapping[str, Effect],
+    planned: Sequence[tuple[Candidate, Case]],
+    workers: int,
+) -> list[Prediction]:
+    """What each experiment would tell, in their order."""
+    cases = [case for _, case in planned]
+    with Simulations(everything, system, rivals.given, cases, workers) as simulations:
+        fit = Fit(simulations, list(effects.values()), beside=cases[:1])
+        begun = _begun(fit, [start_of(system, experiments, one) for one, _ in planned])
+        rows = [_linearised(fit, rivals, one, effects, begun) for one in rivals.models]
+        return [
+            _prediction(simulations, fit.decides, rivals, rows, k, candidate)
+            for k, (candidate, _) in enumerate(planned)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A rival about its point, along all experiments.
+
+    Attributes
+    ----------
+    joint : over its common unknowns.
+    information : of these in the recordings so far, (p, p).
+    bare : its responses without its causes, beside the derivatives of `joint`.
+    """
+
+    joint: Joint
+    information: Matrix
+    bare: Joint
+
+
+def _begun(fit: Fit, starts: Sequence[Mapping[str, float]]) -> Matrix:
+    """Deviations of experiments whose states start as they are set, in standard deviations."""
+    point = fit.unknowns.start()
+    deviations = point.deviations.copy()
+    usual = fit.unknowns.starts(point)
+    for k, (name, start) in enumerate(zip(fit.unknowns.names, starts, strict=True)):
+        for j, (state, spread) in enumerate(fit.unknowns.local.items()):
+            if state in start:
+                away = start[state] - usual[name][state]
+                deviations[k, j] = away / fit.unknowns.spread(point, state, k, spread)
+    return deviations
+
+
+def _linearised(
+    fit: Fit, rivals: Rivals, rival: Rival, effects: Mapping[str, Effect], begun: Matrix
+) -> _Row:
+    start = fit.unknowns.start()
+    levels = {key: rival.levels.get(key, usual) for key, usual in start.levels.items()}
+    turning = {name for name, parameter in rival.sizes if parameter == "amplitude"}
+    phases = {name: np.zeros(fit.unknowns.count) for name in turning}
+    point = Point(rival.sizes, levels, begun, phases)
+    lin = fit.linearise(fit.at(point), [effects[name] for name in rival.effects])
+    # A further sensor has noise alone.
+    inflation = np.ones(lin.inflation.size)
+    inflation[: rivals.inflation.size] = rivals.inflation
+    lin = replace(lin, inflation=inflation)
+    nominal = fit.at(Point({}, levels, begun, {})).evidence
+    bare = [
+        replace(one, errors=without.errors, rest=without.rest)
+        for one, without in zip(lin.evidence, nominal, strict=True)
+    ]
+    joint = fit.quadratics(lin)
+    unexplained = fit.quadratics(replace(lin, evidence=tuple(bare)))
+    return _Row(joint, _aligned(joint, rival), unexplained)
+
+
+def _aligned(joint: Joint, rival: Rival) -> Matrix:
+    """Information of a rival over the unknowns of new recordings.
+
+    Unknowns that these do not have are left free; of new ones only the prior is known.
+    """
+    old: list[Key] = [*rival.sizes, *rival.levels]
+    kept = [key for key in old if key in joint.shared]
+    at, gone = (
+        [old.index(key) for key in keys] for keys in (kept, [k for k in old if k not in kept])
+    )
+    N = rival.information
+    own = N[np.ix_(at, at)]
+    if gone:
+        cross = N[np.ix_(at, gone)]
+        own = own - cross @ covariance(N[np.ix_(gone, gone)]) @ cross.T
+    found = joint.prior.N.copy()
+    places = [joint.shared.index(key) for key in kept]
+    found[places, :] = 0.0
+    found[:, places] = 0.0
+    found[np.ix_(places, places)] = own
+    return found
+
+
+def _prediction(
+    simulations: Simulations,
+    decides: Thresholds,
+    rivals: Rivals,
+    rows: Sequence[_Row],
+    k: int,
+    candidate: Candidate,
+) -> Prediction:
+    count_, first = len(rows), rows[0]
+    apart, chance = np.zeros((count_, count_)), np.ones((count_, count_))
+    left = []
+    for i, (true, model) in enumerate(zip(rows, rivals.models, strict=True)):
+        explained = model.explained + _explained(true, k)
+        for j, (other, rival) in enumerate(zip(rows, rivals.models, strict=True)):
+            away = _away(other.joint, true.joint, k)
+            total, z = refitted(away.eliminated(), other.information)
+            if i != j:
+                apart[i, j] = total + rival.behind - model.behind
+                chance[i, j] = told_apart(apart[i, j], explained, decides)
+            if i == 0:
+                left.append(away.errors(z))
+    own = [first.joint.shared.index(key) for key in rivals.models[0].sizes]
+    samples, case = simulations.recordings[k], simulations.cases[k]
+    return Prediction(
+        candidate=candidate,
+        case=case,
+        apart=apart,
+        chance=chance,
+        precision=precision(first.joint.systems[k].eliminated().N, first.information, own),
+        block_time=samples.time[samples.blocks.mean(axis=1).astype(int)],
+        left=np.array(left),
+    )
+
+
+def _explained(true: _Row, k: int) -> float:
+    """Chi-squared that the causes explain in one experiment, beyond what levels do."""
+    away = _away(true.bare, true.joint, k).eliminated()
+    at = [j for j, key in enumerate(true.joint.shared) if key in true.joint.levels]
+    levels = Quadratic(away.N[np.ix_(at, at)], away.g[at], away.c, away.rows)
+    return levels.at(minimum(levels))
+
+
+def _away(rival: Joint, true: Joint, k: int) -> RecordingSystem:
+    """A rival in one experiment where another is true, noise left out."""
+    one = rival.systems[k]
+    zero = np.zeros(one.deviations.size)
+    return replace(one, r=one.r - true.systems[k].r, deviations=zero)
