@@ -11,7 +11,7 @@ from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
 from workbench.experiments import NextStop, Proposal
 from workbench.system import System
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Conditions, Scenario, plant
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Conditions, Effects, Scenario, plant
 
 from .distances import parted
 from .recordings import record
@@ -28,16 +28,20 @@ def one_speed(system: System) -> System:
     return replace(system, experiments=replace(system.experiments, settings=settings))
 
 
-@pytest.fixture(scope="module")
-def alike(system: System, tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
     """Two stops from 80 km/h at 2.7 bar."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
-    usual, folder = SCENARIOS["02_dry_100_2.7"], tmp_path_factory.mktemp("alike")
+    usual = SCENARIOS["02_dry_100_2.7"]
     conditions = replace(usual.conditions, initial_speed=80 / 3.6)
     for number in (20, 21):
         stop = replace(usual, name=f"{number}_alike", conditions=conditions)
-        record(stop, number, PLANTED, folder / stop.name)
+        record(stop, number, effects, folder / stop.name)
     return [read_case(one, system) for one in sorted(folder.iterdir())]
+
+
+@pytest.fixture(scope="module")
+def alike(system: System, tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    return two_stops(system, PLANTED, tmp_path_factory.mktemp("alike"))
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +103,23 @@ def test_the_separation_is_what_the_stop_then_shows(
     shown = parted(one_speed, [*alike, made(one, one_speed, tmp_path)], *EFFECTS)
     assert shown == pytest.approx(expected, rel=0.2, abs=2.0)
     assert (one.prediction.right > 0.5) == (rank == 0)
+
+
+def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
+    one_speed: System, tmp_path: Path
+) -> None:
+    """A load cell and a torque that read too much are told apart by neither pressure nor time."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    asked = one_speed.experiments
+    assert asked is not None
+    steps = tuple(replace(one, profiles=("step",)) for one in asked.varied)
+    rig = replace(one_speed, experiments=replace(asked, varied=steps))
+    cases = two_stops(rig, plant(CONSTANT_PADS, ["fx_gain=0.02"]), tmp_path / "stops")
+    names = ["FxGain", "DriveTorqueGain"]
+    found = wb.diagnose(rig, cases, effects=names, out=tmp_path, workers=1, report=lambda _: None)
+    (cause,) = found.diagnosis.causes
+    assert {cause.effect.name, *cause.confusable_with} == set(names)
+    proposed = wb.next_stop(found, workers=1, report=lambda _: None)
+    assert not proposed.parts
+    assert proposed.sentence.startswith("No experiment here parts")
+    assert list(proposed.sensors) == ["force in the guidance arms"]
