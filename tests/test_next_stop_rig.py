@@ -121,5 +121,7 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
     assert {cause.effect.name, *cause.confusable_with} == set(names)
     proposed = wb.next_stop(found, workers=1, report=lambda _: None)
     assert not proposed.parts
-    assert proposed.sentence.startswith("No experiment here parts")
+    assert proposed.sentence.startswith(
+        "No experiment here likely parts FxGain and DriveTorqueGain"
+    )
     assert list(proposed.sensors) == ["force in the guidance arms"]

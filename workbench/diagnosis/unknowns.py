@@ -19,7 +19,7 @@ from workbench.diagnosis.presence import Presence
 from workbench.diagnosis.quadratic import Key
 
 SENSOR = "sensor"  # in place of a choice, of a sensor's delay
-_ALL = "all"  # in place of a choice, of a level that no condition changes
+ALL = "all"  # in place of a choice, of a level that no condition changes
 
 
 class Unknowns:
@@ -103,7 +103,7 @@ class Unknowns:
         """Which level of a parameter a recording has: of a list, the entry that is not usual."""
         by = self._compare.levels[level].by
         if not by:
-            return _ALL
+            return ALL
         said = case.conditions[by]
         entries = said if isinstance(said, tuple) else (said,)
         usual = self._simulations.system.condition(by).choices[0]

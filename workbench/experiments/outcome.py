@@ -106,7 +106,8 @@ class NextStop:
             )
         for group in found.groups:
             if len(group) > 1:
-                said.append(f"No experiment here parts {_or(self.names[i] for i in group)}.")
+                names = " and ".join(self.names[i] for i in group)
+                said.append(f"No experiment here likely parts {names}, whichever is true.")
         for sensor, one in self.sensors.items():
             groups = " from ".join(_or(self.names[i] for i in g) for g in one.prediction.groups)
             said.append(f"A sensor of {sensor} would part {groups}: {one.text}.")

@@ -27,6 +27,7 @@ from workbench.diagnosis.quadratic import (
 )
 from workbench.diagnosis.rivals import Rival, Rivals
 from workbench.diagnosis.thresholds import SOUND, Thresholds
+from workbench.diagnosis.unknowns import ALL
 from workbench.errors import InputError
 from workbench.experiments.candidates import Candidate
 from workbench.experiments.recorded import recorded, start_of
@@ -162,7 +163,7 @@ def _choices(system: System, level: str, candidate: Candidate) -> set[str]:
     """What the level of a parameter may be called in an experiment."""
     by = system.comparison.levels[level].by
     if not by:
-        return {"all"}
+        return {ALL}
     setting = candidate.settings.get(by)
     if setting is None:
         return {str(system.condition(by).choices[0])}
