@@ -8,10 +8,10 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="lost", step=0.1, matters=0.75, slots={"brakeUnits"},
+      size="lost", step=0.1, matters=0.1, slots={"brakeUnits"}, after="WeakPads",
       separation="a look at the cocks of the axle's brake units")),
     Documentation(info="<html>
-<p>Units are cut off whole: what is far from one is none. The other discs of the axle stay as warm as
+<p>Units are cut off whole: a size far from 1 is another cause. The other discs of the axle stay as warm as
 they were.</p>
 </html>"));
 end IsolatedUnit;
