@@ -18,6 +18,15 @@ model TwoVehicles "Two vehicles with four axles each"
   input Real dmuDC6(unit="1") "Correction of muDC[6]";
   input Real dmuDC7(unit="1") "Correction of muDC[7]";
   input Real dmuDC8(unit="1") "Correction of muDC[8]";
+  input Real dr1(unit="m") "Correction of r[1]";
+  input Real dr2(unit="m") "Correction of r[2]";
+  input Real dr3(unit="m") "Correction of r[3]";
+  input Real dr4(unit="m") "Correction of r[4]";
+  input Real dr5(unit="m") "Correction of r[5]";
+  input Real dr6(unit="m") "Correction of r[6]";
+  input Real dr7(unit="m") "Correction of r[7]";
+  input Real dr8(unit="m") "Correction of r[8]";
+  input Real dbias(unit="m/s2") "Correction of bias";
   output Real omega1(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 1";
   output Real omega2(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 2";
   output Real omega3(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 3";
@@ -27,7 +36,7 @@ model TwoVehicles "Two vehicles with four axles each"
   output Real omega7(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 7";
   output Real omega8(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 8";
   output Real omegaReading[8](each unit="rad/s") = speedSensor.y "Readings of the speed sensors";
-  output Real slip(unit="m/s") = v - radius.y[1]*omega1 "Slip velocity of axle 1";
+  output Real slip(unit="m/s") = v - rA[1]*omega1 "Slip velocity of axle 1";
   output Real force(unit="N") = sum(Fx) "Braking force of all axles";
   output Real a(unit="m/s2", start=0.0, fixed=true, nominal=1.0) "Of the accelerometer";
   output Real vTrain(unit="m/s", start=0.0, fixed=true, nominal=20.0) "Speed of the train";
@@ -57,7 +66,7 @@ equation
   mu = padFriction.y;
   acting = brakeUnits.y;
   drag = dragging.tau;
-  rA = radius.y;
+  rA = radius.y + {dr1, dr2, dr3, dr4, dr5, dr6, dr7, dr8};
   m = weighed.y;
   mu0 = adhesion.y;
   air = airResistance.y;
@@ -77,7 +86,7 @@ equation
   der(omega8) = rate[8];
   der(vTrain) = acceleration;
   // A filter of first order at 5 Hz.
-  der(a) = 6.283185307179586*5.0*(felt - a);
+  der(a) = 6.283185307179586*5.0*(felt + dbias - a);
   annotation (
     experiment(StopTime=60.0, Tolerance=1e-6),
     Documentation(info="<html>
