@@ -58,7 +58,7 @@ def stop(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
     (own / "case.toml").write_text(CASE.replace(*change))
     names = [*(f"pB{j} [bar]" for j in range(1, 5)), *(f"omega{i} [rad/s]" for i in range(1, 9))]
     header = ["time [s]", *names, "a [m/s2]", "s [m]"]
-    rows = [[t, *[0.1 * t] * 4, *[20.0 / 0.46] * 8, 0.0, 1000.0 + 20.0 * t] for t in TIME]
+    rows = [[t, *[0.1 * t] * 4, *[43.5 - 0.1 * t] * 8, -0.01 * t, 1000.0 + 20.0 * t] for t in TIME]
     lines = [",".join(header), *(",".join(f"{value:.6f}" for value in row) for row in rows)]
     (own / "measured.csv").write_text("\n".join(lines))
     track = "position [m],gradient [permille],radius [m]\n0,0,0\n1200,12,600\n2000,20,0\n"
@@ -163,11 +163,11 @@ def test_friction_and_radius_of_each_axle_are_estimated(train: System, tmp_path:
     case = next(one for one in cases if one.name == "01_120_service_dry")
     told, run = truth["cases"][case.name], wb.observe(train, case, "ekf").to_frame()
     at = int(np.searchsorted(case.time, told["standstill"] - 15.0))  # at about 15 m/s
-    friction = np.array([run[f"ekf.muDC[{i}] [1]"].iloc[at] for i in range(1, 9)])
+    friction = np.array([run[f"muDC[{i}] [1]"].iloc[at] for i in range(1, 9)])
     # Three deviations of profile, load and law, of 3 % in all, of the worst of eight axles.
     assert_allclose(friction, told["pad_level"], atol=0.09 * 0.30)
     assert friction.argmin() == 2
-    radius = np.array([run[f"ekf.r[{i}] [m]"].iloc[at] for i in range(1, 9)])
+    radius = np.array([run[f"r[{i}] [m]"].iloc[at] for i in range(1, 9)])
     # One to another; what is common to all wheels no sensor here tells from the train's speed.
     true = 1e-3 * np.array(told["radius_mm"])
     assert_allclose(radius - radius.mean(), true - true.mean(), atol=4e-5)

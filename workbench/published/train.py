@@ -15,7 +15,8 @@ from workbench.tables import read_table
 
 _CASE = "case.toml"
 _STEP = 0.1  # of a case [s]
-_AXLES, _BOGIES = 8, 4
+_PRESSURES = ("pB1", "pB2", "pB3", "pB4")
+_SPEEDS = tuple(f"omega{axle}" for axle in range(1, 9))
 _MIDDLES = (10.75, 37.15)  # of the vehicles, behind the first axle [m]
 _CURVE = 0.6  # resistance over weight, times the radius [m]
 
@@ -36,8 +37,7 @@ def _recording(folder: Path) -> Recording:
     document = read_table(folder / _CASE, "describe the stop", 'title = "..."')
     conditions = document.table("conditions")
     measured = folder / document.table("measurement").take("file", str)
-    signals = {f"pB{j}": "bar" for j in range(1, _BOGIES + 1)}
-    signals |= {f"omega{i}": "rad/s" for i in range(1, _AXLES + 1)} | {"a": "m/s2"}
+    signals = dict.fromkeys(_PRESSURES, "bar") | dict.fromkeys(_SPEEDS, "rad/s") | {"a": "m/s2"}
     read = {
         name: one.values for name, one in read_columns(measured, ("time", *signals, "s")).items()
     }
