@@ -47,7 +47,7 @@ ORCHARD = """package Orchard "Three trees that drink from one pipe"
   end Drought;
 
   model Base "Water in the ground"
-    parameter Real opening[3](each unit="1") = {0.2, 0.3, 0.4} "Of the valves";
+    parameter Real opening[3](each unit="1") = fill(0.3, 3) "Of the valves";
     output Real water[3](each unit="m3", each start=0.0, each fixed=true) "Of the trees";
     replaceable Valves valves(u=opening) constrainedby PartialValves(u=opening) "Valves";
   equation
@@ -95,6 +95,7 @@ def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path: Path) -> Non
     defaults = {parameter.name: parameter.start for parameter in flat.parameters}
     assert [defaults[f"valves.clogging.lost[{k}]"] for k in (1, 2, 3)] == [0.1, 0.0, 0.5]
     assert defaults["valves.drought.dry"] == 0.2
+    assert [defaults[f"opening[{k}]"] for k in (1, 2, 3)] == [0.3, 0.3, 0.3]  # fill(0.3, 3)
 
 
 @pytest.mark.parametrize(
