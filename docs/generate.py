@@ -236,22 +236,23 @@ def catalogue(systems: list[System]) -> str:
     ]
     for system in systems:
         library = read_library(system.library)
-        effects = read_effects(library, system.models[OBSERVER].name)
+        every = read_effects(library, system.models[OBSERVER].name)
+        effects = [one for one in every if one.place <= 1]  # one class in all its places
         text += ["", f"## {system.name}", "", f"{system.title}.", ""]
         text += ["| effect | what it is | size | matters from | what tells it from its twins |"]
         text += ["| --- | --- | --- | --- | --- |"]
         for one in effects:
             unit = _unit(library, one)
             cells = (
-                f"`{one.name}`",
-                one.text,
+                f"`{one.kind}`",
+                f"{one.text} (any of {one.places})" if one.places else one.text,
                 one.label,
                 f"{one.matters:g} {unit}",
                 one.separation,
             )
             text.append(f"| {' | '.join(map(_cell, cells))} |")
         for one in effects:
-            text += ["", f"### {system.name}: {one.name}", "", *_effect(library, one)]
+            text += ["", f"### {system.name}: {one.kind}", "", *_effect(library, one)]
     return "\n".join(text) + "\n"
 
 

@@ -63,11 +63,23 @@ class Layout:
     name : for people, such as "the publisher's own files".
     files : SHA-256 of each, by its path in the folder; all must be there.
     read : the recordings in a folder with these files.
+    pattern : of files that anybody may have recorded in this format, in place of `files`; their
+        checksums are noted.
     """
 
     name: str
     files: Mapping[str, str]
     read: Callable[[Path], Sequence[Recording]]
+    pattern: str = ""
+
+    def found(self, source: Path) -> dict[str, str]:
+        """SHA-256 of the files of the layout that are in a folder, by their path there."""
+        paths = source.glob(self.pattern) if self.pattern else map(source.joinpath, self.files)
+        return {
+            path.relative_to(source).as_posix(): _sha256(path.read_bytes())
+            for path in sorted(paths)
+            if path.is_file()
+        }
 
 
 @dataclass(frozen=True)
@@ -159,7 +171,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
                 "licence": known.licence,
                 "workbench": commit(),
                 "layout": layout.name,
-                "read": dict(layout.files),
+                "read": layout.found(source),
                 "held_out": [one.name for one in recordings if one.held_out],
                 "written": {path: _sha256(text.encode()) for path, text in written.items()},
                 "cases": {one.name: _described(one) for one in recordings},
@@ -195,11 +207,11 @@ def _refuse_other_files(out: Path) -> None:
 def _layout(known: Published, source: Path) -> Layout:
     """The layout in which the set lies in a folder, of files with the right checksums."""
     for layout in known.layouts:
-        if any((source / path).is_file() for path in layout.files):
+        if layout.found(source):
             for path, sha256 in layout.files.items():
                 _check(source / path, sha256)
             return layout
-    expected = [next(iter(layout.files)) for layout in known.layouts]
+    expected = [next(iter(layout.files), layout.pattern) for layout in known.layouts]
     raise InputError(
         where=str(source),
         found="none of the files" if source.is_dir() else "no such folder",

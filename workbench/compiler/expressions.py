@@ -282,6 +282,9 @@ class Arena:
             case "identity":
                 size = int(float(operands[0][()]))
                 return each(ca.SX, np.array(np.eye(size), object))
+            case "fill":
+                shape = [int(float(o[()])) for o in operands[1:]]
+                return np.broadcast_to(operands[0], (*shape, *operands[0].shape))
             case "zeros" | "ones":
                 shape = [int(float(o[()])) for o in operands]
                 return each(ca.SX, np.full(shape, float(name == "ones"), object))

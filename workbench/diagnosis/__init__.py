@@ -18,7 +18,7 @@ from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.counting import refuse_too_few
 from workbench.diagnosis.evidence import Simulations, delay, simulating
-from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.extension import build, parameter_of, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.pace import Pace
@@ -254,8 +254,7 @@ def _values(
     values: dict[str, dict[str, float]] = {}
     for effect in effects:
         for variable, value in simulations.given.items():
-            slot, _, parameter = variable.rpartition(".")
-            if slot == variables(effect, parameter)[0].rpartition(".")[0]:
+            if parameter := parameter_of(effect, variable):
                 values.setdefault(effect.name, {})[parameter] = value
     for (name, parameter), value in diagnosis.best.point.sizes.items():
         # An order-locked effect has another phase in each recording; the model turns from zero.

@@ -6,15 +6,17 @@ bounds and defaults are those of its parameters; which slots it fills follows fr
 that it extends.
 """
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
+from workbench.diagnosis.annotation import Said
 from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError, closest
 from workbench.modelica import Class, Library
 
 _TURNING = ("cosine", "sine")
+_ARRAY = re.compile(r"zeros\((\w+)\)")
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Effect:
 
     Attributes
     ----------
-    name : of the Modelica class, also used in results.
+    name : of the Modelica class, also used in results; with its place where there are several.
     model : dotted name of the class.
     slots : of the base model that the class is plugged into.
     size : parameter that is zero in the nominal model; of an order-locked effect, which has the
@@ -81,6 +83,7 @@ class Effect:
     text : what it is, for people.
     separation : the experiment that tells it from its likely twins.
     where, unless, falling : which stops can show it; None if all can.
+    place, places : which of how many elements of `size`, from 1; 0 where it is no array.
     """
 
     name: str
@@ -96,6 +99,13 @@ class Effect:
     where: Where | None = None
     unless: Unless | None = None
     falling: Falling | None = None
+    place: int = 0
+    places: int = 0
+
+    @property
+    def kind(self) -> str:
+        """Name of the Modelica class, without a place."""
+        return self.model.rpartition(".")[2]
 
     @property
     def order_locked(self) -> bool:
@@ -135,7 +145,7 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
     for one in library.classes.values():
         if not one.name.startswith(f"{library.name}."):
             continue
-        said = _Said(f"{one.where}, __Workbench", one.vendor)
+        said = Said(f"{one.where}, __Workbench", one.vendor)
         said.only("effect")
         if "effect" not in one.vendor:
             continue
@@ -151,7 +161,8 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
         effects[effect.name] = effect
         if other := entry.text("after", ""):
             after[effect.name] = other
-    return tuple(effects[name] for name in _ordered(library, list(effects), after))
+    ordered = [effects[name] for name in _ordered(library, list(effects), after)]
+    return tuple(placed for one in ordered for placed in _placed(library, one))
 
 
 def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -162,7 +173,7 @@ def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...
     InputError
         If there is no effect of a name.
     """
-    known = {effect.name: effect for effect in effects}
+    known = dict.fromkeys(name for effect in effects for name in (effect.kind, effect.name))
     for name in names:
         if name not in known:
             raise InputError(
@@ -171,79 +182,35 @@ def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...
                 expected=f"some of {', '.join(known)}",
                 remedy="correct the name",
             )
-    return tuple(effect for effect in effects if not names or effect.name in names)
+    return tuple(one for one in effects if not names or {one.name, one.kind} & set(names))
 
 
-@dataclass(frozen=True)
-class _Said:
-    """Part of an annotation, whose keys are asked for by type.
-
-    Attributes
-    ----------
-    where : it stands.
-    content : by key.
-    """
-
-    where: str
-    content: Mapping[str, Any]
-
-    def only(self, *known: str) -> None:
-        for key in self.content:
-            if key not in known:
-                raise InputError(
-                    where=self.where,
-                    found=f"'{key}'{closest(key, known)}",
-                    expected=f"some of {', '.join(known)}",
-                    remedy="correct or remove it",
-                )
-
-    def text(self, key: str, default: str | None = None) -> str:
-        return str(self._of(key, str, "a text in quotes", default))
-
-    def number(self, key: str) -> float:
-        value = float(self._of(key, float, "a number above 0", None))
-        if value <= 0.0:
-            raise self._wrong(key, "a number above 0")
-        return value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        return self._array(key, str, 'an array of texts, such as {"a", "b"}')
-
-    def numbers(self, key: str) -> tuple[float, ...]:
-        """Of which none is zero: a fit changes them by shares."""
-        expected = "an array of numbers that are not 0, such as {0.5, 1.0}"
-        values = self._array(key, float, expected)
-        if 0.0 in values:
-            raise self._wrong(key, expected)
-        return values
-
-    def part(self, key: str) -> "_Said":
-        content = self._of(key, dict, f"{key}(...)", None)
-        return _Said(f"{self.where}({key})", content)
-
-    def _array(self, key: str, of: type, expected: str) -> tuple[Any, ...]:
-        values = tuple(self._of(key, tuple, expected, None))
-        if not all(isinstance(value, of) for value in values):
-            raise self._wrong(key, expected)
-        return values
-
-    def _of(self, key: str, kind: type, expected: str, default: Any) -> Any:
-        value = self.content.get(key, default)
-        if not isinstance(value, kind):
-            raise self._wrong(key, expected)
-        return value
-
-    def _wrong(self, key: str, expected: str) -> InputError:
-        value = self.content.get(key)
-        return InputError(
-            where=self.where,
-            found=f"no '{key}'" if value is None else f"{key} = {value!r}",
-            expected=expected,
-            remedy=f"give '{key}' in the annotation of the class",
+def _placed(library: Library, effect: Effect) -> list[Effect]:
+    """An effect whose size is an array, `zeros(n)`, in each of its places."""
+    components = library.components(effect.model)
+    array = _ARRAY.fullmatch(components[effect.size].modifier.value)
+    if array is None:
+        return [effect]
+    if effect.shapes:
+        raise InputError(
+            where=components[effect.size].where,
+            found=f"shapes of {effect.name}, which has a size for each place",
+            expected="none: one shape would have to serve all places",
+            remedy="remove them, or make each place an effect of its own",
         )
+    count = components[array[1]].modifier.value if array[1] in components else array[1]
+    if not count.isdigit():
+        raise InputError(
+            where=components[effect.size].where,
+            found=f"{effect.size} = zeros({array[1]})",
+            expected=f"'parameter Integer {array[1]} = 8', a number of places",
+            remedy="give the class that number",
+        )
+    names = [(place, f"{effect.name}[{place}]") for place in range(1, int(count) + 1)]
+    return [replace(effect, name=name, place=k, places=int(count)) for k, name in names]
 
 
-def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> Effect:
+def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Effect:
     said.only(
         *("size", "step", "matters", "shapes", "separation", "hidden", "slots", "after"),
         *("where", "unless", "falling"),
@@ -253,7 +220,7 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> E
         size = _TURNING[0]
     else:
         size = said.text("size")
-    shapes = said.part("shapes") if "shapes" in said.content else _Said(said.where, {})
+    shapes = said.part("shapes") if "shapes" in said.content else Said(said.where, {})
     effect = Effect(
         name=one.name.rpartition(".")[2],
         model=one.name,
@@ -274,7 +241,7 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> E
     return effect
 
 
-def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> tuple[str, ...]:
+def _slots(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> tuple[str, ...]:
     extended = library.ancestors(one.name)
     # A class that adds inputs to the partial class of a slot is for one that has them.
     parts = library.components(one.name).items()
@@ -302,7 +269,7 @@ def _slots(library: Library, slots: Sequence[Slot], one: Class, said: _Said) -> 
     return tuple(name for name in fitting if name in chosen)
 
 
-def _where(said: _Said) -> Where | None:
+def _where(said: Said) -> Where | None:
     if "where" not in said.content:
         return None
     part = said.part("where")
@@ -310,7 +277,7 @@ def _where(said: _Said) -> Where | None:
     return Where(part.text("condition"), part.text("is"), part.text("share", ""))
 
 
-def _unless(said: _Said) -> Unless | None:
+def _unless(said: Said) -> Unless | None:
     if "unless" not in said.content:
         return None
     part = said.part("unless")
@@ -318,7 +285,7 @@ def _unless(said: _Said) -> Unless | None:
     return Unless(part.text("condition"), part.text("is"), part.text("because"))
 
 
-def _falling(said: _Said) -> Falling | None:
+def _falling(said: Said) -> Falling | None:
     if "falling" not in said.content:
         return None
     part = said.part("falling")
@@ -355,7 +322,7 @@ def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
             )
     for name in effect.sizes:
         value = parameters[name].modifier.value
-        if value not in ("0", "0.0"):
+        if value not in ("0", "0.0") and not _ARRAY.fullmatch(value):
             raise InputError(
                 where=parameters[name].where,
                 found=f"{name} = {value}" if value else f"{name} without a value",

@@ -5,7 +5,7 @@ Needs the extra `[compiler]` to build; sources can be written without it.
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +30,14 @@ def component(name: str) -> str:
 
 def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     """Names in the FMU of one parameter of an effect, one for each of its slots."""
-    return tuple(f"{slot}.{component(effect.name)}.{parameter}" for slot in effect.slots)
+    element = f"[{effect.place}]" if effect.place else ""
+    return tuple(f"{slot}.{component(effect.kind)}.{parameter}{element}" for slot in effect.slots)
+
+
+def parameter_of(effect: Effect, variable: str) -> str:
+    """Parameter of an effect that a variable of the FMU is, empty if it is none."""
+    parameter = variable.rpartition(".")[2].partition("[")[0]
+    return parameter if variable in variables(effect, parameter) else ""
 
 
 def source(
@@ -62,7 +69,7 @@ def source(
     used: set[str] = set()
     redeclared = [f"    {parameter}={float(value)!r}" for parameter, value in parameters.items()]
     for slot in read_slots(library, base):
-        inside = [effect for effect in effects if slot.name in effect.slots]
+        inside = _bindings([one for one in effects if slot.name in one.slots], values)
         if not inside:
             continue
         label = slot.name[0].upper() + slot.name[1:]
@@ -73,9 +80,9 @@ def source(
             slot, partial=_written(slot.partial, library), nominal=_written(slot.nominal, library)
         )
         if slot.chained or len(inside) == 1:
-            nested.append(_chain(label, slot, inside, values))
+            nested.append(_chain(label, slot, inside))
         else:
-            nested.append(_sum(label, slot, inside, values))
+            nested.append(_sum(label, slot, inside))
         redeclared.append(f"    redeclare {label} {slot.name}")
     modifiers = ",\n".join(redeclared)
     return (
@@ -92,70 +99,88 @@ def _written(name: str, library: Library) -> str:
     return name if name.partition(".")[0] == library.name else _USED + name
 
 
-def _chain(
-    label: str,
-    slot: Slot,
-    effects: Sequence[Effect],
-    values: Mapping[str, Mapping[str, float]],
-) -> str:
-    """Class whose effects hand on what goes in; of one effect, any outputs."""
+def _chain(label: str, slot: Slot, given: Mapping[str, Mapping[str, str]]) -> str:
+    """Class whose effects hand on what goes in; of one effect, any outputs.
+
+    Parameters
+    ----------
+    given : values of parameters, as they are written, by class of the effects.
+    """
     lines = []
-    before = {inlet: inlet for inlet in slot.inputs}
+    before = {name: name for name in (*slot.counts, *slot.inputs)}
     outlets: Mapping[str, str] = {}
-    for effect in effects:
-        lines.append(_declaration(effect.model, before, values.get(effect.name, {})))
-        outlets = {outlet: f"{component(effect.name)}.{outlet}" for outlet in slot.outputs}
+    for model, values in given.items():
+        lines.append(_declaration(model, {**before, **values}))
+        outlets = {outlet: f"{component(model)}.{outlet}" for outlet in slot.outputs}
         before |= dict(zip(slot.inputs, outlets.values(), strict=False))
-    return _class(label, slot, effects, lines, outlets)
+    return _class(label, slot, given, lines, outlets)
 
 
-def _sum(
-    label: str,
-    slot: Slot,
-    effects: Sequence[Effect],
-    values: Mapping[str, Mapping[str, float]],
-) -> str:
-    """Class whose effects each change the nominal output, which changes add up."""
+def _sum(label: str, slot: Slot, given: Mapping[str, Mapping[str, str]]) -> str:
+    """Class whose effects each change the nominal output, which changes add up; see `_chain`."""
     if not slot.settled:
         raise InputError(
             where=f"slot '{slot.name}'",
-            found=f"{' and '.join(effect.name for effect in effects)} beside a {slot.nominal} "
+            found=f"{' and '.join(map(_short, given))} beside a {slot.nominal} "
             "that has parameters of its own in the base model",
             expected="one effect in this slot, whose outputs are of another kind than its inputs",
             remedy=f"choose one of them, or make {slot.nominal} with those parameters a class",
         )
-    before = {inlet: inlet for inlet in slot.inputs}
-    lines = [_declaration(slot.nominal, before, {})]
-    lines += [_declaration(one.model, before, values.get(one.name, {})) for one in effects]
+    before = {name: name for name in (*slot.counts, *slot.inputs)}
+    lines = [_declaration(slot.nominal, before)]
+    lines += [_declaration(model, {**before, **values}) for model, values in given.items()]
     nominal = component(slot.nominal)
     outlets = {
         outlet: " + ".join(
             [
                 f"{nominal}.{outlet}",
-                *(f"({component(e.name)}.{outlet} - {nominal}.{outlet})" for e in effects),
+                *(f"({component(model)}.{outlet} - {nominal}.{outlet})" for model in given),
             ]
         )
         for outlet in slot.outputs
     }
-    return _class(label, slot, effects, lines, outlets)
+    return _class(label, slot, given, lines, outlets)
 
 
-def _declaration(model: str, inputs: Mapping[str, str], values: Mapping[str, float]) -> str:
-    bindings = [f"{name}={value}" for name, value in inputs.items()]
-    bindings += [f"{name}={float(value)!r}" for name, value in values.items()]
-    return f"    {model} {component(model)}({', '.join(bindings)});"
+def _bindings(
+    effects: Sequence[Effect], values: Mapping[str, Mapping[str, float]]
+) -> dict[str, dict[str, str]]:
+    """Values of parameters, as they are written, by class; those of its places in one array."""
+    arrays: dict[str, dict[str, list[float]]] = {}
+    for effect in effects:
+        of_class = arrays.setdefault(effect.model, {})
+        for name, value in values.get(effect.name, {}).items():
+            array = of_class.setdefault(name, [0.0] * max(1, effect.places))
+            array[effect.place - 1] = float(value)
+    placed = {effect.model for effect in effects if effect.place}
+    return {
+        model: {
+            name: f"{{{', '.join(map(repr, array))}}}" if model in placed else repr(array[0])
+            for name, array in of_class.items()
+        }
+        for model, of_class in arrays.items()
+    }
+
+
+def _declaration(model: str, bindings: Mapping[str, str]) -> str:
+    given = ", ".join(f"{name}={value}" for name, value in bindings.items())
+    return f"    {model} {component(model)}({given});"
+
+
+def _short(model: str) -> str:
+    return model.rpartition(".")[2]
 
 
 def _class(
     label: str,
     slot: Slot,
-    effects: Sequence[Effect],
+    models: Iterable[str],
     declarations: Sequence[str],
     outlets: Mapping[str, str],
 ) -> str:
     return "\n".join(
         [
-            f'  model {label} "{", ".join(effect.name for effect in effects)}"',
+            f'  model {label} "{", ".join(map(_short, models))}"',
             f"    extends {slot.partial};",
             *declarations,
             "  equation",

@@ -20,15 +20,17 @@ class Slot:
     ----------
     name : of the base model's component.
     partial : dotted name of the class that each effect in it extends.
+    counts : numbers of places, Integer parameters of the partial class.
     inputs, outputs : of the partial class, in its order; outputs that it has an equation for are
         left out.
     chained : whether outputs continue inputs; else changes add up.
     nominal : dotted name of the class in the base model.
-    settled : whether the base model gives that class its inputs and nothing else.
+    settled : whether the base model gives that class its inputs and counts and nothing else.
     """
 
     name: str
     partial: str
+    counts: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     chained: bool
@@ -69,11 +71,17 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
             for one in declared.values()
             if "output" in one.prefixes and one.name not in computed and not one.modifier.value
         ]
-        names = {one.name for one in inputs}
+        counts = tuple(
+            one.name
+            for one in declared.values()
+            if one.type == "Integer" and "parameter" in one.prefixes
+        )
+        names = {*counts, *(one.name for one in inputs)}
         slots.append(
             Slot(
                 name=component.name,
                 partial=partial,
+                counts=counts,
                 inputs=tuple(one.name for one in inputs),
                 outputs=tuple(one.name for one in outputs),
                 chained=len(outputs) <= len(inputs)

@@ -74,7 +74,9 @@ class Unknowns:
         """
         system, begin = self._simulations.system, self._simulations.begin[0]
         led = self._compare.leading is not None
-        shown = {} if led else {n: ALONG * system.signals[n].noise_at_scale for n in begin}
+        # What rolls along a measured state may have no sensor of its own.
+        seen = [] if led else [name for name in begin if name in system.signals]
+        shown = {name: ALONG * system.signals[name].noise_at_scale for name in seen}
         return {**shown, **system.spreads}
 
     def level_unit(self, key: Key) -> str:

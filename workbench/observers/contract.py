@@ -10,7 +10,7 @@ from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import checked, given, instance
 from workbench.observers.gains import Gains, SearchSpace
-from workbench.observers.layout import layout
+from workbench.observers.layout import layout, rolling_ratio
 from workbench.system import OBSERVER, System
 from workbench.system_check import check_model
 
@@ -169,9 +169,11 @@ class Estimator(ABC):
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
         measured = zip(self.system.outputs, y, strict=True)
-        self.fmu.start(
-            {one.name: float(value) for one, value in measured if one.name in self.fmu.states}
-        )
+        begin = {one.name: float(value) for one, value in measured if one.name in self.fmu.states}
+        rolling = self.system.rolling
+        if rolling is not None and rolling.follower not in begin and rolling.leader in begin:
+            begin[rolling.follower] = rolling_ratio(self.fmu, self.system) * begin[rolling.leader]
+        self.fmu.start(begin)
         self._model.u[:] = 0.0
         self._begin(u, y)
 

@@ -1,0 +1,7 @@
+within TrainRig.Slots;
+partial model PartialPads "Slot: friction of the pads of each axle"
+  parameter Integer n = 8 "Axles";
+  input Real u[n](each unit="1") "Friction by the law of ordinary pads";
+  input Real T[n](each unit="K") "Temperature of the discs";
+  output Real y[n](each unit="1") "Friction that acts";
+end PartialPads;

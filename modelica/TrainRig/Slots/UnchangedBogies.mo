@@ -1,0 +1,6 @@
+within TrainRig.Slots;
+model UnchangedBogies "Null version: nothing changes"
+  extends PartialBogies;
+equation
+  y = u;
+end UnchangedBogies;

@@ -1,0 +1,6 @@
+within TrainRig.Slots;
+model UnchangedVehicles "Null version: nothing changes"
+  extends PartialVehicles;
+equation
+  y = u;
+end UnchangedVehicles;

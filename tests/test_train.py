@@ -1,0 +1,173 @@
+"""The train: what its computer writes becomes cases; faults of one axle are named with the axle."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import workbench as wb
+from workbench.case import Case, read_cases
+from workbench.diagnosis import read_effects
+from workbench.errors import InputError
+from workbench.modelica import read_library
+from workbench.prepare import write_cases
+from workbench.system import OBSERVER, System
+from workbench.systems import load_system
+
+RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
+TIME = np.arange(0.0, 20.0, 0.02)
+CASE = """
+title = "80 km/h"
+
+[conditions]
+rail = "dry"
+mass1 = "45 t"
+mass2 = "50 t"
+
+[measurement]
+file = "measured.csv"
+
+[track]
+file = "track.csv"
+"""
+
+
+@pytest.fixture(scope="module")
+def train() -> System:
+    return load_system("train")
+
+
+def cases_of(name: str, train: System, out: Path) -> tuple[list[Case], dict[str, Any]]:
+    """Cases of a set of the independent simulator, and what it planted."""
+    if not RECORDINGS.exists():
+        pytest.skip("the recordings are not at hand")
+    write_cases("train", RECORDINGS / name, out)
+    return read_cases([out], train), json.loads((RECORDINGS / name / "truth.json").read_text())
+
+
+# --- what the computer writes ---
+
+
+def stop(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
+    """A run at 20 m/s over a gradient that grows by 1 permille in 100 m, into a curve at 1200 m."""
+    own = folder / "set" / "01"
+    own.mkdir(parents=True)
+    (own / "case.toml").write_text(CASE.replace(*change))
+    names = [*(f"pB{j} [bar]" for j in range(1, 5)), *(f"omega{i} [rad/s]" for i in range(1, 9))]
+    header = ["time [s]", *names, "a [m/s2]", "s [m]"]
+    rows = [[t, *[0.1 * t] * 4, *[43.5 - 0.1 * t] * 8, -0.01 * t, 1000.0 + 20.0 * t] for t in TIME]
+    lines = [",".join(header), *(",".join(f"{value:.6f}" for value in row) for row in rows)]
+    (own / "measured.csv").write_text("\n".join(lines))
+    track = "position [m],gradient [permille],radius [m]\n0,0,0\n1200,12,600\n2000,20,0\n"
+    (own / "track.csv").write_text(track)
+    return folder / "set"
+
+
+def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path: Path, train: System) -> None:
+    write_cases("train", stop(tmp_path), tmp_path / "cases")
+    (case,) = read_cases([tmp_path / "cases"], train)
+    assert_allclose(case.time, TIME.reshape(-1, 5).mean(axis=1), atol=1e-12)
+    assert_allclose(case["pB2"], 1e4 * case.time, rtol=1e-9)  # a mean of a line is on it
+    position = 1000.0 + 20.0 * case.time
+    assert_allclose(case["slope1"], 1e-5 * (position - 10.75), rtol=1e-9)
+    assert_allclose(case["slope2"], 1e-5 * (position - 37.15), rtol=1e-9)
+    # 600/R permille, of the share of the weight that is in the curve.
+    weight = 45.0 * (position >= 1210.75) + 50.0 * (position >= 1237.15)
+    assert_allclose(case["curve"], 1e-3 * weight / 95.0, atol=1e-15)
+    assert set(case["mass1"]) == {45e3}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('mass2 = "50 t"', "", "mass2"),
+        ('mass2 = "50 t"', 'mass2 = "50 m"', "a unit of another dimension"),
+        ('rail = "dry"', "", "rail"),
+        ('"track.csv"', '"way.csv"', r"way\.csv"),
+    ],
+)
+def test_a_stop_that_lacks_something_is_refused(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message):
+        write_cases("train", stop(tmp_path, (old, new)), tmp_path / "cases")
+
+
+def test_a_folder_without_stops_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "set" / "01").mkdir(parents=True)
+    (tmp_path / "set" / "01" / "notes.txt").write_text("nothing")
+    with pytest.raises(InputError, match=r"no folder with a case\.toml"):
+        write_cases("train", tmp_path / "set", tmp_path / "cases")
+
+
+# --- effects ---
+
+
+def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
+    names = [
+        one.name for one in read_effects(read_library(train.library), train.model(OBSERVER).name)
+    ]
+    for kind in ("WeakPads", "IsolatedUnit", "DraggingBrake", "WheelRadius", "LateSpeed"):
+        assert [name for name in names if name.startswith(kind)] == [
+            f"{kind}[{axle}]" for axle in range(1, 9)
+        ]
+    assert {"CylinderLag[4]", "PressureSensorGain[4]", "WrongMass[2]"} <= set(names)
+    # Of a bogie, of a vehicle, and of the train.
+    assert not {"CylinderLag[5]", "WrongMass[3]", "Glazing[1]"} & set(names)
+
+
+# --- recordings of an independent simulator ---
+
+LABELLED = {  # set: what is planted, as it is called here
+    "pads_axle": ("WeakPads[3]", "loss", 0.15),
+    "isolated_unit": ("IsolatedUnit[6]", "lost", 1.0),
+    "dragging": ("DraggingBrake[5]", "torque", 1500.0),
+    "cylinder_lag_bogie": ("CylinderLag[3]", "lag", 0.4),
+    "radius_axle": ("WheelRadius[2]", "deviation", -2.5e-3),
+    "glazing": ("Glazing", "loss", 0.15),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LABELLED)
+def test_a_labelled_fault_is_named_with_its_place(name: str, train: System, tmp_path: Path) -> None:
+    pytest.importorskip("rumoca")
+    cases, _ = cases_of(f"labelled/{name}", train, tmp_path / "cases")
+    found = wb.diagnose(train, cases, out=tmp_path / "out", workers=2).diagnosis
+    effect, size, planted = LABELLED[name]
+    (cause,) = found.causes
+    assert effect in (cause.effect.name, *cause.confusable_with)
+    if cause.effect.name == effect:
+        assert cause.parameters[size].low < planted < cause.parameters[size].high
+
+
+def test_a_wrong_radius_is_named_with_its_axle(train: System, tmp_path: Path) -> None:
+    """Among three causes on every axle, in two stops of the four."""
+    pytest.importorskip("rumoca")
+    cases, truth = cases_of("labelled/radius_axle", train, tmp_path / "cases")
+    (planted,) = truth["effects"].values()
+    kinds = ("WheelRadius", "WeakPads", "DraggingBrake")
+    out = wb.diagnose(train, cases[2:], effects=kinds, out=tmp_path / "out", workers=1)
+    (cause,) = out.diagnosis.causes
+    assert cause.effect.name == f"WheelRadius[{planted['at']}]"
+    size = cause.parameters["deviation"]
+    assert size.low < 1e-3 * planted["size"] < size.high
+
+
+def test_friction_and_radius_of_each_axle_are_estimated(train: System, tmp_path: Path) -> None:
+    """Pads of axle 3 have lost 15 %; profiles and loads of a sound train blur axles by 2 %."""
+    cases, truth = cases_of("labelled/pads_axle", train, tmp_path / "cases")
+    case = next(one for one in cases if one.name == "01_120_service_dry")
+    told, run = truth["cases"][case.name], wb.observe(train, case, "ekf").to_frame()
+    at = int(np.searchsorted(case.time, told["standstill"] - 15.0))  # at about 15 m/s
+    friction = np.array([run[f"muDC[{i}] [1]"].iloc[at] for i in range(1, 9)])
+    # Three deviations of profile, load and law, of 3 % in all, of the worst of eight axles.
+    assert_allclose(friction, told["pad_level"], atol=0.09 * 0.30)
+    assert friction.argmin() == 2
+    radius = np.array([run[f"r[{i}] [m]"].iloc[at] for i in range(1, 9)])
+    # One to another; what is common to all wheels no sensor here tells from the train's speed.
+    true = 1e-3 * np.array(told["radius_mm"])
+    assert_allclose(radius - radius.mean(), true - true.mean(), atol=4e-5)
