@@ -40,7 +40,7 @@ $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/run.stamp
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[dev,compiler,cluster,completion,docs]"
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[dev,compiler,cluster,completion,docs,files]"
 	@touch $@
 
 simulate: $(VENV)/run.stamp

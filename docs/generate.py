@@ -20,6 +20,7 @@ from mkdocs.structure.pages import Page
 
 import workbench
 from workbench.commands.options import command_line, parsers
+from workbench.conditions import UNKNOWN
 from workbench.diagnosis import Effect, read_effects
 from workbench.diagnosis.thresholds import RATE, Soundness, Thresholds, thresholds
 from workbench.installed import system_files
@@ -321,7 +322,8 @@ def case_files(systems: list[System]) -> str:
 
 
 _CASE = """
-A recording is a folder with this file and a CSV; see [Your recordings](recordings.md). What is
+A recording is a folder with this file and a CSV, or a recorder's own file; see [Your
+recordings](recordings.md) and [Recordings as they are](import.md). What is
 asked for beyond `title` and `[measurement]` follows from the conditions of the
 [system](system-file.md#conditions). Editors that know JSON Schema for TOML (such as Even Better
 TOML) complete and check it with `#:schema FILE` in the first line:
@@ -342,7 +344,12 @@ def case_schema(system: System) -> dict[str, Any]:
                 "type": "object",
                 "required": ["file"],
                 "properties": {
-                    "file": {"type": "string", "description": "CSV in this folder"},
+                    "file": {"type": "string", "description": "recording in this folder"},
+                    "columns": {
+                        "type": "object",
+                        "properties": dict.fromkeys(("time", *system.signals), _COLUMN),
+                        "additionalProperties": False,
+                    },
                     "counts_from": {"type": "string", "description": "time with unit"},
                 },
             },
@@ -355,8 +362,25 @@ def case_schema(system: System) -> dict[str, Any]:
     }
 
 
+_COLUMN = {
+    "type": ["string", "object"],
+    "required": ["channel"],
+    "properties": {
+        "channel": {"type": "string", "minLength": 1},
+        "unit": {"type": "string"},
+        "reversed": {"type": "boolean"},
+    },
+    "additionalProperties": False,
+}
+
+
 def _condition(one: Condition) -> dict[str, Any]:
-    """Schema of what was set before a recording."""
+    """Schema of what was set before a recording; nobody need know it, but for a sign."""
+    known = _known_condition(one)
+    return known if one.sign else {"anyOf": [known, {"const": UNKNOWN}]}
+
+
+def _known_condition(one: Condition) -> dict[str, Any]:
     about = {"description": one.label}
     if not one.choices:
         return about | {"type": "string", "pattern": r"^\s*[-+0-9.eE]+ \S+", "$comment": one.unit}

@@ -249,7 +249,7 @@ def test_a_path_without_a_case_is_refused(tmp_path, system):
     file = tmp_path / "file"
     file.touch()
     assert_refused("found no case.toml", lambda: read_cases([tmp_path], system))
-    assert_refused("file: found a file;", lambda: read_cases([file], system))
+    assert_refused("file: found an empty file;", lambda: read_cases([file], system))
     assert_refused("none: found no such folder", lambda: read_cases([tmp_path / "none"], system))
     assert_refused("none/case.toml: found no such file", lambda: read(tmp_path / "none"))
 

@@ -17,8 +17,9 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.case import Case, check_recording, read_conditions, read_only
+from workbench.case import Case, check_recording, read_only
 from workbench.case import read_cases as read_folders
+from workbench.conditions import read_conditions
 from workbench.cosim import Run, replay
 from workbench.diagnosis import Outcome, choose, read_effects
 from workbench.diagnosis import diagnose as diagnose_system
@@ -26,6 +27,7 @@ from workbench.errors import InputError
 from workbench.experiments import NextStop
 from workbench.experiments import next_stop as next_experiment
 from workbench.installed import usual_system
+from workbench.mapping import Told, parse_named
 from workbench.modelica import read_library
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
@@ -38,15 +40,25 @@ from workbench.systems import load_system, open_model
 from workbench.tables import Table
 from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, pose
 from workbench.tuning import tune as tune_problem
-from workbench.units import si_factor
+from workbench.units import quantity, si_factor
 
 
-def read_cases(path: str | Path | Sequence[str | Path], system: System | None = None) -> list[Case]:
-    """Read case folders, and folders of case folders.
+def read_cases(
+    path: str | Path | Sequence[str | Path],
+    system: System | None = None,
+    *,
+    conditions: Mapping[str, Any] | None = None,
+    columns: Mapping[str, str] | None = None,
+    rate: str | None = None,
+) -> list[Case]:
+    """Read case folders, folders of case folders, and files of recorders.
 
     Parameters
     ----------
     system : that the recordings are of; unless given, the usual one, which comes with recordings.
+    conditions : of files without a case.toml, as it has them, such as {"load": "2 kN"}.
+    columns : channels of such files by signal, and by "time": {"time": "Zeit [ms]"}.
+    rate : of such files without times, "200 Hz".
 
     Raises
     ------
@@ -59,7 +71,14 @@ def read_cases(path: str | Path | Sequence[str | Path], system: System | None = 
         Of what is unlikely in a recording; `Case.doubts` keeps it.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    cases = read_folders([Path(one) for one in paths], system or load_system(usual_system()))
+    known = system or load_system(usual_system())
+    named = [f"{signal}={channel}" for signal, channel in (columns or {}).items()]
+    told = Told(
+        conditions or {},
+        dict(parse_named(one, "columns", known) for one in named),
+        None if rate is None else 1.0 / quantity(rate, "Hz", "rate"),
+    )
+    cases = read_folders([Path(one) for one in paths], known, told)
     _warn(cases)
     return cases
 

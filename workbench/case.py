@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from workbench.conditions import Value, conditions_shown, read_conditions
 from workbench.errors import InputError
+from workbench.foreign import is_foreign
+from workbench.mapping import Told, has_own_names, read_measured, read_named, stored_columns
 from workbench.plausibility import Origin, doubts
 from workbench.recording import Matrix, Vector, read_columns
-from workbench.system import Condition, System
-from workbench.tables import Table, read_table, shown
-from workbench.units import quantity, si_factor
+from workbench.system import System
+from workbench.tables import Table, read_table
+from workbench.units import si_factor
 
-Value = float | int | str | tuple[Any, ...]
+_NOTHING = Told()
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +98,16 @@ def sign(case: Case, system: System) -> float:
     return 1.0
 
 
-def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
-    """Read case folders and folders of case folders.
+def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> list[Case]:
+    """Read case folders, folders of case folders, and files of recorders.
 
     A folder that holds `case.toml` is a case. Of any other folder the sub-folders are read,
-    sorted by name: those that hold `case.toml`, and those named `NN_...`, which ought to.
+    sorted by name: those that hold `case.toml`, and those named `NN_...`, which ought to. A file is
+    a recording by itself.
+
+    Parameters
+    ----------
+    told : conditions and channels of files that have no `case.toml`.
 
     Raises
     ------
@@ -108,7 +116,7 @@ def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
     """
     folders: dict[str, Path] = {}
     for folder in (folder for path in paths for folder in _case_folders(path)):
-        name = folder.resolve().name
+        name = _name(folder)
         if any("\ud800" <= character <= "\udfff" for character in name):
             raise InputError(  # as Python reads bytes of a name that are none of a character
                 where=str(folder),
@@ -124,7 +132,52 @@ def read_cases(paths: Sequence[Path], system: System) -> list[Case]:
                 remedy="rename one of the folders, or give it once",
             )
         folders[name] = folder
-    return [read_case(folder, system) for folder in folders.values()]
+    if told != _NOTHING and not any(folder.is_file() for folder in folders.values()):
+        raise InputError(
+            where=", ".join(map(str, paths)),
+            found="conditions, columns or a rate for recordings that have a case.toml",
+            expected="a file without one",
+            remedy="write them into case.toml",
+        )
+    return [
+        read_file(path, system, told) if path.is_file() else read_case(path, system)
+        for path in folders.values()
+    ]
+
+
+def _name(path: Path) -> str:
+    """Name of a case: of its folder, or of a file without what tells its format."""
+    name = path.resolve().name
+    return re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", name) if path.is_file() else name
+
+
+def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
+    """Read a file of a recorder; conditions that it shows need not be told.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, its channels are neither confirmed nor certain, or a condition is
+        missing.
+    """
+    measured = read_measured(path, system, told, stored_columns(path.parent, system))
+    shown = conditions_shown(measured.signals, system)
+    where = "command line, --condition"
+    conditions = read_conditions(Table({**shown, **told.conditions}, where), system)
+    check_recording(measured.time, system, f"{path}, time", None)
+    signals = {name: read_only(values) for name, values in measured.signals.items()}
+    origin = Origin(str(path), None, {}, where)
+    return Case(
+        name=_name(path),
+        title=path.name,
+        conditions=conditions,
+        time=read_only(measured.time),
+        signals=signals,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=tuple(one.name for one in system.outputs),
+        source=path,
+        doubts=doubts(measured.time, signals, conditions, system, origin),
+    )
 
 
 def read_case(folder: Path, system: System) -> Case:
@@ -151,9 +204,8 @@ def read_case(folder: Path, system: System) -> Case:
     measurement = document.table("measurement")
     measurement.refuse_unknown(("file", "columns", "counts_from"))
     source = folder / measurement.take("file", str)
-    columns = _column_names(measurement, system)
-    time, signals = _read_signals(source, columns, system)
-    origin = Origin(str(source), 2, columns, f"{toml}, [conditions]")
+    time, signals, origin = _recorded(source, measurement, system)
+    origin = replace(origin, conditions=f"{toml}, [conditions]")
     model = document.table("model")
     model.refuse_unknown(("names",))
     names = model.table("names")
@@ -170,6 +222,28 @@ def read_case(folder: Path, system: System) -> Case:
         counts_from=_counts_from(measurement, time),
         doubts=doubts(time, signals, conditions, system, origin),
     )
+
+
+def _recorded(
+    source: Path, measurement: Table, system: System
+) -> tuple[Vector, dict[str, Vector], Origin]:
+    """Time and signals of a case's recording, SI, and where they stand.
+
+    A CSV whose columns have names and units as the workbench writes them is read to the letter; any
+    other file is that of a recorder.
+    """
+    own = measurement.table("columns")
+    stored = stored_columns(source.parent.parent, system) | stored_columns(source.parent, system)
+    as_named = not any(isinstance(name, dict) for name in own.content.values())
+    if not is_foreign(source) and as_named and (not stored or has_own_names(source, system)):
+        columns = _column_names(measurement, system)
+        time, signals = _read_signals(source, columns, system)
+        return time, signals, Origin(str(source), 2, columns, "")
+    told = Told(columns=read_named(own, system))
+    measured = read_measured(source, system, told, stored)
+    check_recording(measured.time, system, f"{source}, time", None)
+    signals = {name: read_only(values) for name, values in measured.signals.items()}
+    return read_only(measured.time), signals, Origin(str(source), None, {}, "")
 
 
 def _counts_from(measurement: Table, time: Vector) -> float:
@@ -236,63 +310,6 @@ def check_recording(time: Vector, system: System, where: str, first_line: int | 
         )
 
 
-def read_conditions(table: Table, system: System) -> dict[str, Value]:
-    """Conditions of a recording, as the system declares them.
-
-    Raises
-    ------
-    InputError
-        If one is missing, unknown, or none of its choices.
-    """
-    table.refuse_unknown(one.name for one in system.conditions)
-    signs = [f"'{one.name}' holds the sign" for one in system.conditions if one.sign]
-    remedy = "; ".join(["give the magnitude", *signs])
-    return {one.name: _condition(table, one, remedy) for one in system.conditions}
-
-
-def _condition(table: Table, one: Condition, remedy: str) -> Value:
-    """One condition; `remedy` for a quantity that is too small."""
-    if one.count:
-        items = table.take(one.name, list)
-        if len(items) != one.count:
-            raise InputError(
-                where=f"{table.where} {one.name}",
-                found=f"{len(items)} entries",
-                expected=str(one.count),
-                remedy=f"write one of {_either(one)} for each",
-            )
-        return tuple(
-            _choice(one, item, f"{table.where} {one.name}[{i}]") for i, item in enumerate(items)
-        )
-    if one.choices:
-        value: object = table.take(one.name, type(one.choices[0]))
-        return _choice(one, value, f"{table.where} {one.name}")
-    where = f"{table.where} {one.name}"
-    text = table.take(one.name, str)
-    number = quantity(text, one.unit, where)
-    if number < one.least or (one.exclusive and number == one.least):
-        raise InputError(
-            where=where,
-            found=repr(text),
-            expected=f"{'above' if one.exclusive else 'no less than'} {one.least:g} {one.unit}",
-            remedy=remedy,
-        )
-    return number
-
-
-def _choice(one: Condition, value: object, where: str) -> str | int:
-    for choice in one.choices:
-        if type(value) is type(choice) and value == choice:
-            return choice
-    raise InputError(
-        where=where, found=shown(value), expected=_either(one), remedy="write one of them"
-    )
-
-
-def _either(one: Condition) -> str:
-    return " or ".join(map(repr, one.choices))
-
-
 def _case_folders(path: Path) -> list[Path]:
     try:
         return _found_folders(path)
@@ -306,11 +323,13 @@ def _case_folders(path: Path) -> list[Path]:
 
 
 def _found_folders(path: Path) -> list[Path]:
+    if path.is_file() and path.suffix != ".toml":
+        return [path]
     if not path.is_dir():
         raise InputError(
             where=str(path),
             found="a file" if path.exists() else "no such folder",
-            expected="a case folder or a folder of case folders",
+            expected="a case folder, a folder of case folders, or a recording",
             remedy="correct the path",
         )
     if (path / "case.toml").exists():

@@ -3,7 +3,7 @@
 import ast
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -53,7 +53,7 @@ class Expression:
     """
 
     text: str
-    where: str
+    where: str = field(compare=False)
 
     def __post_init__(self) -> None:
         self.names  # noqa: B018  read once, so that a mistake shows where it stands

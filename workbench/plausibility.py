@@ -218,13 +218,12 @@ def _conditions(
 ) -> Iterator[_Finding]:
     """Conditions that the record contradicts."""
     for one in system.conditions:
-        if one.agrees is None or not _has(one.agrees.formula.names, signals, system):
-            continue
-        values = system.evaluate(one.agrees.formula, signals)
+        shown = shown_by(one, signals, system)
+        if one.agrees is None or shown is None or isinstance(conditions[one.name], str):
+            continue  # a text: nobody knows it any more
         at_start = one.agrees.place == FIRST
-        few = min(_FEW, values.size)
-        sample = 0 if at_start else int(np.argsort(values)[-few])  # reached more than once
-        shown = float(np.median(values[:few]) if at_start else values[sample])
+        values = system.evaluate(one.agrees.formula, signals)
+        sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
         said = float(conditions[one.name])
         share = _apart(shown, said, one.agrees.tolerance)
         if not share > one.agrees.tolerance.likely:
@@ -239,6 +238,20 @@ def _conditions(
             f"the same within {one.agrees.tolerance.likely:.0%}",
             "correct the condition, or the unit or the sign of the column",
         )
+
+
+def shown_by(one: Condition, signals: Mapping[str, Vector], system: System) -> float | None:
+    """What a recording shows of a condition [its unit]; None if it shows nothing.
+
+    At the start this is the median of some samples; the largest value is one that is reached more
+    than once.
+    """
+    if one.agrees is None or not _has(one.agrees.formula.names, signals, system):
+        return None
+    with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
+        values = system.evaluate(one.agrees.formula, signals)
+    few = min(_FEW, values.size)
+    return float(np.median(values[:few]) if one.agrees.place == FIRST else np.sort(values)[-few])
 
 
 def _apart(one: float, other: float, tolerance: Tolerance) -> float:

@@ -26,3 +26,10 @@ def fmus() -> Path:
 def cases() -> Path:
     """Folder of the recorded cases, one folder each."""
     return _ROOT / "cases"
+
+
+def installing(extra: str) -> str:
+    """Say how an extra is installed: in a checkout with the versions that it pins."""
+    if CHECKOUT is None:
+        return f"pip install 'wheelset-workbench[{extra}]'"
+    return f"pip install -e '.[{extra}]' -c constraints.txt"

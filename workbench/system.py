@@ -26,6 +26,7 @@ from workbench.system_comparison import (
 from workbench.system_experiments import Experiments
 from workbench.system_parts import (
     Condition,
+    Cutting,
     Derived,
     Estimated,
     Export,
@@ -50,6 +51,7 @@ __all__ = [
     "Channel",
     "Comparison",
     "Condition",
+    "Cutting",
     "Derived",
     "Estimated",
     "Exclusion",
@@ -105,6 +107,7 @@ class System:
     sample_time : [s] of usual recordings.
     sampling : which times between samples are likely.
     redundancies : what tells the same in a recording.
+    cutting : how a long recording is cut into several, or None.
     cases : folder of recordings that come with the system, or None.
     experiments : what may be run next, or None where nobody said so.
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
@@ -149,6 +152,7 @@ class System:
     sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))
     redundancies: tuple[Redundancy, ...] = ()
     experiments: Experiments | None = None
+    cutting: Cutting | None = None
 
     @property
     def signals(self) -> dict[str, Signal]:

@@ -15,6 +15,7 @@ from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     positive,
     read_condition_kinds,
+    read_cutting,
     read_derived,
     read_estimated,
     read_export,
@@ -46,7 +47,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases sampling redundancies next"
+        "export shortest fewest sample_time cases sampling redundancies next cutting"
     )
     return _read(file, path, _models(file, path))
 
@@ -191,4 +192,5 @@ def _placed(file: Table, system: System) -> System:
         export=read_export(file.table("export"), system),
         redundancies=tuple(read_redundancy(table, system) for table in file.tables("redundancies")),
         experiments=read_experiments(file.table("next"), system) if "next" in file else None,
+        cutting=read_cutting(file.table("cutting"), system) if "cutting" in file else None,
     )

@@ -59,6 +59,8 @@ class Signal:
     resolution : step in which it is read, 0 where that is not known [unit].
     limits : between which its sensor reads; what reaches them is saturated [unit].
     plausible, possible : least and largest sample that is likely, and that is possible [unit].
+    called : names that recorders give it, beside its own and its label.
+    recorded_as : what recorders have in its place, a formula of it; None: nothing else.
     """
 
     name: str
@@ -78,6 +80,8 @@ class Signal:
     limits: tuple[float, float]
     plausible: tuple[float, float]
     possible: tuple[float, float]
+    called: tuple[str, ...]
+    recorded_as: "Derived | None"
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
@@ -172,6 +176,25 @@ class Tolerance:
     likely: float
     possible: float
     slack: float
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """Which parts of a long recording are recordings of their own.
+
+    Attributes
+    ----------
+    begins : where a signal rises above a level, while the other is above its own.
+    ends : where the other falls below its level.
+    released : time for which the first may be below its level before the part is given up [s].
+    before, after : time that is kept around a part [s].
+    """
+
+    begins: Threshold
+    ends: Threshold
+    released: float
+    before: float
+    after: float
 
 
 @dataclass(frozen=True)

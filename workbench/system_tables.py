@@ -13,6 +13,7 @@ from workbench.system_parts import (
     LARGEST,
     Agreement,
     Condition,
+    Cutting,
     Derived,
     Estimated,
     Export,
@@ -70,7 +71,7 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
         table = within(file, group, name)
         table.refuse_unknown(
             "unit shown label noise relative_noise relative_error scale scale_error reading "
-            "mode smoothed held resolution saturates plausible possible"
+            "mode smoothed held resolution saturates plausible possible called recorded_as"
         )
         unit = table.unit("unit")
         shown = table.text("shown", unit)
@@ -103,9 +104,21 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
                 limits=_limits(table, "saturates", unit),
                 plausible=_limits(table, "plausible", unit),
                 possible=_limits(table, "possible", unit),
+                called=table.texts("called"),
+                recorded_as=_recorded_as(table, name) if "recorded_as" in table else None,
             )
         )
     return tuple(found)
+
+
+def _recorded_as(signal: Table, name: str) -> Derived:
+    """What recorders have in the place of a signal."""
+    table = signal.table("recorded_as")
+    table.refuse_unknown("is unit")
+    formula = Expression(table.take("is", str), f"{table.where} is")
+    if name not in formula.names:
+        raise table.wrong("is", f"a formula of {name}")
+    return Derived(name, table.unit("unit"), formula.text, formula)
 
 
 def _limits(table: Table, key: str, unit: str) -> tuple[float, float]:
@@ -258,6 +271,18 @@ def read_redundancy(table: Table, system: System) -> Redundancy:
         unit=table.unit("unit"),
         tolerance=_tolerance(table, table.unit("unit")),
         while_below=read_threshold(while_, system, "below") if "only_while" in table else None,
+    )
+
+
+def read_cutting(table: Table, system: System) -> Cutting:
+    """Which parts of a long recording are recordings of their own."""
+    table.refuse_unknown("begins ends released before after")
+    return Cutting(
+        begins=read_threshold(table.table("begins"), system),
+        ends=read_threshold(table.table("ends"), system, "below"),
+        released=table.number("released", "s", 0.0),
+        before=table.number("before", "s", 0.0),
+        after=table.number("after", "s", 0.0),
     )
 
 

@@ -10,6 +10,7 @@ COMMANDS = {
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
     "systems": "list the systems that are installed",
+    "import": "turn files of recorders into case folders",
     "prepare": "turn published recordings of a system into case folders",
     "new": "write a system of one's own to begin with",
     "doctor": "say what is installed, what is missing, and what to do",

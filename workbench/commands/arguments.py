@@ -79,8 +79,10 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         nargs="*",
         type=Path,
         metavar="CASE",
-        help="case folder, or folder of case folders (default: those of the system)",
+        help="case folder, folder of case folders, or a recorder's file whose channels have the "
+        "system's names or were confirmed by 'workbench import' (default: those of the system)",
     )
+    add_told(parser)
     add_out(parser, out)
 
 
@@ -126,6 +128,29 @@ def add_reference(parser: argparse.ArgumentParser, purpose: str) -> None:
         type=Path,
         metavar="FILE",
         help=f"FMU {purpose} (default: the system's reference model)",
+    )
+
+
+def add_told(parser: argparse.ArgumentParser) -> None:
+    """Add what may be said of recordings without a case.toml, which `told` reads."""
+    parser.add_argument(
+        "--condition",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="of recorders' files: as in case.toml, such as load='2 kN' or surface=new,worn; "
+        "'unknown' if nobody knows; may be repeated",
+    )
+    parser.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="SIGNAL=CHANNEL",
+        help="of recorders' files: the channel of a signal, or of time, with its unit where the "
+        "file has none or a wrong one, such as 'time=Zeit [ms]'; may be repeated",
+    )
+    parser.add_argument(
+        "--rate", metavar="RATE", help="of recorders' files without times: such as '200 Hz'"
     )
 
 

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     """Time all of it."""
     require_compiler()
     system = load_system(options.system)
-    cases = given_cases(options.cases, system)
+    cases = given_cases(options, system)
     with claimed(options.out):
         return _run(output, system, cases, options.out / "bench.json")
 

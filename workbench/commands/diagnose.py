@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return Done({"effects": [{"name": one.name, "text": one.text} for one in effects]})
     require_compiler()
-    cases, held_out = _parted(given_cases(options.cases, system), options.held_out)
+    cases, held_out = _parted(given_cases(options, system), options.held_out)
     with claimed(options.out):
         return _run(options, output, system, library, effects, cases, held_out)
 

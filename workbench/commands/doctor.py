@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from workbench.commands.arguments import nearby
-from workbench.commands.extras import PURPOSES, installing, missing_packages
+from workbench.commands.extras import PURPOSES, missing_packages
 from workbench.commands.output import Done, Output
 from workbench.errors import FMUError, InputError
 from workbench.files import prove_writable
 from workbench.fmu import FMU
 from workbench.installed import built_models
-from workbench.resources import CHECKOUT, fmus
+from workbench.resources import CHECKOUT, fmus, installing
 from workbench.shelf import cache_folder
 
 # dx/dt = -x: the smallest model that needs every part of the compiler.

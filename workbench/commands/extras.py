@@ -7,9 +7,11 @@ from importlib.util import find_spec
 
 from workbench import resources
 from workbench.errors import InputError
+from workbench.resources import installing
 
 PURPOSES = {
     "compiler": "Modelica to FMU: diagnose, power, export, bench, systems without a built FMU",
+    "files": "import of Excel, MDF, TDMS, MAT 7.3, Parquet",
     "cluster": "tune on a Dask cluster",
     "completion": "workbench completion",
     "docs": "make docs",
@@ -48,13 +50,6 @@ def _requirements(extra: str) -> list[str]:
         if (asked[1] if asked else "") == extra:
             found.append(requirement)
     return found
-
-
-def installing(extra: str) -> str:
-    """Say how an extra is installed: in a checkout with the versions that it pins."""
-    if resources.CHECKOUT is None:
-        return f"pip install 'wheelset-workbench[{extra}]'"
-    return f"pip install -e '.[{extra}]' -c constraints.txt"
 
 
 def require_compiler() -> None:

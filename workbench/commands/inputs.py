@@ -4,16 +4,68 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from workbench.case import Case, check_names, read_cases
 from workbench.commands.arguments import nearby
-from workbench.errors import InputError
+from workbench.conditions import UNKNOWN
+from workbench.errors import InputError, closest
+from workbench.mapping import Told, parse_named
 from workbench.system import FULL, OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
+from workbench.units import quantity
 
 
-def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
+def told(options: argparse.Namespace, system: System) -> Told:
+    """What is said of recordings without a case.toml.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read.
+    """
+    conditions = dict(read_condition(one, system) for one in options.condition)
+    columns = dict(parse_named(one, "command line, --column", system) for one in options.column)
+    step = None
+    if options.rate is not None:
+        rate = quantity(options.rate, "Hz", "command line, --rate")
+        if not rate > 0.0:
+            raise InputError(
+                where="command line, --rate",
+                found=options.rate,
+                expected="samples per second, above 0",
+                remedy="write for instance --rate '200 Hz'",
+            )
+        step = 1.0 / rate
+    return Told(conditions, columns, step)
+
+
+def read_condition(text: str, system: System) -> tuple[str, Any]:
+    """One condition as people type it, NAME=VALUE, as case.toml has it.
+
+    Raises
+    ------
+    InputError
+        If it is none of the system's.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    kind = next((one for one in system.conditions if one.name == name), None)
+    if not equals or kind is None:
+        raise InputError(
+            where=f"condition {text}",
+            found=f"'{name}'{closest(name, [one.name for one in system.conditions])}",
+            expected="NAME=VALUE of a condition: "
+            + (", ".join(one.name for one in system.conditions) or "this system has none"),
+            remedy="correct the name",
+        )
+    words = {str(choice): choice for choice in kind.choices}
+    entries = [words.get(part.strip(), part.strip()) for part in value.split(",")]
+    whole = value == UNKNOWN or not kind.count
+    return name, words.get(value, value) if whole else entries
+
+
+def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
     """The cases that are asked for, or those that come with the system.
 
     Raises
@@ -21,6 +73,7 @@ def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
     InputError
         If there are none, or one cannot be read.
     """
+    paths: list[Path] = options.cases
     if not paths and system.cases is None:
         raise InputError(
             where="command line",
@@ -28,7 +81,8 @@ def given_cases(paths: Sequence[Path], system: System) -> list[Case]:
             expected="folders of recordings",
             remedy=f"name them, or write cases = 'FOLDER' in {nearby(system.source)}",
         )
-    cases = read_cases(paths or [system.cases], system)  # type: ignore[list-item]  # seen above
+    folders = paths or [path for path in [system.cases] if path is not None]
+    cases = read_cases(folders, system, told(options, system))
     for case in cases:
         for doubt in case.doubts:
             print(f"warning: {doubt}", file=sys.stderr, flush=True)
@@ -44,7 +98,7 @@ def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
         If system, models or cases cannot be read, or do not fit each other.
     """
     system = load_system(options.system)
-    cases = given_cases(options.cases, system)
+    cases = given_cases(options, system)
     names = model_names(options.map, system, cases)
     if options.fmu is not None or names:
         path = options.fmu or system.model(OBSERVER).path

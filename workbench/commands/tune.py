@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     """Search the gains."""
     system = load_system(options.system)
     kind = tunable(system, options.estimator)
-    cases = given_cases(options.cases, system)
+    cases = given_cases(options, system)
     _check(options, cases)
     system = system.with_names(model_names(options.map, system, cases))
     if options.fmu is not None:

@@ -8,6 +8,7 @@ from workbench.commands.arguments import (
     add_isolated,
     add_out,
     add_system,
+    add_told,
 )
 
 
@@ -33,5 +34,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="CASE",
         help="recordings that observers and tuning are timed on (default: those of the system)",
     )
+    add_told(bench)
     add_isolated(bench)
     return bench

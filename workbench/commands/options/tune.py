@@ -9,6 +9,7 @@ from workbench.commands.arguments import (
     add_map,
     add_seed,
     add_system,
+    add_told,
     add_workers,
     positive,
 )
@@ -42,6 +43,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="CASE",
         help="case folders, or folders of case folders (default: those of the system)",
     )
+    add_told(parser)
     parser.add_argument(
         "--fmu",
         type=Path,

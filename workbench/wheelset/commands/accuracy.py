@@ -20,7 +20,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     """Judge the estimators."""
     system = load_system(options.system)
     chosen = choose(system, options.estimator or list(estimators(system)))
-    cases = given_cases(options.cases, system)
+    cases = given_cases(options, system)
     # All of them before the first run, so that one that is missing is told at once.
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []

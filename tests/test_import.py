@@ -1,0 +1,306 @@
+"""Files of recorders are opened as they are: no number is wrong, nothing is invented."""
+
+import builtins
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import workbench as wb
+from workbench.__main__ import main
+from workbench.case import Case
+from workbench.errors import InputError
+from workbench.foreign import read_foreign
+from workbench.system import System
+
+from .recorder_files import DIGITS, FORMATS, csv_of_a_german_rig, german, mdf_4, recorded
+
+UNITS = {"pB": 1e5, "tauR": 1e3, "omegaW": 1 / 3.6 / 0.4, "omegaR": 1 / 3.6 / 0.6, "Fx": 1e3}
+
+
+@pytest.fixture(scope="module")
+def stop(root: Path, system: System) -> Case:
+    """A stop, every fourth sample of it."""
+    (case,) = wb.read_cases(root / "cases" / "01_dry_80_1.5", system)
+    return case.part(slice(None, None, 4))
+
+
+@pytest.fixture(autouse=True)
+def nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(builtins, "input", lambda: pytest.fail("a question"))
+
+
+def rounding(signal: str) -> float:
+    """Half of the last digit that a text has, in SI; and roundings of doubles."""
+    return 0.51 * UNITS[signal] * 10.0**-DIGITS
+
+
+def imported(out: Path, name: str, system: System) -> Case:
+    (case,) = wb.read_cases(out / name, system)
+    return case
+
+
+# --- formats ---
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_file_is_imported_without_a_wrong_number(
+    tmp_path: Path, stop: Case, system: System, name: str
+) -> None:
+    path = tmp_path / name
+    FORMATS[name](path, recorded(stop, system))
+    before = path.read_bytes()
+    assert main(["import", str(path), "--out", str(tmp_path / "cases"), "--yes"]) == 0
+    case = imported(tmp_path / "cases", name.partition(".")[0], system)
+    assert_allclose(case.time, stop.time - stop.time[0], atol=1e-9)
+    for signal in ("tauR", "omegaW", "omegaR", "Fx"):
+        assert_allclose(case[signal], stop[signal], rtol=1e-12, atol=rounding(signal))
+    exact = slice(None, None, 5)  # where the logger of two rates has samples, too
+    assert_allclose(case["pB"][exact], stop["pB"][exact], rtol=1e-12, atol=rounding("pB"))
+    assert path.read_bytes() == before
+
+
+def test_what_was_done_to_a_file_is_written_down(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    csv_of_a_german_rig(tmp_path / "a.csv", recorded(stop, system))
+    main(["import", str(tmp_path / "a.csv"), "--out", str(tmp_path / "out"), "--yes"])
+    (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
+    (file,) = one["files"]
+    assert file["format"].startswith("CSV, semicolons, decimal commas, Windows-1252")
+    assert file["notes"][0].startswith("1 lines that are no samples were left out, the first in")
+    assert one["dropped"] == ["Temperatur [degC]"]
+    assert one["channels"]["omegaR"]["converted"] == {
+        "to": "rad/s",
+        "factor": pytest.approx(1 / 3.6 / system.values["rR"], rel=1e-12),
+        "zero": 0.0,
+        "recorded_as": "rR * omegaR",
+    }
+    conditions = one["cases"]["a"]["conditions"]
+    assert conditions["initial_speed"]["from"] == "shown by the record"
+    assert conditions["wheel_rail"] == {"value": "unknown", "from": "unknown"}
+
+
+@pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
+def test_a_missing_reader_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    begins = {
+        "openpyxl": b"PK\x03\x04",
+        "pyarrow": b"PAR1",
+        "h5py": b"MATLAB 7.3 MAT-file",
+        "asammdf": b"MDF     ",
+        "nptdms": b"TDSm",
+    }
+    (tmp_path / "a").write_bytes(begins[package])
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(
+        InputError, match=rf"package '{package}' reads.*extra \[files\].*pip install"
+    ):
+        read_foreign(tmp_path / "a")
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (b"", "found an empty file"),
+        (b"PK\x03\x04" + b"x" * 99, "an Excel workbook that cannot be read"),
+        (b"PAR1" + b"x" * 99, "a Parquet file that cannot be read"),
+        (b"MDF     4.10" + b"x" * 99, "an MDF file that cannot be read"),
+        (b"MATLAB 7.3 MAT-file" + b"x" * 999, "a MAT 7.3 or HDF5 file that cannot be read"),
+        (b"MATLAB 5.0 MAT-file" + b"x" * 999, "a MAT file that cannot be read"),
+        (b"\x1f\x8b" + b"x" * 99, "damaged gzip"),
+        (b"\xd0\xcf\x11\xe0", r"save it as \.xlsx"),
+        (b"\0\1\2", "zero bytes, which no text has"),
+        (b"hello\nworld\n", "found no columns"),
+        (b"t;p;v\n0;1.234;5\n1;1.234;5\n2;1.234;6\n", "'1.234', which can be read with"),
+    ],
+)
+def test_what_is_no_recording_is_refused_in_words(
+    tmp_path: Path, content: bytes, match: str
+) -> None:
+    (tmp_path / "a").write_bytes(content)
+    with pytest.raises(InputError, match=match):
+        read_foreign(tmp_path / "a")
+
+
+# --- the same reader elsewhere ---
+
+
+def test_a_case_folder_may_hold_the_recorders_file(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    mdf_4(tmp_path / "stop.mf4", recorded(stop, system))
+    (tmp_path / "case.toml").write_text(
+        """title = "as it was recorded"
+[conditions]
+initial_speed = "80 km/h"
+brake_pressure = "1.5 bar"
+wheel_rail = "dry"
+discs = ["dry", "dry", "dry"]
+direction = 1
+[measurement]
+file = "stop.mf4"
+[measurement.columns]
+pB = "Bremsdruck"
+tauR = "Antriebsmoment"
+omegaW = "v_Rad"
+omegaR = { channel = "v_Rolle" }
+Fx = { channel = "Längskraft", reversed = true }
+"""
+    )
+    (case,) = wb.read_cases(tmp_path, system)
+    assert_allclose(case["omegaR"], stop["omegaR"], rtol=1e-12, atol=1e-12)
+    assert_allclose(case["Fx"], -stop["Fx"], rtol=1e-12, atol=1e-9)
+
+
+def test_a_bare_file_is_a_case_with_its_conditions_as_options(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    lines = ["time [s],pB [bar],tauR [kN.m],omegaW [rad/s],omegaR [1/min]"]
+    values = stop.time, stop["pB"] / 1e5, stop["tauR"] / 1e3, stop["omegaW"]
+    columns = (*values, stop["omegaR"] * 30 / np.pi)
+    lines += [",".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
+    (tmp_path / "stop.csv").write_text("\n".join(lines))
+    conditions = {"wheel_rail": "dry", "discs": "unknown"}
+    (case,) = wb.read_cases(tmp_path / "stop.csv", system, conditions=conditions)
+    assert case.name == "stop"
+    assert case.conditions["wheel_rail"] == "dry"
+    assert case.conditions["initial_speed"] == pytest.approx(80 / 3.6, rel=0.01)
+    assert_allclose(case["omegaR"], stop["omegaR"], rtol=1e-12)
+    with pytest.raises(InputError, match="no 'wheel_rail'"):
+        wb.read_cases(tmp_path / "stop.csv", system)
+
+
+def test_names_that_nobody_confirmed_are_not_taken_in_silence(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    csv_of_a_german_rig(tmp_path / "a.csv", recorded(stop, system))
+    with pytest.raises(InputError, match=r"nobody confirmed: perhaps pB = Bremsdruck \[bar\]"):
+        wb.read_cases(tmp_path / "a.csv", system)
+
+
+def test_channels_confirmed_for_a_folder_hold_for_its_files(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    out = tmp_path / "out"
+    for name in ("a.csv", "b.csv"):
+        csv_of_a_german_rig(tmp_path / name, recorded(stop, system))
+    assert main(["import", str(tmp_path / "a.csv"), "--out", str(out), "--yes"]) == 0
+    assert main(["import", str(tmp_path / "b.csv"), "--out", str(out)]) == 0  # nobody answers
+    assert [one.name for one in wb.read_cases(out, system)] == ["a", "b"]
+    (tmp_path / "columns.toml").write_bytes((out / "columns.toml").read_bytes())
+    unknown = {"wheel_rail": "unknown", "discs": "unknown"}
+    (case,) = wb.read_cases(tmp_path / "b.csv", system, conditions=unknown)
+    assert_allclose(case["pB"], stop["pB"], atol=rounding("pB"))
+
+
+# --- what is proposed, and what is asked ---
+
+
+@pytest.fixture
+def table(tmp_path: Path, stop: Case, system: System) -> Callable[..., Path]:
+    """Writes a CSV of a stop with other headers, by the usual name of a column."""
+
+    def write(name: str = "a.csv", **headers: str) -> Path:
+        columns = recorded(stop, system)
+        shown = [headers.get(key, f"{key} [{unit}]") for key, (unit, _) in columns.items()]
+        values = zip(*(values for _, values in columns.values()), strict=True)
+        lines = [";".join(shown), *(";".join(map(german, row)) for row in values)]
+        (tmp_path / name).write_text("\n".join(lines))
+        return tmp_path / name
+
+    return write
+
+
+def test_an_answer_confirms_and_corrects_at_once(
+    table: Callable[..., Path], tmp_path: Path, system: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    questions = []
+
+    def answer() -> str:
+        questions.append(1)
+        return "pB = Kanal 7 [bar]; wheel_rail=dry; discs=dry,dry,wet"
+
+    monkeypatch.setattr(builtins, "input", answer)
+    path = table(Bremsdruck="Kanal 7", Temperatur="Kanal 8")
+    assert main(["import", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert len(questions) == 1
+    case = imported(tmp_path / "out", "a", system)
+    assert case.conditions["discs"] == ("dry", "dry", "wet")
+    assert case.conditions["wheel_rail"] == "dry"
+
+
+@pytest.mark.parametrize(
+    ("headers", "match"),
+    [
+        (
+            {"Bremsdruck": "Bremsdruck 1 [bar]", "Temperatur": "Bremsdruck 2 [kPa]"},
+            "pB: it may be 'Bremsdruck 1' or 'Bremsdruck 2'",
+        ),
+        ({"Bremsdruck": "Bremsdruck Soll [bar]"}, "'Bremsdruck Soll' is asked for, not measured"),
+        ({"Bremsdruck": "Kanal 7 [bar]"}, "speaks for it, --column 'pB=Kanal 7' confirms"),
+        ({"Bremsdruck": "Bremsdruck [N]"}, r"'Bremsdruck' is in \[N\]"),
+        ({"Antriebsmoment": "Antriebsmoment [km/h]"}, r"'Antriebsmoment' is in \[km/h\]"),
+        ({"Temperatur": "Bremsdruck [°C]", "Bremsdruck": "x"}, r"'Bremsdruck' is in \[degC\]"),
+        ({"v_Rad": "v_Rad [m/s]"}, "wheel and roller roll along"),
+        ({"v_Rad": "v_Rad"}, "'v_Rad' has no unit and is plausible as"),
+        ({"Zeit": "Messwert"}, "no time among"),
+    ],
+)
+def test_what_is_not_certain_is_not_taken_by_yes(
+    table: Callable[..., Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    headers: dict[str, str],
+    match: str,
+) -> None:
+    path = table(**headers)
+    assert main(["import", str(path), "--out", str(tmp_path / "out"), "--yes"]) == 2
+    error = capsys.readouterr().err
+    assert match.replace("\\", "") in error
+    assert not list((tmp_path / "out").glob("*/case.toml"))
+
+
+def test_a_unit_that_alone_is_plausible_is_taken_and_said(
+    table: Callable[..., Path], tmp_path: Path, stop: Case, system: System
+) -> None:
+    path = table(Bremsdruck="Bremsdruck")
+    assert main(["import", str(path), "--out", str(tmp_path / "out"), "--yes"]) == 0
+    (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
+    assert one["channels"]["pB"]["unit"] == "bar"
+    assert not one["channels"]["pB"]["unit_stated"]
+    assert_allclose(imported(tmp_path / "out", "a", system)["pB"], stop["pB"], atol=rounding("pB"))
+
+
+def test_a_unit_that_a_further_file_states_is_not_overruled(
+    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first file has no unit, and bar is confirmed; the second says kPa and is asked about."""
+    out = str(tmp_path / "out")
+    assert main(["import", str(table(Bremsdruck="Bremsdruck")), "--out", out, "--yes"]) == 0
+    other = table("b.csv", Bremsdruck="Bremsdruck [kPa]")
+    assert main(["import", str(other), "--out", out, "--yes"]) == 0
+    assert "Bremsdruck [kPa]" in capsys.readouterr().out
+
+
+def test_of_several_files_one_that_is_refused_leaves_the_others(
+    table: Callable[..., Path], tmp_path: Path, system: System
+) -> None:
+    bad = table("bad.csv", Zeit="Messwert")
+    good = table("good.csv")
+    command = ["import", str(bad), str(good), "--out", str(tmp_path / "out"), "--yes"]
+    assert main(command) == 2
+    assert [one.name for one in wb.read_cases(tmp_path / "out", system)] == ["good"]
+
+
+def test_a_folder_with_other_files_is_left_as_it_is(
+    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = table()
+    assert main(["import", str(path), "--out", str(tmp_path), "--yes"]) == 2
+    assert "a folder with other files" in capsys.readouterr().err

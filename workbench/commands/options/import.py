@@ -1,0 +1,41 @@
+"""What `workbench import` may be told."""
+
+import argparse
+from pathlib import Path
+
+from workbench.commands.arguments import Commands, add_out, add_system, add_told
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "import",
+        help=text,
+        description="Turn files of recorders into case folders: CSV of any locale, Excel, MDF, "
+        "TDMS, MAT, Parquet. Channels are proposed by name, unit and plausible values; you confirm "
+        "them once, and columns.toml keeps that for further files. import.json says what was read, "
+        "converted, left out and cut. Originals are only read.",
+        epilog="examples:\n"
+        "  python -m workbench import monday/*.mf4 --out cases\n"
+        "  python -m workbench import stop7.csv --out cases --condition load='2 kN'\n"
+        "  python -m workbench import stop7.csv --out cases --column 'time=Zeit [ms]' --yes",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="of a recorder")
+    add_out(parser, "imported")
+    add_system(parser)
+    add_told(parser)
+    parser.add_argument(
+        "--yes",
+        action="store_true",
+        help="take what is proposed by name without asking, but not what only a unit speaks for",
+    )
+    parser.add_argument(
+        "--together",
+        action="store_true",
+        help="the files are of one recording, by several recorders",
+    )
+    parser.add_argument(
+        "--whole", action="store_true", help="do not cut a long recording into several"
+    )
+    return parser

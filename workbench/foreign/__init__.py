@@ -1,0 +1,155 @@
+"""Files of recorders, read as they are: which channels they hold, with names, units and times.
+
+Each format is one module, and what it needs beyond the workbench is in the extra `files`. What a
+channel means for a machine is not known here.
+"""
+
+import gzip
+import hashlib
+import io
+import stat
+import zlib
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from workbench.errors import InputError
+from workbench.foreign.contents import Channel, Group, Recorded
+from workbench.foreign.text import read as read_as_text
+from workbench.resources import installing
+
+__all__ = ["Channel", "Group", "Recorded", "is_foreign", "read_foreign"]
+
+_Reader = Callable[[Path, bytes], tuple[str, list[Group], list[str]]]
+_MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
+# Packages that read a format, by the module here, and what people call its files.
+_PACKAGES = {
+    "excel": ("openpyxl", "an Excel workbook"),
+    "parquet": ("pyarrow", "a Parquet file"),
+    "matlab5": ("scipy", "a MAT file"),
+    "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
+    "mdf": ("asammdf", "an MDF file"),
+    "tdms": ("nptdms", "a TDMS file"),
+}
+_BEGINS = {  # how files begin, whatever their ending
+    b"PAR1": "parquet",
+    b"MDF     ": "mdf",
+    b"UnFinMF ": "mdf",
+    b"TDSm": "tdms",
+    b"MATLAB 5.0 MAT-file": "matlab5",
+    b"MATLAB 7.3 MAT-file": "hdf5",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"PK\x03\x04": "excel",
+}
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file is read here by its ending; a CSV may be the workbench's own."""
+    return path.suffix.lower() != ".csv"
+
+
+def read_foreign(path: Path) -> Recorded:
+    """Read a file of a recorder.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, its format is not known, or the package that reads it is missing.
+    """
+    try:
+        kind = path.stat().st_mode
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end
+            raise OSError(0, "no regular file")
+        raw = path.read_bytes()
+    except OSError as error:
+        missing = isinstance(error, FileNotFoundError)
+        raise InputError(
+            where=str(path),
+            found="no such file" if missing else f"a file that cannot be read ({error.strerror})",
+            expected="a readable recording",
+            remedy="correct the path",
+        ) from None
+    if not raw:
+        raise InputError(
+            where=str(path),
+            found="an empty file",
+            expected="a recording",
+            remedy="export it again, with its samples",
+        )
+    sha256 = hashlib.sha256(raw).hexdigest()
+    packed = raw.startswith(b"\x1f\x8b")
+    if packed:
+        raw = _unpacked(path, raw)
+    words, groups, notes = _reader(path, raw)(path, raw)
+    if not any(group.channels for group in groups):
+        raise InputError(
+            where=str(path),
+            found=f"{words} without a channel of numbers",
+            expected="a recording",
+            remedy="export it again, with its samples",
+        )
+    return Recorded(path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256)
+
+
+def _unpacked(path: Path, raw: bytes) -> bytes:
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
+            unpacked = stream.read(_MOST + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(
+            where=str(path),
+            found=f"a damaged gzip file ({error})",
+            expected="a whole one",
+            remedy="copy or pack it again",
+        ) from None
+    if len(unpacked) > _MOST:
+        raise InputError(
+            where=str(path),
+            found=f"more than {_MOST >> 30} GB, unpacked",
+            expected="a recording that fits into memory",
+            remedy="cut it into several files",
+        )
+    return unpacked
+
+
+def _reader(path: Path, raw: bytes) -> _Reader:
+    """The reader of a format, by how the file begins."""
+    module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
+    if raw.startswith(b"\xd0\xcf\x11\xe0"):
+        raise InputError(
+            where=str(path),
+            found="a workbook of Excel 97 to 2003 (.xls)",
+            expected="a workbook (.xlsx), or a CSV",
+            remedy="save it as .xlsx",
+        )
+    if not module:
+        return read_as_text
+    package, called = _PACKAGES[module]
+    try:
+        import_module(package)
+    except ImportError:
+        raise InputError(
+            where=str(path),
+            found=f"{called}, which the package '{package}' reads, and that is not installed",
+            expected="the extra [files], which holds what reads such files",
+            remedy=installing("files"),
+        ) from None
+    return partial(_undamaged, import_module(f"workbench.foreign.{module}").read, called)
+
+
+def _undamaged(
+    reader: _Reader, called: str, path: Path, raw: bytes
+) -> tuple[str, list[Group], list[str]]:
+    """What a library reads of a file, if it is whole."""
+    try:
+        return reader(path, raw)
+    except InputError:
+        raise
+    except Exception as error:  # libraries stumble over damaged files in dozens of ways
+        raise InputError(
+            where=str(path),
+            found=f"{called} that cannot be read ({type(error).__name__}: {error})",
+            expected="a whole file, as its recorder writes it",
+            remedy="copy or export it again",
+        ) from None

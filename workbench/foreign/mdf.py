@@ -1,0 +1,54 @@
+"""MDF of data loggers, version 3 and 4: each channel group has its own times."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from asammdf import MDF
+
+from workbench.foreign.contents import Channel, Group
+from workbench.foreign.spelling import named, spelled
+
+_TIME = 1  # what a group counts its samples by: 0 nothing said, 1 time, 2 angle, 3 way, 4 index
+
+
+def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+    """Kind, groups and notes of a measurement file, in physical values."""
+    if raw[64:68] != b"##HD" and raw[64:66] != b"HD":
+        raise ValueError("no header")  # asammdf stumbles over itself without one
+    groups: list[Group] = []
+    notes: list[str] = []
+    with MDF(io.BytesIO(raw)) as file:
+        version, start = file.version, file.start_time.timestamp()
+        for index, held in enumerate(file.groups):
+            group = _group(file, index, held, start, notes)
+            if group is not None:
+                groups.append(group)
+    return f"MDF {version}", groups, notes
+
+
+def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> Group | None:
+    """Channels of one group with its times, or None without any."""
+    master = file.masters_db.get(index)
+    clock: Channel | None = None
+    channels: list[Channel] = []
+    for number, one in enumerate(held.channels):
+        if number == master:
+            continue
+        signal = file.get(group=index, index=number, ignore_invalidation_bits=True)
+        name, unit = named(one.name)
+        if signal.samples.dtype.kind not in "fiub" or signal.samples.ndim > 1:
+            notes.append(f"'{name}' holds no numbers")
+            continue
+        values = np.asarray(signal.samples, dtype=np.float64)
+        if signal.invalidation_bits is not None:
+            values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
+        channels.append(Channel(name, unit or spelled(signal.unit), values, signal.comment or ""))
+        clock = Channel("time", "s", np.asarray(signal.timestamps, np.float64), start=start)
+    if not channels or channels[0].values.size < 2:
+        return None
+    # Some are sampled over an angle or a way.
+    timed = master is not None and getattr(held.channels[master], "sync_type", _TIME) <= _TIME
+    title = str(getattr(held.channel_group, "acq_name", "") or "") or f"group {index + 1}"
+    return Group(title, tuple(channels), time=clock if timed else None)

@@ -1,0 +1,71 @@
+"""TDMS of LabVIEW and DIAdem: groups of channels, with waveforms or channels of times."""
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nptdms import TdmsFile
+
+from workbench.foreign.contents import Channel, Group
+from workbench.foreign.spelling import named, spelled
+
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
+
+
+def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+    """Kind, groups and notes of a file, in scaled values."""
+    groups: list[Group] = []
+    notes: list[str] = []
+    for held in TdmsFile.read(io.BytesIO(raw)).groups():
+        groups += _groups(held, notes)
+    return "TDMS", groups, notes
+
+
+def _groups(held: Any, notes: list[str]) -> list[Group]:
+    """A group of the file; channels with other times or lengths are groups of their own."""
+    found: dict[tuple[int, float, float, float], list[Channel]] = {}
+    for one in held.channels():
+        name, unit = named(one.name)
+        stated: Mapping[str, Any] = one.properties
+        unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
+        values = one[:]
+        step = float(stated.get("wf_increment", 0.0) or 0.0)
+        offset = float(stated.get("wf_start_offset", 0.0) or 0.0) if step > 0.0 else 0.0
+        begun = stated.get("wf_start_time")
+        start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan
+        if values.dtype.kind == "M":
+            channel = _stamps(name, values)
+        elif values.dtype.kind in "fiub":
+            about = str(stated.get("description", ""))
+            channel = Channel(name, unit, np.asarray(values, dtype=np.float64), about)
+        else:
+            notes.append(f"'{name}' holds texts")
+            continue
+        key = values.size, step, offset, -1.0 if np.isnan(start) else start
+        found.setdefault(key, []).append(channel)
+    groups = []
+    for (size, step, offset, start), channels in found.items():
+        if size < 2:
+            continue
+        clock = None
+        if step > 0.0:
+            times = offset + step * np.arange(size, dtype=np.float64)
+            clock = Channel("time", "s", times, start=start if start >= 0.0 else np.nan)
+        groups.append(Group(held.name, tuple(channels), time=clock))
+    return groups
+
+
+def _since_1970(moment: Any) -> float:
+    counted = np.datetime64(moment, "us").astype(np.int64)
+    seconds = float(counted) * 1e-6
+    return seconds if seconds > 0.0 else np.nan  # TDMS writes 1904 where it knows none
+
+
+def _stamps(name: str, values: Any) -> Channel:
+    """Time stamps, without what a float of seconds since 1970 would round."""
+    known = ~np.isnat(values)
+    first = values[known][0] if known.any() else np.datetime64(0, "us")
+    times = (values - first) / np.timedelta64(1, "s")
+    return Channel(name, "s", np.where(known, times, np.nan), start=_since_1970(first), stamp=True)

@@ -1,0 +1,318 @@
+"""Files of recorders become case folders; what was done to them is written down.
+
+A file is read (`foreign`), its channels are proposed for the signals of a system and confirmed
+(`mapping`), and it is cut where it holds several recordings. Originals are only read.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from workbench.case import check_recording
+from workbench.conditions import UNKNOWN, conditions_shown, read_conditions
+from workbench.errors import InputError
+from workbench.files import write_json, write_whole
+from workbench.foreign import Recorded
+from workbench.foreign.stamps import iso
+from workbench.importing.cutting import Cut, cut
+from workbench.mapping import COLUMNS, Measured, Named, Proposal, merge
+from workbench.plausibility import Origin, doubts
+from workbench.provenance import commit
+from workbench.recording import Vector
+from workbench.system import System
+from workbench.tables import Table
+
+__all__ = [
+    "IMPORTED",
+    "Cut",
+    "Import",
+    "Piece",
+    "case_name",
+    "describe",
+    "import_files",
+    "imported",
+    "store",
+    "write",
+    "write_record",
+]
+
+IMPORTED = "import.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One recording of an import.
+
+    Attributes
+    ----------
+    name : of its case folder.
+    samples : first, and the one after the last, of those that were read.
+    time : (n,) s from its first sample.
+    signals : (n,) each, SI.
+    conditions : as `case.toml` has them.
+    sources : where each condition is from: given, shown by the record, unknown.
+    doubts : what is unlikely in it, in words.
+    """
+
+    name: str
+    samples: tuple[int, int]
+    time: Vector
+    signals: Mapping[str, Vector]
+    conditions: Mapping[str, Any]
+    sources: Mapping[str, str]
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Import:
+    """What becomes of some files that hold one recording, or one long one.
+
+    Attributes
+    ----------
+    measured : all of it, in SI units.
+    parts : in which it was cut.
+    pieces : those that become cases.
+    """
+
+    files: tuple[Recorded, ...]
+    proposal: Proposal
+    measured: Measured
+    parts: tuple[Cut, ...]
+    pieces: tuple[Piece, ...] = field(default_factory=tuple)
+
+
+def import_files(
+    name: str,
+    files: Sequence[Recorded],
+    proposal: Proposal,
+    system: System,
+    conditions: Mapping[str, Any],
+    *,
+    whole: bool = False,
+) -> Import:
+    """Make recordings of files whose channels are known.
+
+    Parameters
+    ----------
+    name : of the case, or of all that a long recording is cut into, with numbers.
+    proposal : channels of all signals that are needed, confirmed.
+    conditions : of all these recordings, as `case.toml` has them.
+    whole : leave a long recording as it is.
+
+    Raises
+    ------
+    InputError
+        If signals have no samples in common, a condition is none of the system's, or a recording
+        cannot be what it says it is.
+    """
+    where = ", ".join(str(one.path) for one in files)
+    measured = merge(files, proposal, system)
+    check_recording(measured.time, system, f"{where}, time", None)
+    parts = [Cut(0, measured.time.size)] if whole else cut(measured.time, measured.signals, system)
+    kept = [one for one in parts if not one.reason]
+    if not kept:
+        raise InputError(
+            where=where,
+            found=f"no recording: {'; '.join(dict.fromkeys(one.reason for one in parts))}",
+            expected=f"at least {system.fewest} samples over {system.shortest:g} s",
+            remedy="import it as one recording, --whole",
+        )
+    many = len(kept) > 1
+    names = [f"{k:02d}_{name}" if many else name for k in range(1, len(kept) + 1)]
+    pieces = [
+        _piece(own, one, measured, system, conditions, where)
+        for own, one in zip(names, kept, strict=True)
+    ]
+    return Import(tuple(files), proposal, measured, tuple(parts), tuple(pieces))
+
+
+def case_name(path: Path) -> str:
+    """Name of a case: letters, figures and signs that every file system takes."""
+    stem = re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", path.name)
+    return re.sub(r"[^\w.+-]+", "_", stem).strip("._") or "recording"
+
+
+def _piece(
+    name: str,
+    one: Cut,
+    measured: Measured,
+    system: System,
+    given: Mapping[str, Any],
+    where: str,
+) -> Piece:
+    part = slice(one.first, one.end)
+    time = measured.time[part] - measured.time[one.first]
+    signals = {signal: values[part] for signal, values in measured.signals.items()}
+    shown = conditions_shown(signals, system)
+    unknown = {
+        kind.name: UNKNOWN
+        for kind in system.conditions
+        if kind.name not in given and kind.name not in shown and not kind.sign
+    }
+    conditions = {**unknown, **shown, **given}
+    table = Table(conditions, f"{where}, conditions")
+    read = read_conditions(table, system)
+    sources = {
+        key: "given" if key in given else "shown by the record" if key in shown else UNKNOWN
+        for key in read
+    }
+    origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
+    found = doubts(time, signals, read, system, origin)
+    ordered = {key: conditions[key] for key in read}
+    return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
+
+
+def store(out: Path, named: Mapping[str, Named]) -> None:
+    """Keep confirmed channels for all files of a folder; those of earlier files stay.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    tables = {signal: one.to_dict() for signal, one in named.items()}
+    write_whole(out / COLUMNS, tomli_w.dumps({"columns": tables}))
+
+
+def write(one: Import, out: Path, system: System) -> None:
+    """Write case folders of an import.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    written: dict[str, str] = {}
+    for piece in one.pieces:
+        names = ", ".join(file.path.name for file in one.files)
+        case = {"title": f"{piece.name}, imported from {names}"}
+        conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
+        measurement = {"measurement": {"file": "measured.csv"}}
+        written[f"{piece.name}/case.toml"] = tomli_w.dumps({**case, **conditions, **measurement})
+        columns = {"time": piece.time, **piece.signals}
+        units = {"time": "s", **{n: system.signals[n].unit for n in piece.signals}}
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [",".join(f"{name} [{units[name]}]" for name in columns)]
+        lines += [",".join(map(repr, row)) for row in rows]
+        written[f"{piece.name}/measured.csv"] = "\n".join(lines) + "\n"
+    for path, text in written.items():
+        write_whole(out / path, text)
+
+
+def describe(one: Import, system: System) -> dict[str, Any]:
+    """What was read, converted, dropped and cut, for programs."""
+    time, measured = one.measured.time, one.measured
+    return {
+        "files": [
+            {
+                "file": str(file.path),
+                "sha256": file.sha256,
+                "format": file.kind,
+                "notes": list(file.notes),
+            }
+            for file in one.files
+        ],
+        "began": iso(measured.start + float(time[0])) or None,
+        "time": _described_clocks(one),
+        "channels": _described_channels(one, system),
+        "dropped": list(one.proposal.left),
+        "notes": list(measured.notes),
+        "cut": [
+            {
+                "from": float(time[part.first]),
+                "to": float(time[part.end - 1]),
+                "samples": part.end - part.first,
+                "case": next((p.name for p in one.pieces if p.samples[0] == part.first), None),
+                "left_out": part.reason or None,
+            }
+            for part in one.parts
+        ],
+        "cases": {
+            piece.name: {
+                "samples": piece.time.size,
+                "seconds": float(piece.time[-1]),
+                "conditions": {
+                    key: {"value": value, "from": piece.sources[key]}
+                    for key, value in piece.conditions.items()
+                },
+                "doubts": list(piece.doubts),
+            }
+            for piece in one.pieces
+        },
+    }
+
+
+def _described_clocks(one: Import) -> list[dict[str, Any]]:
+    return [
+        {
+            "file": one.files[file].path.name,
+            "group": one.files[file].groups[group].name,
+            "channel": clock.channel or None,
+            "unit": clock.unit,
+            "reason": clock.reason,
+        }
+        for (file, group), clock in one.proposal.clocks.items()
+    ]
+
+
+def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]]:
+    return {
+        name: {
+            "file": one.files[found.file].path.name,
+            "group": one.files[found.file].groups[found.group].name,
+            "channel": found.channel.name,
+            "unit": found.unit,
+            "unit_stated": not found.concluded,
+            "converted": {
+                "to": system.signals[name].unit,
+                "factor": found.factor,
+                "zero": found.zero,
+                "recorded_as": found.formula or None,
+            },
+            "reason": found.reason,
+        }
+        for name, found in one.proposal.assigned.items()
+    }
+
+
+def imported(out: Path) -> list[dict[str, Any]]:
+    """What was imported into a folder before; empty if nothing was.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other files.
+    """
+    path = out / IMPORTED
+    if path.is_file():
+        found: list[dict[str, Any]] = json.loads(path.read_text())["imports"]
+        return found
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(
+            where=str(out),
+            found="a folder with other files" if out.is_dir() else "a file",
+            expected="a new or an empty folder, or one with imported recordings",
+            remedy="choose another folder",
+        )
+    return []
+
+
+def write_record(out: Path, system: System, imports: Sequence[Mapping[str, Any]]) -> None:
+    """Write what was read, converted, dropped and cut, as `import.json`.
+
+    Parameters
+    ----------
+    imports : of `describe`, and those before.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    content = {"system": system.name, "workbench": commit(), "imports": list(imports)}
+    write_json(out / IMPORTED, content)

@@ -1,0 +1,152 @@
+"""When the samples of a group were taken."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.foreign import Channel, Group
+from workbench.foreign.spelling import conversion
+from workbench.mapping.names import TIME, Named, is_time, listed
+from workbench.recording import Vector
+from workbench.system import System
+
+# Units of time that recorders leave out; each is at least a thousand times the one before, so that
+# at most one makes steps like those of usual recordings, within a factor of the root of a thousand.
+_UNSTATED = ("ns", "us", "ms", "s", "d")
+_LIKE = math.sqrt(1000.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Times of a group's samples.
+
+    Attributes
+    ----------
+    channel : name of the channel that holds them; empty: the file itself says them.
+    times : (n,) s, NaN where there is none.
+    start : of their zero [s since 1970], NaN where that is not known.
+    unit : that the channel was read in.
+    reason : why these are the times, for people; `certain`: nothing was concluded.
+    """
+
+    channel: str
+    times: Vector
+    start: float
+    unit: str
+    reason: str
+    certain: bool
+
+
+def read_clock(
+    group: Group, named: Named | None, step: float | None, system: System, where: str
+) -> Clock:
+    """Times of a group's samples.
+
+    Parameters
+    ----------
+    named : the channel that the user says is the time.
+    step : between two samples, as the user says [s]; it wins over all that the file says.
+
+    Raises
+    ------
+    InputError
+        If there is no time, or none that goes on.
+    """
+    count = np.arange(group.channels[0].values.size, dtype=np.float64)
+    if step is not None:
+        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True)
+    if named is not None:
+        found = next((one for one in group.channels if one.name == named.channel), None)
+        if found is not None:
+            return _going_on(_named(found, named, system, where), where)
+    if group.time is not None:
+        one = group.time
+        return _going_on(Clock("", one.values, one.start, "s", "the file says it", True), where)
+    clocks = [clock for one in group.channels if (clock := _candidate(one, group, system))]
+    for clock in sorted(clocks, key=lambda one: not one.certain):
+        if _increases(clock.times):
+            return clock
+    if math.isfinite(group.step):
+        times = count * group.step
+        return Clock("", times, math.nan, "s", f"every {group.step:g} s, as the file says", False)
+    if clocks:
+        return _going_on(clocks[0], where)
+    raise InputError(
+        where=where,
+        found=f"no time among {listed([one.name for one in group.channels])}",
+        expected="a channel of times, or a known rate",
+        remedy=f"name it, --column '{TIME}=NAME [s]', or give --rate '200 Hz'",
+    )
+
+
+def _named(channel: Channel, named: Named, system: System, where: str) -> Clock:
+    unit = named.unit or channel.unit or _unstated(channel.values, system)
+    found = conversion(unit, "s") if unit else None
+    if found is None:
+        raise InputError(
+            where=f"{where}, '{channel.name}'",
+            found=f"times in [{unit}]" if unit else "times without a unit",
+            expected="a unit of time",
+            remedy=f"give it, --column '{TIME}={channel.name} [ms]'",
+        )
+    times = found.factor * channel.values
+    return Clock(channel.name, times, channel.start, unit, "named", True)
+
+
+def _candidate(channel: Channel, group: Group, system: System) -> Clock | None:
+    """A channel that may be the time, by its name, its unit and its place."""
+    if channel.stamp:
+        return Clock(channel.name, channel.values, channel.start, "s", "time stamps", True)
+    found = conversion(channel.unit, "s") if channel.unit else None
+    if found is not None and (is_time(channel.name) or channel is group.channels[0]):
+        times = found.factor * channel.values
+        return Clock(channel.name, times, math.nan, channel.unit, "name and unit", True)
+    if not channel.unit and is_time(channel.name):
+        unit = _unstated(channel.values, system)
+        scale = conversion(unit, "s") if unit else None
+        if scale is not None:
+            times = scale.factor * channel.values
+            reason = f"no unit in the file; in {unit} it is sampled as is usual"
+            return Clock(channel.name, times, math.nan, unit, reason, False)
+    return None
+
+
+def _unstated(values: Vector, system: System) -> str:
+    """The unit in which times step as usual recordings do; empty if there is none."""
+    held = values[np.isfinite(values)]
+    steps = np.diff(held)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    for unit in _UNSTATED:
+        factor = conversion(unit, "s")
+        if factor and 1.0 / _LIKE < usual * factor.factor / system.sample_time < _LIKE:
+            return unit
+    return ""
+
+
+def _increases(times: Vector) -> bool:
+    held = times[np.isfinite(times)]
+    return held.size > 1 and bool((np.diff(held) > 0).all())
+
+
+def _going_on(clock: Clock, where: str) -> Clock:
+    """The clock, if it goes on from sample to sample.
+
+    Raises
+    ------
+    InputError
+        If it repeats itself, or goes back.
+    """
+    if _increases(clock.times):
+        return clock
+    held = clock.times[np.isfinite(clock.times)]
+    late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
+    found = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
+    count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
+    raise InputError(
+        where=f"{where}, '{clock.channel}'" if clock.channel else where,
+        found=f"{found} in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else ""),
+        expected="times that go on",
+        remedy="if samples are evenly spaced say so, --rate '200 Hz'; else export more digits",
+    )

@@ -1,0 +1,157 @@
+"""Which channel a user says is which signal, and how alike their names are."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from workbench.errors import InputError
+from workbench.foreign.spelling import named, spelled
+from workbench.system import System
+from workbench.system_parts import Signal
+from workbench.tables import Table
+
+TIME = "time"
+_TIME_WORDS = frozenset(
+    "time t zeit timestamp zeitstempel datum date datetime uhrzeit temps tiempo tempo elapsed "  # noqa: SIM905
+    "clock utc messzeit relativzeit reltime".split()
+)
+# A value that is asked for is no measurement.
+_ASKED = frozenset(
+    "soll sollwert set setpoint command commanded cmd demand demanded target request requested "  # noqa: SIM905
+    "reference ref vorgabe consigne".split()
+)
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
+_LEAST = 4  # letters of a word that tells within another one: "druck" in "Bremsdruck"
+EXACT, WORDS, WITHIN = 4, 3, 2  # how alike names are
+
+
+@dataclass(frozen=True)
+class Named:
+    """A channel that a user names.
+
+    Attributes
+    ----------
+    channel : its name, or "GROUP/NAME" where several groups have it.
+    unit : what its values are in, whatever the file says; empty: as the file says.
+    reversed : whether its sign is the other one.
+    """
+
+    channel: str
+    unit: str = ""
+    reversed: bool = False
+
+    def to_dict(self) -> dict[str, str | bool]:
+        """Entries of a TOML table."""
+        return {
+            "channel": self.channel,
+            **({"unit": self.unit} if self.unit else {}),
+            **({"reversed": True} if self.reversed else {}),
+        }
+
+
+def read_named(table: Table, system: System) -> dict[str, Named]:
+    """Channels by signal, as a table of TOML has them: a name, or a table.
+
+    Raises
+    ------
+    InputError
+        If a signal is none of the system, or an entry is unknown.
+    """
+    table.refuse_unknown((TIME, *system.signals))
+    found: dict[str, Named] = {}
+    for signal, entry in table.content.items():
+        if isinstance(entry, str):
+            found[signal] = Named(table.take(signal, str))
+            continue
+        table.take(signal, dict)
+        own = table.table(signal)
+        own.refuse_unknown("channel unit reversed")
+        unit = spelled(own.text("unit", ""))
+        other = "reversed" in own and own.take("reversed", bool)
+        found[signal] = Named(own.take("channel", str), unit, other)
+    return found
+
+
+def parse_named(text: str, where: str, system: System) -> tuple[str, Named]:
+    """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    signal, equals, channel = (part.strip() for part in text.partition("="))
+    if not equals or not channel.lstrip("-") or signal not in (TIME, *system.signals):
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"SIGNAL=CHANNEL or SIGNAL=CHANNEL [unit], of {TIME}, "
+            f"{', '.join(system.signals)}",
+            remedy="write for instance 'time=Zeit [ms]'; a minus before the channel reverses it",
+        )
+    name, unit = named(channel.removeprefix("-").strip())
+    return signal, Named(name, unit, channel.startswith("-"))
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of a name, however they are run together.
+
+    >>> words("Brems-Druck_2"), words("rollSpeed"), words("n Rolle (gefiltert)")
+    (('brems', 'druck', '2'), ('roll', 'speed'), ('n', 'rolle', 'gefiltert'))
+    """
+    apart = re.sub(r"([a-zäöüß])([A-ZÄÖÜ])", r"\1 \2", name)
+    folded = apart.casefold().translate(_UMLAUTS)
+    return tuple(re.findall(r"[^\W\d_]+|\d+", folded))
+
+
+def is_time(name: str) -> bool:
+    """Whether a name is one of time."""
+    return bool(_TIME_WORDS.intersection(words(name)))
+
+
+def is_asked(name: str) -> bool:
+    """Whether a name is one of a value that is asked for, not measured."""
+    return bool(_ASKED.intersection(words(name)))
+
+
+def alike(channel: str, about: str, signal: Signal) -> int:
+    """How alike a channel's name is to those of a signal: EXACT, WORDS, WITHIN, or 0."""
+    known = [signal.name, signal.label, *signal.called]
+    own = words(channel)
+    best = 0
+    for name in known:
+        theirs = words(name)
+        if channel.strip() == name or (theirs and own == theirs):
+            return EXACT
+        if theirs and set(theirs) <= {*own, *words(about)}:
+            best = max(best, WORDS)
+        joined = "".join(theirs)
+        if len(joined) >= _LEAST and joined in "".join(own):
+            best = max(best, WITHIN)
+    return best
+
+
+def refuse_shared(names: Mapping[str, Named], where: str) -> None:
+    """Refuse one channel for two signals.
+
+    Raises
+    ------
+    InputError
+        If there is one.
+    """
+    taken: dict[str, str] = {}
+    for signal, one in names.items():
+        if one.channel in taken:
+            raise InputError(
+                where=f"{where} {signal}",
+                found=f"channel '{one.channel}', which is already {taken[one.channel]}",
+                expected="a different channel for each signal",
+                remedy="correct one of the two",
+            )
+        taken[one.channel] = signal
+
+
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Names for a message, not more than people read."""
+    left = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + left

@@ -1,0 +1,390 @@
+"""Channels are proposed for signals: by name, by unit, and by what values are plausible."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.errors import InputError, closest
+from workbench.foreign import Channel, Group, Recorded
+from workbench.foreign.spelling import Conversion, conversion, spelled
+from workbench.mapping.clock import Clock, read_clock
+from workbench.mapping.names import EXACT, TIME, WITHIN, WORDS, Named, alike, is_asked, listed
+from workbench.recording import Vector
+from workbench.system import System
+from workbench.system_parts import Signal
+
+# Units that recorders use and may leave out, by the SI unit of what they measure.
+_USUAL = {
+    "Pa": ("Pa", "kPa", "MPa", "mbar", "bar", "psi"),
+    "rad/s": ("rad/s", "rpm", "rev/s", "deg/s"),
+    "rad": ("rad", "deg", "rev"),
+    "m/s": ("m/s", "km/h", "mph"),
+    "m": ("m", "mm"),
+    "N": ("N", "kN"),
+    "N.m": ("N.m", "kN.m"),
+    "V": ("V", "mV"),
+    "A": ("A", "mA"),
+    "K": ("K", "degC"),
+}
+_TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
+
+
+@dataclass(frozen=True, eq=False)
+class Assigned:
+    """A channel that is taken for a signal.
+
+    Attributes
+    ----------
+    file : it stands in, counted from 0.
+    group : in that file, counted from 0.
+    label : the channel's name, with its group where several have it.
+    unit : that its values are in.
+    factor, zero : SI value is `factor*value + zero`.
+    formula : what the recorder has in place of the signal; empty: the signal itself.
+    reason : why this one, for people.
+    certain : whether name and unit are the system's own, so that nobody need be asked.
+    concluded : whether the file does not say the unit.
+    alone : whether nothing but its unit speaks for it.
+    """
+
+    file: int
+    group: int
+    channel: Channel
+    label: str
+    unit: str
+    factor: float
+    zero: float
+    formula: str
+    reason: str
+    certain: bool
+    concluded: bool = False
+    alone: bool = False
+
+    @property
+    def values(self) -> Vector:
+        """(n,) SI, NaN in gaps."""
+        return self.factor * self.channel.values + self.zero
+
+    @property
+    def named(self) -> Named:
+        """As it is stored; what the file says of the unit is left to it."""
+        unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
+        return Named(self.label, unit, self.factor < 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Which channels of some files are which signals of a system.
+
+    Attributes
+    ----------
+    assigned : channels by signal.
+    clocks : of each group with an assigned channel, by file and group.
+    left : channels that nobody takes.
+    problems : why a signal that is needed has no channel, in words.
+    """
+
+    assigned: Mapping[str, Assigned]
+    clocks: Mapping[tuple[int, int], Clock]
+    left: tuple[str, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def certain(self) -> bool:
+        """Whether it follows from names and units alone."""
+        own = all(one.certain for one in self.assigned.values())
+        return not self.problems and own and all(one.certain for one in self.clocks.values())
+
+    @property
+    def named(self) -> dict[str, Named]:
+        """As it is stored."""
+        found = {name: one.named for name, one in self.assigned.items()}
+        for clock in self.clocks.values():
+            if clock.channel:
+                found.setdefault(TIME, Named(clock.channel, "" if clock.certain else clock.unit))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    file: int
+    group: int
+    holder: Group
+    channel: Channel
+    label: str
+
+
+def propose(
+    files: Sequence[Recorded],
+    system: System,
+    given: Mapping[str, Named],
+    step: float | None = None,
+) -> Proposal:
+    """Propose a channel for each signal.
+
+    Parameters
+    ----------
+    files : that hold one recording, of one or several recorders.
+    given : channels that the user names, by signal, and by "time".
+    step : between two samples, where the files do not say it [s].
+
+    Raises
+    ------
+    InputError
+        If a named channel is missing, or its unit does not fit; or a group that holds a signal has
+        no time.
+    """
+    places = _places(files)
+    where = ", ".join(str(one.path) for one in files)
+    assigned = {
+        name: _as_named(one, system.signals[name], places, system, where)
+        for name, one in given.items()
+        if name != TIME
+    }
+    if TIME in given:
+        _find(given[TIME], TIME, places, where)
+    times = {given[TIME].channel} if TIME in given else set()
+    free = [
+        one
+        for one in places
+        if one.channel.name not in times
+        and not one.channel.stamp
+        and all(one.channel is not other.channel for other in assigned.values())
+    ]
+    doubts: dict[str, str] = {}
+    _by_name(assigned, doubts, free, system)
+    _by_unit(assigned, doubts, free, system)
+    problems = tuple(
+        f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
+        for one in (*system.inputs, *system.outputs)
+        if one.name not in assigned
+    )
+    clocks: dict[tuple[int, int], Clock] = {}
+    for one in assigned.values():
+        if (one.file, one.group) not in clocks:
+            group = files[one.file].groups[one.group]
+            at = str(files[one.file].path) + (f", '{group.name}'" if group.name else "")
+            clocks[one.file, one.group] = read_clock(group, given.get(TIME), step, system, at)
+    taken = {id(one.channel) for one in assigned.values()}
+    timed = {clock.channel for clock in clocks.values()}
+    left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
+    shown = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in left)
+    return Proposal(assigned, clocks, shown, problems)
+
+
+def _places(files: Sequence[Recorded]) -> list[_Place]:
+    """All channels, each with a name that no other has, if groups have names."""
+    found = [
+        (i, j, group, channel)
+        for i, one in enumerate(files)
+        for j, group in enumerate(one.groups)
+        for channel in group.channels
+    ]
+    counts = Counter(channel.name for *_, channel in found)
+    return [
+        _Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
+        for i, j, group, one in found
+    ]
+
+
+def _find(one: Named, signal: str, places: Sequence[_Place], where: str) -> _Place:
+    """The place that a user names."""
+    name = one.channel
+    found = [place for place in places if place.channel.name == name]
+    found = found or [place for place in places if place.label == name]
+    found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
+    if signal == TIME and found:
+        return found[0]
+    if len(found) != 1:
+        names = [place.channel.name for place in places]
+        raise InputError(
+            where=f"{where}, channel '{name}'",
+            found=f"{len(found)} channels of this name" if found else "no such channel",
+            expected=f"one for {signal} among {listed(names)}{closest(name, names)}",
+            remedy=f"correct the name, --column '{signal}=NAME'"
+            + (", or GROUP/NAME where several groups have it" if found else ""),
+        )
+    return found[0]
+
+
+def _as_named(
+    one: Named, signal: Signal, places: Sequence[_Place], system: System, where: str
+) -> Assigned:
+    """The channel that a user names for a signal."""
+    place = _find(one, signal.name, places, where)
+    unit = one.unit or place.channel.unit
+    concluded = not unit
+    if not unit:
+        fitting = _fitting(place.channel, signal, system)
+        unit = fitting[0] if len(fitting) == 1 else ""
+    way = _way(unit, signal, system) if unit else None
+    if way is None:
+        raise InputError(
+            where=f"{where}, channel '{place.channel.name}'",
+            found=f"[{unit}], no unit of {signal.label}" if unit else "no unit in the file",
+            expected=f"one that can become {signal.unit}"
+            + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
+            remedy=f"give it, --column '{signal.name}={place.channel.name} [{signal.shown}]'",
+        )
+    turn = -1.0 if one.reversed else 1.0
+    scale, formula = way
+    return Assigned(
+        place.file,
+        place.group,
+        place.channel,
+        place.label,
+        unit,
+        turn * scale.factor,
+        turn * scale.zero,
+        formula,
+        _unit_reason("named", unit, concluded),
+        certain=True,
+        concluded=concluded or bool(one.unit),
+    )
+
+
+def _way(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | None:
+    """How values in a unit become a signal, and by which formula; None: in no way."""
+    direct = conversion(unit, signal.unit)
+    if direct is not None:
+        return direct, ""
+    other = signal.recorded_as
+    found = conversion(unit, other.unit) if other is not None else None
+    if other is None or found is None:
+        return None
+    (slope,) = other.formula.slopes((signal.name,), system.values)
+    return Conversion(found.factor / slope, found.zero / slope), other.formula.text
+
+
+def _fitting(channel: Channel, signal: Signal, system: System) -> list[str]:
+    """Usual units in which values without a unit have the signal's typical size."""
+    others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
+    units = dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others))
+    fitting: list[str] = []
+    for unit in units:
+        way = _way(unit, signal, system)
+        if way is None:
+            continue
+        values = way[0].factor * channel.values + way[0].zero
+        size = float(np.nanmax(np.abs(values), initial=0.0))
+        low, high = signal.plausible
+        if not signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL:
+            continue
+        if np.nanmin(values) >= low and np.nanmax(values) <= high:
+            fitting.append(unit)
+    return fitting
+
+
+def _unit_reason(reason: str, unit: str, concluded: bool) -> str:
+    return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
+
+
+def _candidate(
+    place: _Place, signal: Signal, system: System, likeness: int
+) -> tuple[Assigned | None, str]:
+    """A channel as a signal, or None and why it cannot be."""
+    channel = place.channel
+    unit = channel.unit or _suffix(channel.name, signal, system)
+    concluded = not unit
+    if concluded:
+        fitting = _fitting(channel, signal, system)
+        if len(fitting) != 1:
+            fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
+            return None, f"'{channel.name}' has no unit and is plausible {fits}"
+        unit = fitting[0]
+    way = _way(unit, signal, system)
+    if way is None:
+        return None, f"'{channel.name}' is in [{unit}]"
+    scale, formula = way
+    values = scale.factor * channel.values + scale.zero
+    low, high = signal.possible
+    if not np.isfinite(values).any():
+        return None, f"'{channel.name}' holds no numbers"
+    if np.nanmin(values) < low or np.nanmax(values) > high:
+        return None, f"'{channel.name}' in [{unit}] goes beyond what is possible"
+    reason = "name and unit" if likeness else "the only one of its unit"
+    return Assigned(
+        place.file,
+        place.group,
+        channel,
+        place.label,
+        unit,
+        scale.factor,
+        scale.zero,
+        formula,
+        _unit_reason(reason, unit, concluded),
+        certain=likeness == EXACT and channel.name == signal.name and bool(channel.unit),
+        concluded=concluded,
+        alone=not likeness,
+    ), ""
+
+
+def _suffix(name: str, signal: Signal, system: System) -> str:
+    """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
+    _, _, last = name.replace(" ", "_").rpartition("_")
+    unit = spelled(last)
+    return unit if len(last) > 1 and last != name and _way(unit, signal, system) else ""
+
+
+def _by_name(
+    assigned: dict[str, Assigned],
+    doubts: dict[str, str],
+    places: Sequence[_Place],
+    system: System,
+) -> None:
+    """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
+    found: dict[int, list[tuple[Signal, Assigned]]] = {EXACT: [], WORDS: [], WITHIN: []}
+    for signal in system.signals.values():
+        for place in places:
+            likeness = alike(place.channel.name, place.channel.about, signal)
+            if likeness and is_asked(place.channel.name) and not signal.exact:
+                doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
+            elif likeness:
+                one, doubt = _candidate(place, signal, system, likeness)
+                if one is not None:
+                    found[likeness].append((signal, one))
+                else:
+                    doubts[signal.name] = doubt
+    settled = set(assigned)
+    for level in found.values():
+        taken = {id(one.channel) for one in assigned.values()}
+        left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
+        for signal, one in left:
+            rivals = [o.channel.name for s, o in left if s is signal]
+            claims = [s.name for s, o in left if o.channel is one.channel]
+            settled.add(signal.name)
+            if len(rivals) == len(claims) == 1:
+                assigned[signal.name] = one
+            elif len(rivals) > 1:
+                doubts[signal.name] = f"it may be {' or '.join(map(repr, rivals))}"
+            else:
+                doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
+
+
+def _by_unit(
+    assigned: dict[str, Assigned],
+    doubts: Mapping[str, str],
+    places: Sequence[_Place],
+    system: System,
+) -> None:
+    """Assign the only channel that has the unit of the only signal that lacks one."""
+    taken = {id(one.channel) for one in assigned.values()}
+    lacking = [
+        one
+        for one in (*system.inputs, *system.outputs)
+        if one.name not in assigned and one.name not in doubts
+    ]
+    fitting = [
+        (signal, one)
+        for signal in lacking
+        for place in places
+        if id(place.channel) not in taken
+        and place.channel.unit
+        and not is_asked(place.channel.name)
+        and (one := _candidate(place, signal, system, 0)[0]) is not None
+    ]
+    for signal, one in fitting:
+        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1:
+            assigned[signal.name] = one
