@@ -159,6 +159,25 @@ def test_a_time_without_a_unit_is_read_as_recordings_are_usually_sampled(
     assert_allclose(next(iter(named.clocks.values())).times, time * factor)
 
 
+def test_a_counted_time_goes_before_stamps_that_are_coarser(system: System) -> None:
+    time = np.arange(0.0, 5.0, 0.01)
+    plain = group("", time, pB=time, **rolling(system, time, np.full(time.size, 20.0)))
+    stamps = Channel("Datum", "s", np.ceil(100 * time) / 100 + 1e-3 * time, stamp=True)
+    channels = (stamps, Channel("Zeit", "s", time), *plain.channels)
+    (clock,) = propose([file(Group("", channels))], system, {}).clocks.values()
+    assert clock.channel == "Zeit"
+
+
+def test_one_channel_of_two_groups_is_not_taken_for_the_other(system: System) -> None:
+    time = np.arange(0.0, 5.0, 0.01)
+    one = group("run 1", time, pB=time, **rolling(system, time, 20.0 + time))
+    held = file(one, group("run 2", time, pB=2 * time))
+    proposal = propose([held], system, {})
+    assert proposal.problems == ("pB: it may be 'run 1/pB' or 'run 2/pB'",)
+    named = propose([held], system, {"pB": Named("run 2/pB")})
+    assert_allclose(named.assigned["pB"].values, 2 * time)
+
+
 # --- cuts ---
 
 

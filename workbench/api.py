@@ -49,7 +49,7 @@ def read_cases(
     *,
     conditions: Mapping[str, Any] | None = None,
     columns: Mapping[str, str] | None = None,
-    rate: str | None = None,
+    sample_rate: str | None = None,
 ) -> list[Case]:
     """Read case folders, folders of case folders, and files of recorders.
 
@@ -58,7 +58,7 @@ def read_cases(
     system : that the recordings are of; unless given, the usual one, which comes with recordings.
     conditions : of files without a case.toml, as it has them, such as {"load": "2 kN"}.
     columns : channels of such files by signal, and by "time": {"time": "Zeit [ms]"}.
-    rate : of such files without times, "200 Hz".
+    sample_rate : of such files without times, "200 Hz".
 
     Raises
     ------
@@ -76,7 +76,7 @@ def read_cases(
     told = Told(
         conditions or {},
         dict(parse_named(one, "columns", known) for one in named),
-        None if rate is None else 1.0 / quantity(rate, "Hz", "rate"),
+        None if sample_rate is None else 1.0 / quantity(sample_rate, "Hz", "sample_rate"),
     )
     cases = read_folders([Path(one) for one in paths], known, told)
     _warn(cases)

@@ -150,7 +150,7 @@ def add_told(parser: argparse.ArgumentParser) -> None:
         "file has none or a wrong one, such as 'time=Zeit [ms]'; may be repeated",
     )
     parser.add_argument(
-        "--rate", metavar="RATE", help="of recorders' files without times: such as '200 Hz'"
+        "--sample-rate", metavar="RATE", help="of recorders' files without times: such as '200 Hz'"
     )
 
 

@@ -28,14 +28,14 @@ def told(options: argparse.Namespace, system: System) -> Told:
     conditions = dict(read_condition(one, system) for one in options.condition)
     columns = dict(parse_named(one, "command line, --column", system) for one in options.column)
     step = None
-    if options.rate is not None:
-        rate = quantity(options.rate, "Hz", "command line, --rate")
+    if options.sample_rate is not None:
+        rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
         if not rate > 0.0:
             raise InputError(
-                where="command line, --rate",
-                found=options.rate,
+                where="command line, --sample-rate",
+                found=options.sample_rate,
                 expected="samples per second, above 0",
-                remedy="write for instance --rate '200 Hz'",
+                remedy="write for instance --sample-rate '200 Hz'",
             )
         step = 1.0 / rate
     return Told(conditions, columns, step)

@@ -64,7 +64,9 @@ def read_clock(
     if group.time is not None:
         one = group.time
         return _going_on(Clock("", one.values, one.start, "s", "the file says it", True), where)
-    clocks = [clock for one in group.channels if (clock := _candidate(one, group, system))]
+    # Stamps are often coarser than a counted time beside them.
+    channels = sorted(group.channels, key=lambda one: one.stamp)
+    clocks = [clock for one in channels if (clock := _candidate(one, group, system))]
     for clock in sorted(clocks, key=lambda one: not one.certain):
         if _increases(clock.times):
             return clock
@@ -77,7 +79,7 @@ def read_clock(
         where=where,
         found=f"no time among {listed([one.name for one in group.channels])}",
         expected="a channel of times, or a known rate",
-        remedy=f"name it, --column '{TIME}=NAME [s]', or give --rate '200 Hz'",
+        remedy=f"name it, --column '{TIME}=NAME [s]', or give --sample-rate '200 Hz'",
     )
 
 
@@ -148,5 +150,6 @@ def _going_on(clock: Clock, where: str) -> Clock:
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
         found=f"{found} in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else ""),
         expected="times that go on",
-        remedy="if samples are evenly spaced say so, --rate '200 Hz'; else export more digits",
+        remedy="if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more "
+        "digits",
     )

@@ -352,7 +352,7 @@ def _by_name(
         taken = {id(one.channel) for one in assigned.values()}
         left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
         for signal, one in left:
-            rivals = [o.channel.name for s, o in left if s is signal]
+            rivals = [o.label for s, o in left if s is signal]
             claims = [s.name for s, o in left if o.channel is one.channel]
             settled.add(signal.name)
             if len(rivals) == len(claims) == 1:
