@@ -176,6 +176,35 @@ def test_a_bare_file_is_a_case_with_its_conditions_as_options(
         wb.read_cases(tmp_path / "stop.csv", system)
 
 
+def test_nothing_is_claimed_of_a_condition_that_nobody_knows(
+    root: Path, tmp_path: Path, system: System
+) -> None:
+    """A slide shows the friction of the rail, if the law of the contact is known."""
+    source = root / "cases" / "09_wet_160_4.2_wsp"
+    text = (source / "case.toml").read_text()
+    runs = {}
+    for said in ("dry", "unknown"):
+        (tmp_path / said).mkdir()
+        told = text.replace('wheel_rail = "wet"', f'wheel_rail = "{said}"')
+        (tmp_path / said / "case.toml").write_text(told)
+        (tmp_path / said / "measured.csv").write_bytes((source / "measured.csv").read_bytes())
+        (case,) = wb.read_cases(tmp_path / said, system)
+        runs[said] = wb.observe(system, case, "ekf")
+    np.testing.assert_array_equal(runs["dry"].estimate, runs["unknown"].estimate)
+    (rail,) = [one.name for one in system.estimated if "wheel_rail" in one.claimed]
+    assert runs["dry"].claimed[rail].any()
+    assert not runs["unknown"].claimed[rail].any()
+
+
+def test_the_sign_of_the_signals_must_be_known(tmp_path: Path, root: Path, system: System) -> None:
+    source = root / "cases" / "01_dry_80_1.5"
+    text = (source / "case.toml").read_text()
+    (tmp_path / "case.toml").write_text(text.replace("direction = 1", 'direction = "unknown"'))
+    (tmp_path / "measured.csv").write_bytes((source / "measured.csv").read_bytes())
+    with pytest.raises(InputError, match="direction: found 'unknown'; expected a whole number"):
+        wb.read_cases(tmp_path, system)
+
+
 def test_names_that_nobody_confirmed_are_not_taken_in_silence(
     tmp_path: Path, stop: Case, system: System
 ) -> None:

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         output.result(f"see {IMPORTED} in {nearby(options.out)}")
         output.result(f"next: workbench simulate --system {options.system} {nearby(options.out)}")
     told_all = {"out": options.out, "imports": record, "refused": refused}
-    return Done(told_all, {"from": "s", "to": "s", "seconds": "s"}, 2 if refused else 0)
+    return Done(told_all, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
 
 
 def _one(

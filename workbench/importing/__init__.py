@@ -224,8 +224,8 @@ def describe(one: Import, system: System) -> dict[str, Any]:
         "notes": list(measured.notes),
         "cut": [
             {
-                "from": float(time[part.first]),
-                "to": float(time[part.end - 1]),
+                "begins": float(time[part.first]),
+                "ends": float(time[part.end - 1]),
                 "samples": part.end - part.first,
                 "case": next((p.name for p in one.pieces if p.samples[0] == part.first), None),
                 "left_out": part.reason or None,
