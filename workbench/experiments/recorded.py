@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from workbench.case import Case, Value, read_only
+from workbench.case import Case, read_only
+from workbench.conditions import Value
 from workbench.errors import InputError
 from workbench.experiments.candidates import Candidate
 from workbench.fmu import CoSimulation, Matrix, Vector
