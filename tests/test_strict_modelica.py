@@ -264,3 +264,14 @@ def test_either_compiler_refuses_it_before_its_front_end_is_asked(
     with pytest.raises(InputError, match=message):
         openmodelica.build_with_omc(package, ["Lib.M"], out)
     assert not out.exists()
+
+
+def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
+    """A component that the base inherits stays as it was, however right its redeclaration is."""
+    pytest.importorskip("rumoca")
+    from workbench.compiler.flat import flatten  # needs the extra
+
+    text = "model N extends Part; end N; model M extends N(redeclare Named slot); end M;"
+    message = r"redeclaration of 'slot', which Lib\.N inherits.*declare 'slot' in Lib\.N"
+    with pytest.raises(InputError, match=message):
+        flatten(write(tmp_path, text), "Lib.M")

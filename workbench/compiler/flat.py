@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 import rumoca
 
+from workbench.compiler.dropped import refuse_dropped
 from workbench.compiler.expressions import BINARY, Arena, Value, each, lift
 from workbench.errors import InputError
 from workbench.modelica import check, packages, read_library
@@ -93,7 +94,8 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected="the package.mo of a Modelica library",
             remedy="give the path of the library's package.mo",
         )
-    check(read_library(package), model)
+    library = read_library(package)
+    refuse_dropped(library, check(library, model))
     used = [str(one.parent) for one in packages(package)[1:]]
     try:
         dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")

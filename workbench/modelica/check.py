@@ -29,7 +29,7 @@ _OTHERS = frozenset({"StateSelect", "AssertionLevel", "ExternalObject", "Clock"}
 _NOTHING = Modifier()
 
 
-def check(library: Library, model: str = "") -> None:
+def check(library: Library, model: str = "") -> tuple[str, ...]:
     """Refuse what a model, or every class of a library, says of others that is not so.
 
     Parameters
@@ -37,6 +37,10 @@ def check(library: Library, model: str = "") -> None:
     model : dotted name. It is held to what it reaches by components and bases, and to have an
         `inner` for each `outer`. Without it, all classes of the library and of those that it uses
         are held to what they say, each by itself.
+
+    Returns
+    -------
+    Dotted names of the classes that were held to it.
 
     Raises
     ------
@@ -57,6 +61,7 @@ def check(library: Library, model: str = "") -> None:
                 f"an 'inner {outer.name}' around it",
                 f"declare 'inner {outer.type} {outer.name}' in {model}",
             )
+    return tuple(waiting)
 
 
 class _Checker:
