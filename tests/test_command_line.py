@@ -1,6 +1,7 @@
 """Every command says its result in one way, and begins at once."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -55,6 +56,18 @@ def test_progress_goes_to_standard_error_unless_nobody_asks(
     assert "s left" not in said
     assert main(["--quiet", *arguments]) == 0
     assert capsys.readouterr() == (said, "")
+
+
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_a_reader_that_has_gone_costs_nothing_but_the_text(root: Path, options: list[str]) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "workbench", *options, "systems"]
+    run = subprocess.run(
+        command, cwd=root, stdout=write, stderr=subprocess.PIPE, timeout=120, check=False
+    )
+    os.close(write)
+    assert (run.returncode, run.stderr) == (0, b"")
 
 
 def test_a_mistake_is_a_document_too(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Mapping
@@ -46,7 +47,7 @@ class Output:
     def result(self, text: str) -> None:
         """What was found, for people."""
         if not self.json:
-            print(text, flush=True)
+            _print(text)
 
     def progress(self, line: str) -> None:
         """What is being done."""
@@ -67,7 +68,7 @@ class Output:
         """Print the document, if it is asked for; returns the status."""
         if self.json:
             told = {"units": done.units, "result": done.result}
-            self._print(command, done.status, told)
+            _print(_document(command, done.status, told))
         return done.status
 
     def fail(self, command: str, status: int, error: Exception | str) -> int:
@@ -77,13 +78,21 @@ class Output:
             parts = ("where", "found", "expected", "remedy")
             known = isinstance(error, InputError)
             told = {part: getattr(error, part) for part in parts} if known else {}
-            self._print(command, status, {"error": {"message": str(error), **told}})
+            _print(_document(command, status, {"error": {"message": str(error), **told}}))
         return status
 
-    @staticmethod
-    def _print(command: str, status: int, told: Mapping[str, Any]) -> None:
-        document = _plain({"command": command, "status": status, **told})
-        print(json.dumps(document, indent=2, allow_nan=False), flush=True)
+
+def _document(command: str, status: int, told: Mapping[str, Any]) -> str:
+    content = _plain({"command": command, "status": status, **told})
+    return json.dumps(content, indent=2, allow_nan=False)
+
+
+def _print(text: str) -> None:
+    """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def read_result(path: Path) -> dict[str, Any]:
