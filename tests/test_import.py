@@ -2,6 +2,7 @@
 
 import builtins
 import json
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -83,6 +84,22 @@ def test_what_was_done_to_a_file_is_written_down(
     conditions = one["cases"]["a"]["conditions"]
     assert conditions["initial_speed"]["from"] == "shown by the record"
     assert conditions["wheel_rail"] == {"value": "unknown", "from": "unknown"}
+
+
+def test_a_file_that_ends_the_process_of_its_library_is_refused(
+    tmp_path: Path, stop: Case, system: System
+) -> None:
+    """Its channels lie far beyond what it holds, where asammdf's compiled code looks for them."""
+    path = tmp_path / "stop.mf4"
+    mdf_4(path, recorded(stop, system))
+    damaged = bytearray(path.read_bytes())
+    block = -1
+    while (block := damaged.find(b"##CN", block + 1)) >= 0:
+        (links,) = struct.unpack_from("<Q", damaged, block + 16)
+        struct.pack_into("<I", damaged, block + 24 + 8 * links + 4, 1 << 28)  # of the first byte
+    path.write_bytes(damaged)
+    with pytest.raises(InputError, match=r"an MDF file that cannot be read .*SIGSEGV"):
+        read_foreign(path)
 
 
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])

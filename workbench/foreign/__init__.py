@@ -10,6 +10,7 @@ import io
 import stat
 import zlib
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +18,7 @@ from pathlib import Path
 from workbench.errors import InputError
 from workbench.foreign.contents import Channel, Group, Recorded
 from workbench.foreign.text import read as read_as_text
+from workbench.pool import Pool
 from workbench.resources import installing
 
 __all__ = ["Channel", "Group", "Recorded", "is_foreign", "read_foreign"]
@@ -32,6 +34,9 @@ _PACKAGES = {
     "mdf": ("asammdf", "an MDF file"),
     "tdms": ("nptdms", "a TDMS file"),
 }
+# Their libraries hand what a file says to compiled code, which may end the process or never return.
+_NATIVE = frozenset({"mdf", "hdf5", "parquet"})
+_START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",
     b"MDF     ": "mdf",
@@ -135,7 +140,20 @@ def _reader(path: Path, raw: bytes) -> _Reader:
             expected="the extra [files], which holds what reads such files",
             remedy=installing("files"),
         ) from None
-    return partial(_undamaged, import_module(f"workbench.foreign.{module}").read, called)
+    reader = partial(_apart if module in _NATIVE else _here, module)
+    return partial(_undamaged, reader, called)
+
+
+def _here(module: str, path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+    found: tuple[str, list[Group], list[str]]
+    found = import_module(f"workbench.foreign.{module}").read(path, raw)
+    return found
+
+
+def _apart(module: str, path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+    """Read a file in a process of its own."""
+    with Pool(1, nullcontext, module, limit=_START + len(raw) / _RATE) as pool:
+        return pool.submit(_here, path, raw).result()
 
 
 def _undamaged(
