@@ -17,6 +17,9 @@ from workbench.errors import InputError
 # Mutants of each kind of file, some seconds in all; FMUs take longest, which are tried and loaded.
 COUNTS = {
     "case": 500,
+    "german.csv": 300,
+    "stamps.txt": 300,
+    "labview.tdms": 300,
     "gains": 500,
     "checkpoint": 500,
     "verdicts": 300,

@@ -102,6 +102,17 @@ def test_a_file_that_ends_the_process_of_its_library_is_refused(
         read_foreign(path)
 
 
+def test_the_end_that_a_tdms_file_lacks_is_told(
+    tmp_path: Path, stop: Case, system: System, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "stop.tdms"
+    FORMATS["labview.tdms"](path, recorded(stop, system))
+    assert not [note for note in read_foreign(path).notes if "less data" in note]
+    path.write_bytes(path.read_bytes()[:-100])
+    assert [note for note in read_foreign(path).notes if "less data than expected" in note]
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
 def test_a_missing_reader_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str

@@ -2,6 +2,7 @@
 
 import re
 import zipfile
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -11,10 +12,12 @@ import numpy as np
 from tests.case_folders import LINES, TOML
 from tests.fuzz.harness import Target
 from tests.fuzz.mutations import BYTES, Files, mutate, zipped
+from tests.recorder_files import FORMATS, recorded
 from workbench import resources
 from workbench.case import Case, read_case
 from workbench.description import Description, read_description
 from workbench.fmu import FMU
+from workbench.foreign import Recorded, read_foreign
 from workbench.modelica import check, read_library
 from workbench.observers.gains import Gains
 from workbench.observers.gains_file import read_gains
@@ -43,6 +46,7 @@ def targets(folder: Path) -> tuple[Target, ...]:
     tank = {path.name: path.read_bytes() for path in write_system(folder / "tank") if path.suffix}
     return (
         _case(system),
+        *_of_recorders(folder, system),
         _gains(system),
         _checkpoint(folder / "checkpoint.json"),
         _journal(folder / "sets.jsonl"),
@@ -75,6 +79,27 @@ def _impossible_case(case: Case) -> str:
             return f"{name} of another length, or not finite"
     numbers = [value for value in case.conditions.values() if isinstance(value, float)]
     return "" if np.isfinite(numbers).all() else "a condition that is not finite"
+
+
+def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
+    """Files that are read here; others are read in processes, which fuzzing would wait for."""
+    stop = read_case(resources.cases() / "01_dry_80_1.5", system).part(slice(None, None, 100))
+    for name in ("german.csv", "stamps.txt", "labview.tdms"):
+        FORMATS[name](folder / name, recorded(stop, system))
+        content = (folder / name).read_bytes()
+        yield Target(name, {name: content}, partial(_read_recorded, name), _impossible_channels)
+
+
+def _read_recorded(name: str, folder: Path) -> Recorded:
+    return read_foreign(folder / name)
+
+
+def _impossible_channels(recording: Recorded) -> str:
+    """What no file can hold: channels of one group and of different lengths."""
+    for group in recording.groups:
+        if len({channel.values.shape for channel in group.channels}) > 1:
+            return "channels of different lengths"
+    return ""
 
 
 # --- what the workbench writes and reads again ---

@@ -35,7 +35,7 @@ _PACKAGES = {
     "tdms": ("nptdms", "a TDMS file"),
 }
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
-_NATIVE = frozenset({"mdf", "hdf5", "parquet"})
+_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",

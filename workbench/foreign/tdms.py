@@ -1,12 +1,14 @@
 """TDMS of LabVIEW and DIAdem: groups of channels, with waveforms or channels of times."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from nptdms import TdmsFile
+from nptdms.log import log_manager
 
 from workbench.foreign.contents import Channel, Group
 from workbench.foreign.spelling import named, spelled
@@ -18,9 +20,22 @@ def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
     """Kind, groups and notes of a file, in scaled values."""
     groups: list[Group] = []
     notes: list[str] = []
-    for held in TdmsFile.read(io.BytesIO(raw)).groups():
-        groups += _groups(held, notes)
+    with _heard(notes):
+        for held in TdmsFile.read(io.BytesIO(raw)).groups():
+            groups += _groups(held, notes)
     return "TDMS", groups, notes
+
+
+@contextmanager
+def _heard(notes: list[str]) -> Iterator[None]:
+    """Note what the library only prints, such as an end that is missing."""
+    said = io.StringIO()
+    before = log_manager.console_handler.setStream(said)
+    try:
+        yield
+    finally:
+        log_manager.console_handler.setStream(before)
+        notes += dict.fromkeys(line[:200] for line in said.getvalue().splitlines())
 
 
 def _groups(held: Any, notes: list[str]) -> list[Group]:
