@@ -103,14 +103,23 @@ def test_a_file_that_ends_the_process_of_its_library_is_refused(
 
 
 def test_the_end_that_a_tdms_file_lacks_is_told(
-    tmp_path: Path, stop: Case, system: System, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, stop: Case, system: System, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "stop.tdms"
     FORMATS["labview.tdms"](path, recorded(stop, system))
-    assert not [note for note in read_foreign(path).notes if "less data" in note]
+    command = ["import", str(path), "--out", str(tmp_path / "cases"), "--yes"]
+    assert main(command) == 0
+    assert "warning" not in capsys.readouterr().err
     path.write_bytes(path.read_bytes()[:-100])
-    assert [note for note in read_foreign(path).notes if "less data than expected" in note]
-    assert capfd.readouterr().err == ""
+    assert main(command) == 0
+    warning = f"warning: {path}: [nptdms.reader WARNING] Last segment of file has less data"
+    assert capsys.readouterr().err.count(warning) == 1
+    told = json.loads((tmp_path / "cases" / "import.json").read_text())
+    assert any("less data" in doubt for doubt in told["imports"][-1]["files"][0]["doubts"])
+    # The same without an import.
+    (tmp_path / "columns.toml").write_bytes((tmp_path / "cases" / "columns.toml").read_bytes())
+    with pytest.warns(UserWarning, match=r"stop\.tdms: \[nptdms"):
+        wb.read_cases(path, system, conditions={"wheel_rail": "dry", "discs": ["dry"] * 3})
 
 
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])

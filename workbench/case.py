@@ -166,7 +166,7 @@ def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
     conditions = read_conditions(Table({**shown, **told.conditions}, where), system)
     check_recording(measured.time, system, f"{path}, time", None)
     signals = {name: read_only(values) for name, values in measured.signals.items()}
-    origin = Origin(str(path), None, {}, where)
+    origin = Origin(str(path), None, {}, where, measured.doubts)
     return Case(
         name=_name(path),
         title=path.name,
@@ -243,7 +243,7 @@ def _recorded(
     measured = read_measured(source, system, told, stored)
     check_recording(measured.time, system, f"{source}, time", None)
     signals = {name: read_only(values) for name, values in measured.signals.items()}
-    return read_only(measured.time), signals, Origin(str(source), None, {}, "")
+    return read_only(measured.time), signals, Origin(str(source), None, {}, "", measured.doubts)
 
 
 def _counts_from(measurement: Table, time: Vector) -> float:

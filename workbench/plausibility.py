@@ -31,12 +31,14 @@ class Origin:
     first_line : of the first sample in a file, None without one.
     columns : name of each signal's column, and of "time".
     conditions : where the conditions stand.
+    doubts : what its reader doubts already, in words.
     """
 
     name: str
     first_line: int | None
     columns: Mapping[str, str]
     conditions: str
+    doubts: tuple[str, ...] = ()
 
     def at(self, sample: int, signal: str) -> str:
         """Place of a sample."""
@@ -91,7 +93,7 @@ def doubts(
         ):
             found += check
     _refuse(found)
-    return tuple(str(one.refusal()) for one in found)
+    return (*origin.doubts, *(str(one.refusal()) for one in found))
 
 
 def _refuse(found: list[_Finding]) -> None:

@@ -36,19 +36,19 @@ class Column:
     values: Vector
 
 
-def read_text(path: Path, remedy: str) -> str:
-    """Read a UTF-8 file, with or without a byte-order mark; lines end in newlines.
+def read_bytes(path: Path, remedy: str) -> bytes:
+    """Read a file that ends.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is not UTF-8; `remedy` is for a file that cannot be read.
+        If it cannot be read.
     """
     try:
         kind = path.stat().st_mode
         if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end
             raise OSError(0, "no regular file")
-        raw = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         missing = isinstance(error, FileNotFoundError)
         raise InputError(
@@ -57,6 +57,17 @@ def read_text(path: Path, remedy: str) -> str:
             expected="a readable file",
             remedy=remedy,
         ) from None
+
+
+def read_text(path: Path, remedy: str) -> str:
+    """Read a UTF-8 file, with or without a byte-order mark; lines end in newlines.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not UTF-8; `remedy` is for a file that cannot be read.
+    """
+    raw = read_bytes(path, remedy)
     save_as_utf8 = "save the file as UTF-8"
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw:
         raise InputError(

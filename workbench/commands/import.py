@@ -197,7 +197,9 @@ def _shown(files: Sequence[Recorded], proposal: Proposal, system: System) -> str
 
 
 def _tell(one: Import, output: Output) -> None:
-    """Say what was written, and what nobody knows."""
+    """Say what was written, what nobody knows, and what is unlikely."""
+    for doubt in one.measured.doubts:
+        print(f"warning: {doubt}", file=sys.stderr, flush=True)
     for piece in one.pieces:
         unknown = [key for key, source in piece.sources.items() if source == UNKNOWN]
         known = [f"{key} {value}" for key, value in piece.conditions.items() if key not in unknown]

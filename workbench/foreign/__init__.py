@@ -7,7 +7,6 @@ channel means for a machine is not known here.
 import gzip
 import hashlib
 import io
-import stat
 import zlib
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -16,14 +15,15 @@ from importlib import import_module
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.foreign.contents import Channel, Group, Recorded
+from workbench.foreign.contents import Channel, Contents, Group, Recorded
 from workbench.foreign.text import read as read_as_text
 from workbench.pool import Pool
+from workbench.recording import read_bytes
 from workbench.resources import installing
 
 __all__ = ["Channel", "Group", "Recorded", "is_foreign", "read_foreign"]
 
-_Reader = Callable[[Path, bytes], tuple[str, list[Group], list[str]]]
+_Reader = Callable[[Path, bytes], Contents]
 _MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
 # Packages that read a format, by the module here, and what people call its files.
 _PACKAGES = {
@@ -62,19 +62,7 @@ def read_foreign(path: Path) -> Recorded:
     InputError
         If it cannot be read, its format is not known, or the package that reads it is missing.
     """
-    try:
-        kind = path.stat().st_mode
-        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end
-            raise OSError(0, "no regular file")
-        raw = path.read_bytes()
-    except OSError as error:
-        missing = isinstance(error, FileNotFoundError)
-        raise InputError(
-            where=str(path),
-            found="no such file" if missing else f"a file that cannot be read ({error.strerror})",
-            expected="a readable recording",
-            remedy="correct the path",
-        ) from None
+    raw = read_bytes(path, "correct the path")
     if not raw:
         raise InputError(
             where=str(path),
@@ -86,7 +74,7 @@ def read_foreign(path: Path) -> Recorded:
     packed = raw.startswith(b"\x1f\x8b")
     if packed:
         raw = _unpacked(path, raw)
-    words, groups, notes = _reader(path, raw)(path, raw)
+    words, groups, notes, doubts = _reader(path, raw)(path, raw)
     if not any(group.channels for group in groups):
         raise InputError(
             where=str(path),
@@ -94,7 +82,7 @@ def read_foreign(path: Path) -> Recorded:
             expected="a recording",
             remedy="export it again, with its samples",
         )
-    return Recorded(path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256)
+    return Recorded(path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256, doubts)
 
 
 def _unpacked(path: Path, raw: bytes) -> bytes:
@@ -144,21 +132,18 @@ def _reader(path: Path, raw: bytes) -> _Reader:
     return partial(_undamaged, reader, called)
 
 
-def _here(module: str, path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
-    found: tuple[str, list[Group], list[str]]
-    found = import_module(f"workbench.foreign.{module}").read(path, raw)
+def _here(module: str, path: Path, raw: bytes) -> Contents:
+    found: Contents = import_module(f"workbench.foreign.{module}").read(path, raw)
     return found
 
 
-def _apart(module: str, path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def _apart(module: str, path: Path, raw: bytes) -> Contents:
     """Read a file in a process of its own."""
     with Pool(1, nullcontext, module, limit=_START + len(raw) / _RATE) as pool:
         return pool.submit(_here, path, raw).result()
 
 
-def _undamaged(
-    reader: _Reader, called: str, path: Path, raw: bytes
-) -> tuple[str, list[Group], list[str]]:
+def _undamaged(reader: _Reader, called: str, path: Path, raw: bytes) -> Contents:
     """What a library reads of a file, if it is whole."""
     try:
         return reader(path, raw)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from workbench.recording import Vector
 
@@ -61,6 +62,7 @@ class Recorded:
     kind : format, and what was found of it, in words.
     notes : what was left out or understood, in words.
     sha256 : of the file.
+    doubts : why it may be damaged, in words.
     """
 
     path: Path
@@ -68,3 +70,13 @@ class Recorded:
     groups: tuple[Group, ...]
     notes: tuple[str, ...]
     sha256: str
+    doubts: tuple[str, ...] = ()
+
+
+class Contents(NamedTuple):
+    """What the reader of a format finds in a file; see `Recorded`."""
+
+    kind: str
+    groups: list[Group]
+    notes: list[str]
+    doubts: tuple[str, ...] = ()

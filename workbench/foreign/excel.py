@@ -9,12 +9,12 @@ import openpyxl
 
 from workbench.errors import InputError
 from workbench.foreign.cells import find_table, read_group
-from workbench.foreign.contents import Group
+from workbench.foreign.contents import Contents, Group
 
 _MOST = 1_048_576  # rows of a sheet of Excel
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a workbook, with formulas as Excel last computed them.
 
     Raises
@@ -46,7 +46,7 @@ def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
             notes.append(f"sheet '{title}': {left} rows that are no samples were left out")
     if refusal is not None and not groups:
         raise refusal
-    return f"Excel, {_counted(len(groups), 'sheet')} with samples", groups, notes
+    return Contents(f"Excel, {_counted(len(groups), 'sheet')} with samples", groups, notes)
 
 
 def _counted(count: int, noun: str) -> str:

@@ -8,18 +8,18 @@ import h5py
 import numpy as np
 
 from workbench.foreign.arrays import read_groups
-from workbench.foreign.contents import Group
+from workbench.foreign.contents import Contents
 
 _CLASS = "MATLAB_class"
 _UNITS = ("unit", "units", "Unit", "Units")
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file."""
     with h5py.File(io.BytesIO(raw), "r") as file:
         content = _members(file, file)
     groups, notes = read_groups(content)
-    return "MAT 7.3" if raw.startswith(b"MATLAB") else "HDF5", groups, notes
+    return Contents("MAT 7.3" if raw.startswith(b"MATLAB") else "HDF5", groups, notes)
 
 
 def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:

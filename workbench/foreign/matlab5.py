@@ -8,16 +8,16 @@ import numpy as np
 from scipy.io import loadmat
 
 from workbench.foreign.arrays import read_groups
-from workbench.foreign.contents import Group
+from workbench.foreign.contents import Contents
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a MAT file."""
     stream: Any = io.BytesIO(raw)  # which the stubs do not know that it takes
     content = loadmat(stream, simplify_cells=True, chars_as_strings=True)
     held = {name: _plain(value) for name, value in content.items() if not name.startswith("__")}
     groups, notes = read_groups(held)
-    return "MAT 5", groups, notes
+    return Contents("MAT 5", groups, notes)
 
 
 def _plain(value: Any) -> Any:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from asammdf import MDF
 
-from workbench.foreign.contents import Channel, Group
+from workbench.foreign.contents import Channel, Contents, Group
 from workbench.foreign.spelling import named, spelled
 
 _TIME = 1  # what a group counts its samples by: 0 nothing said, 1 time, 2 angle, 3 way, 4 index
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a measurement file, in physical values."""
     if raw[64:68] != b"##HD" and raw[64:66] != b"HD":
         raise ValueError("no header")  # asammdf stumbles over itself without one
@@ -25,7 +25,7 @@ def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
             group = _group(file, index, held, start, notes)
             if group is not None:
                 groups.append(group)
-    return f"MDF {version}", groups, notes
+    return Contents(f"MDF {version}", groups, notes)
 
 
 def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> Group | None:

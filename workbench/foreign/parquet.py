@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from workbench.foreign.contents import Channel, Group
+from workbench.foreign.contents import Channel, Contents, Group
 from workbench.foreign.spelling import named, spelled
 from workbench.foreign.stamps import is_stamp, read_stamps
 
@@ -16,7 +16,7 @@ _UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
 _ABOUT = (b"description", b"comment", b"long_name")
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a Parquet file."""
     table = pq.read_table(io.BytesIO(raw))
     channels: list[Channel] = []
@@ -44,7 +44,7 @@ def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
                 notes.append(f"'{name}' holds {kind}")
             else:
                 channels.append(found)
-    return "Parquet", [Group("", tuple(channels))], notes
+    return Contents("Parquet", [Group("", tuple(channels))], notes)
 
 
 def _first(known: dict[bytes, bytes], keys: tuple[bytes, ...]) -> str:

@@ -10,32 +10,33 @@ import numpy as np
 from nptdms import TdmsFile
 from nptdms.log import log_manager
 
-from workbench.foreign.contents import Channel, Group
+from workbench.foreign.contents import Channel, Contents, Group
 from workbench.foreign.spelling import named, spelled
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file, in scaled values."""
     groups: list[Group] = []
     notes: list[str] = []
-    with _heard(notes):
+    doubts: list[str] = []
+    with _heard(doubts):
         for held in TdmsFile.read(io.BytesIO(raw)).groups():
             groups += _groups(held, notes)
-    return "TDMS", groups, notes
+    return Contents("TDMS", groups, notes, tuple(doubts))
 
 
 @contextmanager
-def _heard(notes: list[str]) -> Iterator[None]:
-    """Note what the library only prints, such as an end that is missing."""
+def _heard(doubts: list[str]) -> Iterator[None]:
+    """Take down what the library only prints, such as an end that is missing."""
     said = io.StringIO()
     before = log_manager.console_handler.setStream(said)
     try:
         yield
     finally:
         log_manager.console_handler.setStream(before)
-        notes += dict.fromkeys(line[:200] for line in said.getvalue().splitlines())
+        doubts += dict.fromkeys(line[:200] for line in said.getvalue().splitlines())
 
 
 def _groups(held: Any, notes: list[str]) -> list[Group]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from workbench.errors import InputError
 from workbench.foreign.cells import find_table, read_group
-from workbench.foreign.contents import Group
+from workbench.foreign.contents import Contents
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"\s*\"?(#+|%+|//+|!+|\*+)\s*")
@@ -16,7 +16,7 @@ _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _CELL = re.compile(r"\s*[+-]?[0-9.,:/TZ\s+-]*[0-9][0-9.,:/TZ\s+-]*([eE][+-]?[0-9]+)?\s*")
 
 
-def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
+def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file of text.
 
     Raises
@@ -41,7 +41,7 @@ def read(path: Path, raw: bytes) -> tuple[str, list[Group], list[str]]:
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
     words.append(f"samples from line {table.lines[0]}")
-    return ", ".join(words), [group], notes
+    return Contents(", ".join(words), [group], notes)
 
 
 def _decoded(path: Path, raw: bytes) -> tuple[str, str]:

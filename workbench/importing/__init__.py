@@ -214,6 +214,7 @@ def describe(one: Import, system: System) -> dict[str, Any]:
                 "sha256": file.sha256,
                 "format": file.kind,
                 "notes": list(file.notes),
+                "doubts": list(file.doubts),
             }
             for file in one.files
         ],

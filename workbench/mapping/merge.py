@@ -26,12 +26,14 @@ class Measured:
     signals : (n,) each, by name.
     start : of time zero [s since 1970], NaN where that is not known.
     notes : what was interpolated and left out, in words.
+    doubts : why its files may be damaged, in words.
     """
 
     time: Vector
     signals: Mapping[str, Vector]
     start: float
     notes: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,8 @@ def merge(files: Sequence[Recorded], proposal: Proposal, system: System) -> Meas
     signals = {name: values[known] for name, values in signals.items()}
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
     zero = min(begun, default=math.nan)
-    return Measured(time[known], signals, zero, tuple(notes))
+    doubts = tuple(f"{one.path}: {doubt}" for one in files for doubt in one.doubts)
+    return Measured(time[known], signals, zero, tuple(notes), doubts)
 
 
 def _starts(files: Sequence[Recorded], proposal: Proposal) -> dict[tuple[int, int], float]:
