@@ -18,7 +18,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, as_completed, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, SpawnContext
@@ -187,7 +187,8 @@ class Pool(Generic[State]):
 
     def _attend(self, number: int) -> None:
         """See to one worker, in a thread of its own."""
-        self._start(number)
+        with suppress(EOFError, OSError):  # the first task tries again, and can say why
+            self._start(number)
         while (task := self._tasks.get()) is not None:
             future, message = task
             if not future.set_running_or_notify_cancel():
@@ -206,27 +207,37 @@ class Pool(Generic[State]):
         ended = ""
         for _ in range(2):
             try:
+                worker = self._running.get(number) or self._start(number)
                 answer: tuple[Any, BaseException | None] = pickle.loads(
-                    self._running[number].ask(message, self._limit)
+                    worker.ask(message, self._limit)
                 )
                 return answer
             except TimeoutError:
-                self._start(number)
+                self._drop(number, kill=True)
                 return None, WorkerError(f"a task took longer than {self._limit:g} s")
             except (EOFError, OSError):
                 if self._closed:
                     return None, WorkerError("the pool was closed")
-                ended = self._running[number].end()
-                self._start(number)
+                ended = self._drop(number)
         return None, WorkerError(f"a task ended its worker, twice: {ended}")
 
-    def _start(self, number: int) -> None:
-        """Start a worker in place of the one before, unless the pool is being closed."""
+    def _start(self, number: int) -> "_Worker":
+        """Start a worker; EOFError or OSError if the system does not, or the pool is closed."""
         with _starting:
-            if number in self._running:
-                self._running[number].kill()
-            if not self._closed:
-                self._running[number] = _Worker(self._folder)
+            if self._closed:
+                raise EOFError
+            worker = self._running[number] = _Worker(self._folder)
+            return worker
+
+    def _drop(self, number: int, *, kill: bool = False) -> str:
+        """End a worker, whose place the next task fills; says how it ended."""
+        with _starting:
+            worker = self._running.pop(number, None)
+        if worker is None:
+            return "before it had begun"
+        if kill:
+            worker.kill()
+        return worker.end()
 
 
 class _Worker:
