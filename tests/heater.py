@@ -31,7 +31,7 @@ package Heater "A heated block in a casing"
   equation
     Q = G*T;
     annotation (__Workbench(effect(
-      size="G", step=1e-3, matters=0.02, separation="the surface in a closed box")));
+      size="G", matters=0.02, separation="the surface in a closed box")));
   end Draught;
 
   model Radiation "heat that is radiated"
@@ -40,7 +40,7 @@ package Heater "A heated block in a casing"
   equation
     Q = s*T*abs(T);
     annotation (__Workbench(effect(
-      size="s", step=1e-5, matters=5e-4, separation="a hotter block")));
+      size="s", matters=5e-4, separation="a hotter block")));
   end Radiation;
 
   model Observer "Block and casing"

@@ -418,12 +418,13 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
     simulator = Simulator(Simulated(MINIMAL, SYSTEM, (samples,)))
     with FMU(MINIMAL) as fmu:
         nominal = {name: fmu.defaults[name] for name in steps} | point
-    about = simulator.at(0, nominal)
-    found = simulator.derivatives(0, nominal, [Variation((n,), h) for n, h in steps.items()], about)
-    found = np.column_stack([about.jacobian, found])
+    found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
+    found = np.column_stack([simulator.at(0, nominal).jacobian, found])
     for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
         sides = [simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
         central = (sides[0].residual - sides[1].residual) / step
-        # Forward over a step in which curvature adds no more than a hundredth.
-        np.testing.assert_allclose(found[:, j], central, atol=0.01 * np.abs(central).max())
+        # Derivatives of the motion, stepped, against those of its steps: they differ by less than
+        # a thousandth. The wheel load does a thousandth of what friction does: there, a hundredth.
+        share = {"Fz": 0.02}.get(name, 1e-3)
+        np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
     simulator.close()

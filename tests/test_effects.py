@@ -44,7 +44,7 @@ TANK = """package Tank "A tank that runs out"
   equation
     q = (1.0 - share)*drawn.q;
     annotation (__Workbench(effect(
-      size="share", step=0.01, matters=0.02, separation="a look into the orifice")));
+      size="share", matters=0.02, separation="a look into the orifice")));
   end Clogging;
 
   model Leak "A leak at the bottom"
@@ -54,7 +54,7 @@ TANK = """package Tank "A tank that runs out"
   equation
     q = drawn.q + area*sqrt(2.0*9.81*h);
     annotation (__Workbench(effect(
-      size="area", step=1e-5, matters=2e-5, separation="a dry floor")));
+      size="area", matters=2e-5, separation="a dry floor")));
   end Leak;
 
   partial model PartialGauge "Slot: from level to reading"
@@ -74,7 +74,7 @@ TANK = """package Tank "A tank that runs out"
   equation
     reading = level + offset;
     annotation (__Workbench(effect(
-      size="offset", step=0.01, matters=0.01, separation="an empty tank")));
+      size="offset", matters=0.01, separation="an empty tank")));
   end GaugeOffset;
 
   model GaugeGain "A gauge with a wrong gain"
@@ -83,7 +83,7 @@ TANK = """package Tank "A tank that runs out"
   equation
     reading = (1.0 + gain)*level;
     annotation (__Workbench(effect(
-      size="gain", step=0.01, matters=0.01, separation="two levels", after="GaugeOffset")));
+      size="gain", matters=0.01, separation="two levels", after="GaugeOffset")));
   end GaugeGain;
 
   model Base "A tank"
@@ -261,9 +261,9 @@ def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_pa
         ("max=0.9) = 0.0", "max=0.9)", "share without a value; expected '= 0.0'"),
         ("matters=0.02, ", "", "found no 'matters'; expected a number above 0"),
         ("matters=0.02", "matters=-0.02", "found matters = -0.02"),
-        ("step=0.01, matters=0.02", 'step="x", matters=0.02', "found step = 'x'"),
+        ("matters=0.02", 'matters="x"', "found matters = 'x'"),
         (', separation="a look into the orifice"', "", "found no 'separation'"),
-        ("step=0.01", "stepp=0.01", r"found 'stepp' \(closest: 'step'\)"),
+        ("matters=0.02", "mattters=0.02", r"found 'mattters' \(closest: 'matters'\)"),
         ("(effect(", "(efect(", r"found 'efect' \(closest: 'effect'\)"),
         ('size="share",', 'size="share", slots={"gauge"},', "found slot 'gauge'"),
         ('size="share",', 'size="share", shapes(b={1.0}),', "without a parameter 'b'"),

@@ -49,7 +49,7 @@ package Fan "A fan on an electric motor"
   equation
     tau = tau_c*tanh(w/0.5);
     annotation (__Workbench(effect(
-      size="tau_c", step=1e-3, matters=2e-3, separation="the speed while it runs out")));
+      size="tau_c", matters=2e-3, separation="the speed while it runs out")));
   end BearingFriction;
 
   model Grease "grease that is stiff"
@@ -58,7 +58,7 @@ package Fan "A fan on an electric motor"
   equation
     tau = d*w;
     annotation (__Workbench(effect(
-      size="d", step=1e-5, matters=5e-5, separation="the speed while it runs out")));
+      size="d", matters=5e-5, separation="the speed while it runs out")));
   end Grease;
 
   partial model PartialSupply "Slot: from voltage set to voltage at the motor"
@@ -78,7 +78,7 @@ package Fan "A fan on an electric motor"
   equation
     v = u - drop*tanh(u/0.5);
     annotation (__Workbench(effect(
-      size="drop", step=0.01, matters=0.02, separation="the current at standstill")));
+      size="drop", matters=0.02, separation="the current at standstill")));
   end BrushDrop;
 
   model SupplyGain "a supply whose scale is wrong"
@@ -87,7 +87,7 @@ package Fan "A fan on an electric motor"
   equation
     v = (1.0 + gain)*u;
     annotation (__Workbench(effect(
-      size="gain", step=1e-3, matters=2e-3, separation="a voltmeter at the motor")));
+      size="gain", matters=2e-3, separation="a voltmeter at the motor")));
   end SupplyGain;
 
   model Observer "Motor, fan, winding"

@@ -34,7 +34,7 @@ ORCHARD = """package Orchard "Three trees that drink from one pipe"
     for i in 1:n loop
       y[i] = u[i]*(1.0 - share*lost[i]);
     end for;
-    annotation (__Workbench(effect(size="lost", step=0.01, matters=0.02, separation="a look")));
+    annotation (__Workbench(effect(size="lost", matters=0.02, separation="a look")));
   end Clogging;
 
   model Drought "less water in all valves"
@@ -43,7 +43,7 @@ ORCHARD = """package Orchard "Three trees that drink from one pipe"
   equation
     y = u*(1.0 - dry);
     annotation (__Workbench(effect(
-      size="dry", step=0.01, matters=0.02, after="Clogging", separation="a look at the well")));
+      size="dry", matters=0.02, after="Clogging", separation="a look at the well")));
   end Drought;
 
   model Base "Water in the ground"

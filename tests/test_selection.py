@@ -23,7 +23,7 @@ CONVECTION = """  model Convection "air that rises from the block"
   equation
     Q = c*T*sqrt(abs(T)/10.0 + 1e-6);
     annotation (__Workbench(effect(
-      size="c", step=1e-3, matters=0.02, separation="the block on its side")));
+      size="c", matters=0.02, separation="the block on its side")));
   end Convection;
 
 """

@@ -47,7 +47,7 @@ package Balance "A spring balance: force by deflection, without a motion of its 
   equation
     f = fc*tanh(v/1e-3);
     annotation (__Workbench(effect(
-      size="fc", step=0.1, matters=0.05, separation="a slow pull")));
+      size="fc", matters=0.05, separation="a slow pull")));
   end DryFriction;
 
   model Grease "grease that gives way late"
@@ -58,7 +58,7 @@ package Balance "A spring balance: force by deflection, without a motion of its 
   equation
     tau*der(late) = v - late;
     f = d*late;
-    annotation (__Workbench(effect(size="d", step=1.0, matters=1.0, separation="two rates")));
+    annotation (__Workbench(effect(size="d", matters=1.0, separation="two rates")));
   end Grease;
 
   model Observer "The balance that observers run on"
@@ -126,7 +126,7 @@ package Bottle "A closed bottle of gas"
   equation
     rate = k*p;
     annotation (__Workbench(effect(
-      size="k", step=1e-4, matters=1e-5, separation="two pressures")));
+      size="k", matters=1e-5, separation="two pressures")));
   end Pore;
 
   model Permeation "gas that passes the wall at a constant rate"
@@ -134,7 +134,7 @@ package Bottle "A closed bottle of gas"
     parameter Real r(unit="Pa/s", min=-1e4, max=1e4) = 0.0 "Rate";
   equation
     rate = r;
-    annotation (__Workbench(effect(size="r", step=10, matters=1, separation="two pressures")));
+    annotation (__Workbench(effect(size="r", matters=1, separation="two pressures")));
   end Permeation;
 
   model Observer "The bottle that observers run on"

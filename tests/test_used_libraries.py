@@ -25,25 +25,25 @@ STAGE = """package Stage "A stage on rails"
     model BearingFriction "dry friction in the bearing"
       extends Common.Friction.Dry(coulomb(max=5.0));
       annotation (__Workbench(effect(
-        size="coulomb", step=0.1, matters=0.2, separation="a slow run-down")));
+        size="coulomb", matters=0.2, separation="a slow run-down")));
     end BearingFriction;
 
     model Grease "stiff grease"
       extends Common.Friction.Viscous;
       annotation (__Workbench(effect(
-        size="damping", step=0.1, matters=0.2, separation="a run-down from two velocities")));
+        size="damping", matters=0.2, separation="a run-down from two velocities")));
     end Grease;
 
     model TachoOffset "a tacho whose zero is wrong"
       extends Common.Signals.Offset(offset(unit="m/s", min=-0.1, max=0.1));
       annotation (__Workbench(effect(
-        size="offset", step=1e-3, matters=1e-3, separation="its reading at standstill")));
+        size="offset", matters=1e-3, separation="its reading at standstill")));
     end TachoOffset;
 
     model TachoGain "a tacho whose gain is wrong"
       extends Common.Signals.Gain(gain(max=0.2));
       annotation (__Workbench(effect(
-        size="gain", step=1e-3, matters=1e-3, separation="a ruler and a clock")));
+        size="gain", matters=1e-3, separation="a ruler and a clock")));
     end TachoGain;
   end Effects;
 

@@ -175,12 +175,17 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
     """
     if model.fmi == 0:
         return _differences(model)
-    known, out, seed = model.knowns[row:], model.jacobian[row], model.seed
+    return direction(model, model.knowns[row:], 1, model.seed, model.jacobian[row], count)
+
+
+@inlined
+def direction(model, knowns, number, seeds, out, count):  # type: ignore[no-untyped-def]
+    """Derivatives of the first `count` unknowns along `number` knowns into `out`; a status."""
     if model.fmi == 2:
-        words = model.address, model.unknowns, count, known, 1, seed, out
+        words = model.address, model.unknowns, count, knowns, number, seeds, out
         status = _call(model.directional, words)
     else:
-        more = model.address, model.unknowns, count, known, 1, seed, 1, out, count
+        more = model.address, model.unknowns, count, knowns, number, seeds, number, out, count
         status = _call(model.directional, more)
     return REFUSED if status > 1 else OK
 

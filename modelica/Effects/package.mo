@@ -12,7 +12,7 @@ package Stage
   model BearingFriction \"dry friction in the bearing\"
     extends Common.Friction.Dry(coulomb(max=5.0));
     annotation (__Workbench(effect(
-      size=\"coulomb\", step=0.1, matters=0.2, separation=\"a slow run-down\")));
+      size=\"coulomb\", matters=0.2, separation=\"a slow run-down\")));
   end BearingFriction;
 
   annotation (uses(Effects(version=\"1.0\")));

@@ -75,8 +75,7 @@ class Effect:
     slots : of the base model that the class is plugged into.
     size : parameter that is zero in the nominal model; of an order-locked effect, which has the
         pair `cosine` and `sine`, "cosine".
-    step : change of `size` that is small and clearly visible, in its SI unit.
-    matters : least size worth a finding, in the same unit: what tolerances, or differences between
+    matters : least size worth a finding, in its SI unit: what tolerances, or differences between
         an observer model and a real machine, may fake.
     shapes : other parameters that are fitted once the effect is found, each with values to try.
     hidden : why recorded stops cannot show the effect; empty if they can.
@@ -90,7 +89,6 @@ class Effect:
     model: str
     slots: tuple[str, ...]
     size: str
-    step: float
     matters: float
     text: str
     separation: str
@@ -212,7 +210,7 @@ def _placed(library: Library, effect: Effect) -> list[Effect]:
 
 def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Effect:
     said.only(
-        *("size", "step", "matters", "shapes", "separation", "hidden", "slots", "after"),
+        *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
         *("where", "unless", "falling"),
     )
     size = said.content.get("size")
@@ -226,7 +224,6 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Ef
         model=one.name,
         slots=_slots(library, slots, one, said),
         size=size,
-        step=said.number("step"),
         matters=said.number("matters"),
         text=_within_sentence(one.description),
         separation=said.text("separation"),

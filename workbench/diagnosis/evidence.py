@@ -1,6 +1,6 @@
 """What each recording says about every parameter: whitened prediction errors, their derivatives.
 
-The derivatives are differences of two simulations. Everything that follows, fits, tests on held-out
+The derivatives are made beside the simulation. Everything that follows, fits, tests on held-out
 recordings and confusability, is linear algebra on them.
 """
 
@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeVar
@@ -18,7 +18,7 @@ import numpy as np
 from workbench.case import Case
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.pace import Pace
-from workbench.diagnosis.prediction import Predictor
+from workbench.diagnosis.prediction import Predictor, Variation
 from workbench.diagnosis.samples import Samples, compared, prepare
 from workbench.diagnosis.thresholds import SOUND, Soundness, Thresholds
 from workbench.fmu import FMU, Matrix, Vector
@@ -30,29 +30,11 @@ Result = TypeVar("Result")
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _FINEST = 32  # steps of a sample time
-_CHUNK = 6  # columns of one task: few, so that no processor waits long for the last one
 
 
 def delay(signal: str) -> str:
     """Name of the delay of a sensor behind a structure [s], which is no variable of the FMU."""
     return f"{signal}Delay"
-
-
-@dataclass(frozen=True)
-class Variation:
-    """A parameter that is varied.
-
-    Attributes
-    ----------
-    variables : of the FMU that take its value.
-    step : of the difference, in SI units.
-    setting : other variables that are set while it is varied, such as the shape of an effect that
-        is absent otherwise.
-    """
-
-    variables: tuple[str, ...]
-    step: float
-    setting: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,52 +126,72 @@ class Simulator:
         number: int,
         values: Mapping[str, float],
         columns: Sequence[Variation],
-        about: Evidence,
     ) -> Matrix:
-        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
-
-        Parameters
-        ----------
-        about : errors at the point.
-        """
-        jacobian = np.zeros((about.errors.size + 1, len(columns)))
-        for j, column in enumerate(columns):
-            name = column.variables[0]
-            start = values[name] if name in values else self._fmu.defaults[name]
-            moved = {**values, **column.setting}
-            moved |= dict.fromkeys(column.variables, start + column.step)
-            simulated, rest = self._simulated(number, moved)
-            errors = self._whitened(number, self._read(number, simulated, values))
-            jacobian[:-1, j] = (errors - about.errors).ravel() / column.step
-            jacobian[-1, j] = (rest - about.rest) / column.step
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p)."""
+        one, fmu = self._recordings[number], self._fmu
+        jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
+        for part in _compatible(columns):
+            varied = [columns[j] for j in part]
+            _, found = self._predictor.derivatives(one, self._known(values), varied)
+            by = self._whitened(number, self._late(number, found.errors, values))
+            jacobian[:-1, part] = by.reshape(-1, len(part))
+            if self._rest is not None:
+                place = self._rest.references
+                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ found.states)[0]
+                for q, column in enumerate(varied):
+                    acting = [name for name in column.variables if name not in fmu.states]
+                    slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
+                jacobian[-1, part] = -slopes / one.rest_noise
         return jacobian
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
         """Prediction errors of all samples, and the whitened error of the input at rest."""
         one = self._recordings[number]
-        delays = {name for name, _ in self._delays.values()}
-        known = {name: value for name, value in values.items() if name not in delays}
-        errors = self._predictor.errors(one, known)
+        errors = self._predictor.errors(one, self._known(values))
         if self._rest is None:
             return errors, 0.0
         return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
 
+    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the FMU's variables."""
+        delays = {name for name, _ in self._delays.values()}
+        return {name: value for name, value in values.items() if name not in delays}
+
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
+        measured = self._recordings[number].y
+        return measured - self._late(number, measured - errors, values)
+
+    def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
+        """What sensors read of signals (n, c, ...), behind structures and late."""
         one = self._recordings[number]
         if self._delays:
-            errors = errors.copy()
+            signals = signals.copy()
         for j, (name, _) in self._delays.items():
-            measured = one.y[:, j]
-            behind = one.behind_structure(j, measured - errors[:, j])
-            errors[:, j] = measured - (behind - values[name] * np.gradient(behind, one.time))
-        return errors
+            behind = one.behind_structure(j, signals[:, j])
+            signals[:, j] = behind - values[name] * np.gradient(behind, one.time, axis=0)
+        return signals
 
     def _whitened(self, number: int, errors: Matrix) -> Matrix:
-        """Whitened errors of the blocks, (b, c)."""
+        """Whitened errors of the blocks, (b, c, ...)."""
         one = self._recordings[number]
-        whitened: Matrix = np.einsum("bij,bj->bi", one.whitening, one.channels(errors))
+        whitened: Matrix = np.einsum("bij,bj...->bi...", one.whitening, one.channels(errors))
         return whitened
+
+
+def _compatible(columns: Sequence[Variation]) -> list[list[int]]:
+    """Numbers of columns that may be varied in one run: none sets what another sets otherwise."""
+    parts: list[tuple[list[int], dict[str, float]]] = []
+    for j, column in enumerate(columns):
+        wanted = column.setting.items()
+        able = (
+            one for one in parts if all(one[1].get(name, value) == value for name, value in wanted)
+        )
+        if (part := next(able, None)) is None:
+            parts.append(part := ([], {}))
+        part[0].append(j)
+        part[1].update(wanted)
+    return [part for part, _ in parts]
 
 
 @contextmanager
@@ -309,26 +311,12 @@ class Simulations:
         self,
         points: Sequence[Mapping[str, float]],
         columns: Sequence[Variation],
-        about: Sequence[Evidence],
     ) -> list[Matrix]:
-        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p).
-
-        Parameters
-        ----------
-        about : errors of each recording at its point.
-        """
-        chunks = [columns[i : i + _CHUNK] for i in range(0, len(columns), _CHUNK)]
+        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p)."""
         found = self._gathered(
-            {
-                (k, i): (Simulator.derivatives, k, points[k], chunk, about[k])
-                for k in self._order
-                for i, chunk in enumerate(chunks)
-            }
+            {k: (Simulator.derivatives, k, points[k], columns) for k in self._order}
         )
-        return [
-            np.column_stack([found[k, i] for i in range(len(chunks))])
-            for k in range(len(self.recordings))
-        ]
+        return [found[k] for k in range(len(self.recordings))]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""

@@ -13,9 +13,10 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
-from workbench.diagnosis.evidence import Evidence, Item, Result, Simulations, Variation
+from workbench.diagnosis.evidence import Evidence, Item, Result, Simulations
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, slowness
+from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
@@ -27,8 +28,6 @@ _PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
-_LEVEL_STEP = 0.02  # relative, twice the step of a level that has no tolerance
-_LEAST_STEP = 1e-3  # of the range of a parameter
 
 
 class Fit:
@@ -130,7 +129,11 @@ class Fit:
         active : effects that the point has.
         candidates : others, each with the shape it is tried with.
         """
-        columns = self._tolerances() | self._present(lin.point, active)
+        names = dict.fromkeys([*self._compare.levels, *self.unknowns.local])
+        columns = {(_LOCAL, name): Variation((name,)) for name in names}
+        for effect in active:
+            for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
+                columns[effect.name, parameter] = Variation(variables(effect, parameter))
         for effect, shape in candidates:
             setting = {
                 name: value
@@ -138,41 +141,14 @@ class Fit:
                 for name in variables(effect, parameter)
             }
             for parameter in effect.sizes:
-                column = Variation(variables(effect, parameter), effect.step, setting)
+                column = Variation(variables(effect, parameter), setting)
                 columns[variant(effect, shape), parameter] = column
         missing = {key: column for key, column in columns.items() if key not in lin.keys}
         if not missing:
             return lin
         values = self.unknowns.values(lin.point)
-        more = self._simulations.derivatives(values, list(missing.values()), lin.evidence)
+        more = self._simulations.derivatives(values, list(missing.values()))
         return self.hide(lin.extended(missing, more))
-
-    def _tolerances(self) -> dict[Key, Variation]:
-        """Columns of what differs from stop to stop."""
-        start = self.unknowns.start()
-        spreads = {**dict.fromkeys(self._compare.levels, _LEVEL_STEP), **self.unknowns.local}
-        columns = {}
-        for name, spread in spreads.items():
-            low, high = self._simulations.bounds.get(name, (-np.inf, np.inf))
-            # A level that is zero has a step by its range.
-            least = _LEAST_STEP * (high - low if np.isfinite(high - low) else 1.0)
-            step = 0.5 * self.unknowns.spread(start, name, 0, spread)
-            columns[_LOCAL, name] = Variation((name,), step or least)
-        return columns
-
-    def _present(self, point: Point, active: Sequence[Effect]) -> dict[Key, Variation]:
-        """Columns of the effects that a point has."""
-        columns = {}
-        for effect in active:
-            for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
-                names = variables(effect, parameter)
-                is_shape = parameter not in effect.sizes
-                step = 0.05 * point.sizes[effect.name, parameter] if is_shape else effect.step
-                high = self._simulations.bounds[names[0]][1]
-                if not is_shape and point.sizes[effect.name, effect.label] + step > high:
-                    step = -step
-                columns[effect.name, parameter] = Variation(names, step)
-        return columns
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.

@@ -9,6 +9,7 @@ methods).
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from workbench.diagnosis.samples import Samples
 from workbench.diagnosis.steps import Steps, step, steps
+from workbench.diagnosis.tangent import Tangent, advance, renew, tangent, tell
 from workbench.fmu import FMU, Matrix
 from workbench.kernel import checked, compiled, instance, place, read, set_inputs, set_states
 from workbench.system import System
@@ -42,12 +44,39 @@ class _Led(NamedTuple):
 
 
 @compiled
-def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # type: ignore[no-untyped-def]
-    """Fill `errors` (n, c), measured minus predicted; returns a status.
+def _lead(model, led, share, error, states, errors):  # type: ignore[no-untyped-def]
+    """Correct the states by prediction errors (c,), and derivatives (n, p) by theirs (c, p).
 
     A correction scales all states that move together: what depends on their ratio stays as it is,
     so that the noise of one sample does not come back as something else in the next.
     """
+    x, p = model.x, states.shape[1]
+    if led.states.size:
+        first, column = led.states[0], led.column
+        correction, leader = share * error[column], x[first]
+        if led.states.size == 1:
+            x[first] += correction
+            for q in range(p):
+                states[first, q] += share * errors[column, q]
+        elif abs(leader) > 2.0 * abs(correction):
+            for q in range(p):
+                moved = share * errors[column, q] - correction / leader * states[first, q]
+                for i in led.states:
+                    states[i, q] *= 1.0 + correction / leader
+                    states[i, q] += moved / leader * x[i]
+            for i in led.states:
+                x[i] *= 1.0 + correction / leader
+    for i in range(led.corrected.size):
+        for j in range(led.gain.shape[1]):
+            x[led.corrected[i]] += led.gain[i, j] * error[j]
+            for q in range(p):
+                states[led.corrected[i], q] += led.gain[i, j] * errors[j, q]
+
+
+@compiled
+def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work, tangent):  # type: ignore[no-untyped-def]
+    """Fill `errors` (n, c), measured minus predicted, and their derivatives; returns a status."""
+    varied = tangent.states.shape[1] > 0
     for i in range(x0.size):
         model.x[i] = x0[i]
     for j in range(u.shape[1]):
@@ -59,17 +88,8 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # 
         holds = holds or held[j]
     for k in range(time.size):
         if k > 0:
-            if led.states.size:
-                correction = gain[k - 1] * errors[k - 1, led.column]
-                leader = model.x[led.states[0]]
-                if led.states.size == 1:
-                    model.x[led.states[0]] += correction
-                elif abs(leader) > 2.0 * abs(correction):
-                    for i in led.states:
-                        model.x[i] *= 1.0 + correction / leader
-            for i in range(led.corrected.size):
-                for j in range(led.gain.shape[1]):
-                    model.x[led.corrected[i]] += led.gain[i, j] * errors[k - 1, j]
+            before = k - 1 if varied else 0
+            _lead(model, led, gain[k - 1], errors[k - 1], tangent.states, tangent.errors[before])
             if set_states(model):
                 return 1
             interval = time[k] - time[k - 1]
@@ -79,6 +99,8 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # 
                     moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / count
                     work.to[j] = u[k - 1, j] + moved
                 status = step(model, work, interval / count)
+                if varied and not status:
+                    status = advance(model, tangent, work.stiff, interval / count)
                 if status:
                     return status
             for j in range(u.shape[1]):
@@ -89,7 +111,26 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work):  # 
             return 1
         for i in range(y.shape[1]):
             errors[k, i] = y[k, i] - model.y[i]
+        if varied:
+            if (k == 0 or holds) and renew(model, tangent):
+                return 1
+            tell(tangent, k)
     return 0
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A parameter that is varied.
+
+    Attributes
+    ----------
+    variables : of the FMU that take its value; of a state it is the start.
+    setting : other variables that are set while it is varied, such as the shape of an effect that
+        is absent otherwise.
+    """
+
+    variables: tuple[str, ...]
+    setting: Mapping[str, float] = field(default_factory=dict)
 
 
 class Predictor:
@@ -137,12 +178,26 @@ class Predictor:
         FMUError
             If the model cannot be evaluated along the recording.
         """
-        fmu = self._fmu
-        fmu.start({**self.begin(samples), **values})
+        return self.derivatives(samples, values, ())[0]
+
+    def derivatives(
+        self, samples: Samples, values: Mapping[str, float], columns: Sequence[Variation]
+    ) -> tuple[Matrix, Tangent]:
+        """Prediction errors along one recording, and their derivatives by p columns.
+
+        The FMU is left at the last sample. See `errors`.
+        """
+        fmu, values = self._fmu, {**self.begin(samples), **values}
+        for column in columns:
+            values |= column.setting
+        fmu.start(values)
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
+        work = self._steps()
+        varied = [column.variables for column in columns]
+        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff.size)
         status = _predict(
             self._model,
             samples.time[:end],
@@ -154,10 +209,11 @@ class Predictor:
             x0,
             self._longest,
             errors,
-            self._steps(),
+            work,
+            along,
         )
         checked(status, fmu)
-        return errors
+        return errors, along
 
     def _led(self, samples: Samples) -> _Led:
         lead = samples.lead

@@ -123,12 +123,13 @@ class Samples:
         return found
 
     def behind_structure(self, column: int, values: Vector) -> Vector:
-        """What a sensor reads of a quantity, (n,): a mode of second order in between."""
+        """What a sensor reads of quantities, (n, ...): a mode of second order in between."""
         if column not in self._filters:
             return values
         numerator, denominator = self._filters[column]
-        begin = lfiltic(numerator, denominator, values[:1].repeat(2), values[:1].repeat(2))
-        read: Vector = lfilter(numerator, denominator, values, zi=begin)[0]
+        rest = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
+        begin = np.multiply.outer(rest, values[0])
+        read: Vector = lfilter(numerator, denominator, values, axis=0, zi=begin)[0]
         return read
 
     def sizes(self, errors: Matrix) -> Matrix:
@@ -143,13 +144,13 @@ class Samples:
         )
 
     def channels(self, errors: Matrix) -> Matrix:
-        """Means of prediction errors (n, c) over each block, by channel, (b, c)."""
-        total = np.zeros((len(errors) + 1, len(self.slopes)))
+        """Means of prediction errors (n, c, ...) over each block, by channel, (b, c, ...)."""
+        total = np.zeros((len(errors) + 1, len(self.slopes), *errors.shape[2:]))
         for c, slopes in enumerate(self.slopes):
             sum_ = sum(slope * errors[:, j] for j, slope in enumerate(slopes) if slope)
-            np.cumsum(sum_, out=total[1:, c])
+            np.cumsum(sum_, axis=0, out=total[1:, c])
         first, end = self.blocks.T
-        means: Matrix = (total[end] - total[first]) / (end - first)[:, None]
+        means: Matrix = ((total[end] - total[first]).T / (end - first)).T
         return means
 
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis import Effect
-from workbench.diagnosis.evidence import Evidence, Simulations, Variation
+from workbench.diagnosis.evidence import Evidence, Simulations
 from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
 from workbench.diagnosis.verdict import conclude
 from workbench.errors import InputError, WorkerError
@@ -100,14 +101,13 @@ class Remembering(Simulations):
         self,
         points: Sequence[Mapping[str, float]],
         columns: Sequence[Variation],
-        about: Sequence[Evidence],
     ) -> list[Matrix]:
         """Derivatives of every recording's errors by the columns."""
         point = _key(points)
-        keys = [(point, one.variables, one.step, _key([one.setting])) for one in columns]
+        keys = [(point, one.variables, _key([one.setting])) for one in columns]
         new = [i for i, key in enumerate(keys) if key not in self._columns]
         if new:
-            made = super().derivatives(points, [columns[i] for i in new], about)
+            made = super().derivatives(points, [columns[i] for i in new])
             for j, i in enumerate(new):
                 self._columns[keys[i]] = [one[:, j : j + 1] for one in made]
         found = [self._columns[key] for key in keys]

@@ -7,7 +7,7 @@ equation
   actual = nominal - conductance*(1.0 - runs)*(p - p0);
   annotation (
     __Workbench(effect(
-      size="conductance", step=2e-11, matters=5e-11,
+      size="conductance", matters=5e-11,
       slots={"compressor"},
       separation="a closed valve between compressor and reservoir")),
     Documentation(info="<html>

@@ -3,7 +3,7 @@ model CompressibleLeak "a laminar leak of a gas whose density follows the pressu
   extends Common.Leaks.CompressibleLaminar(conductance(max=1e-8));
   annotation (
     __Workbench(effect(
-      size="conductance", step=4e-12, matters=1e-11,
+      size="conductance", matters=1e-11,
       separation="the fall of the pressure from full to half with the compressor off")),
     Documentation(info="<html>
 <p>Narrow gaps, over which the pressure falls by much.</p>

@@ -3,7 +3,7 @@ model DeliveryLag "delivery that lags behind the valve, at starts and at stops"
   extends Common.Signals.Lag(lag(max=60.0), window=1.0);
   annotation (
     __Workbench(effect(
-      size="lag", step=1.0, matters=2.0,
+      size="lag", matters=2.0,
       slots={"running"},
       separation="pressure at its outlet, sampled ten times as often")),
     Documentation(info="<html>

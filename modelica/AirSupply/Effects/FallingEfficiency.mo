@@ -7,7 +7,7 @@ equation
   actual = nominal*(1.0 - fall*(p - pUsual)/pUsual);
   annotation (
     __Workbench(effect(
-      size="fall", step=0.05, matters=0.2,
+      size="fall", matters=0.2,
       slots={"compressor"},
       separation="its flow against several pressures, held for minutes each")),
     Documentation(info="<html>

@@ -9,7 +9,7 @@ equation
   actual = isothermal + der(excess);
   annotation (
     __Workbench(effect(
-      size="share", step=0.02, matters=0.05,
+      size="share", matters=0.05,
       shapes(tau={20.0, 80.0}),
       slots={"air"},
       separation="a thermometer in the reservoir")),

@@ -3,7 +3,7 @@ model SensorOffset "a pressure sensor whose zero is wrong"
   extends Common.Signals.Offset(offset(unit="Pa", min=-1e5, max=1e5));
   annotation (
     __Workbench(effect(
-      size="offset", step=2e3, matters=5e3,
+      size="offset", matters=5e3,
       slots={"sensor"},
       separation="the reading of the empty reservoir")),
     Documentation(info="<html>

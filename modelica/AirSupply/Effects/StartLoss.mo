@@ -11,7 +11,7 @@ equation
   y = u*(1.0 - loss/tau*(1.0 - begun));
   annotation (
     __Workbench(effect(
-      size="loss", step=0.5, matters=1.0,
+      size="loss", matters=1.0,
       slots={"running"},
       separation="pressure at its outlet, sampled ten times as often")),
     Documentation(info="<html>

@@ -9,7 +9,7 @@ equation
   actual = nominal*(1.0 - share*(warmth - 0.5));
   annotation (
     __Workbench(effect(
-      size="share", step=0.02, matters=0.05,
+      size="share", matters=0.05,
       slots={"compressor"},
       separation="two starts, from cold and shortly after a stop")),
     Documentation(info="<html>

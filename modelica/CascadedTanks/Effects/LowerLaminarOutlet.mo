@@ -6,7 +6,7 @@ equation
   actual = nominal + rate*h;
   annotation (
     __Workbench(effect(
-      size="rate", step=2e-4, matters=1e-3,
+      size="rate", matters=1e-3,
       slots={"lowerOutlet"},
       separation="the level of the lower tank while it empties")),
     Documentation(info="<html>

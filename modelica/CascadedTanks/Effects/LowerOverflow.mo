@@ -8,7 +8,7 @@ equation
   caught = 0.0;
   annotation (
     __Workbench(effect(
-      size="spilled", step=0.05, matters=0.2,
+      size="spilled", matters=0.2,
       shapes(rim={8.0, 9.0, 9.8}),
       slots={"lowerRim"},
       separation="a look at the lower rim while the level is high")),

@@ -7,7 +7,7 @@ equation
   actual = nominal/sqrt((1.0 + widening*(h - middle)/middle)^2 + 1e-3*widening^2);
   annotation (
     __Workbench(effect(
-      size="widening", step=0.02, matters=0.05,
+      size="widening", matters=0.05,
       separation="a rule along the tank; the rise of the level with the outlet closed")),
     Documentation(info="<html>
 <p>The section is <code>1 + widening*(level - middle)/middle</code> of that in the middle. Levels at rest do not

@@ -6,7 +6,7 @@ equation
   y = u*(1.0 + curvature*u);
   annotation (
     __Workbench(effect(
-      size="curvature", step=5e-3, matters=0.01,
+      size="curvature", matters=0.01,
       slots={"drive"},
       separation="steady flow of the pump into a bucket at several voltages")),
     Documentation(info="<html>

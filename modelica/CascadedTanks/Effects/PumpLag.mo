@@ -3,7 +3,7 @@ model PumpLag "flow of the pump that lags behind its voltage"
   extends Common.Signals.Lag(lag(max=60.0), window=1.0, past(start=3.0));
   annotation (
     __Workbench(effect(
-      size="lag", step=1.0, matters=2.0,
+      size="lag", matters=2.0,
       slots={"drive"},
       separation="a step of the voltage, with the flow watched")),
     Documentation(info="<html>

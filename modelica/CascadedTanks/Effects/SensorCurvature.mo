@@ -7,7 +7,7 @@ equation
   y = u + bow*((u - middle)/middle)^2;
   annotation (
     __Workbench(effect(
-      size="bow", step=0.05, matters=0.1,
+      size="bow", matters=0.1,
       slots={"sensor"},
       separation="the reading beside a ruler, at several levels")),
     Documentation(info="<html>

@@ -3,7 +3,7 @@ model SensorSaturation "a level sensor that reads less and less above some level
   extends Common.Signals.Saturation(high(unit="V", min=1.0, max=10.0));
   annotation (
     __Workbench(effect(
-      size="share", step=0.05, matters=0.1,
+      size="share", matters=0.1,
       shapes(high={6.0, 8.0, 9.5}),
       slots={"sensor"},
       separation="the reading beside a ruler, at several levels")),

@@ -7,7 +7,7 @@ equation
   caught = 0.0;
   annotation (
     __Workbench(effect(
-      size="rate", step=2e-4, matters=1e-3,
+      size="rate", matters=1e-3,
       slots={"upperRim"},
       separation="the level of the upper tank over an hour, with its outlet closed")),
     Documentation(info="<html>

@@ -6,7 +6,7 @@ equation
   actual = nominal + k*(Functions.root(h + head) - Functions.root(h));
   annotation (
     __Workbench(effect(
-      size="head", step=0.1, matters=0.3,
+      size="head", matters=0.3,
       slots={"upperOutlet"},
       separation="the level at which the upper outlet stops to run; the height of its pipe")),
     Documentation(info="<html>

@@ -9,7 +9,7 @@ equation
   caught = share*leaves;
   annotation (
     __Workbench(effect(
-      size="spilled", step=0.05, matters=0.2,
+      size="spilled", matters=0.2,
       shapes(rim={6.0, 8.0, 10.0, 12.0}, share={0.3, 0.8}),
       slots={"upperRim"},
       separation="a look at the upper rim while the pump runs at full voltage")),

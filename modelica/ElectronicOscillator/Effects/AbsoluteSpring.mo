@@ -6,7 +6,7 @@ equation
   f = k1*noEvent(abs(y));
   annotation (
     __Workbench(effect(
-      size="k1", step=0.002, matters=0.004,
+      size="k1", matters=0.004,
       separation="static force over displacement")),
     Documentation(info="<html>
 <p><code>f = k1*|y|</code>: a diode in the feedback.</p>

@@ -6,7 +6,7 @@ equation
   f = k3*y^3;
   annotation (
     __Workbench(effect(
-      size="k3", step=0.05, matters=0.05,
+      size="k3", matters=0.05,
       separation="static force over displacement")),
     Documentation(info="<html>
 <p><code>f = k3*y^3</code>.</p>

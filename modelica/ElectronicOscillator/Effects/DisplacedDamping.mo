@@ -6,7 +6,7 @@ equation
   f = dy*y^2*v;
   annotation (
     __Workbench(effect(
-      size="dy", step=2e-5, matters=5e-5,
+      size="dy", matters=5e-5,
       separation="how free swings of several amplitudes fade")),
     Documentation(info="<html>
 <p><code>f = dy*y^2*v</code>, after B. van der Pol (1926): a multiplier whose output lags.</p>

@@ -7,7 +7,7 @@ equation
   f = coulomb*tanh(v/v0);
   annotation (
     __Workbench(effect(
-      size="coulomb", step=5e-5, matters=1e-4,
+      size="coulomb", matters=1e-4,
       separation="how free swings fade")),
     Documentation(info="<html>
 <p>Of a real oscillator; a circuit should have none.</p>

@@ -6,7 +6,7 @@ equation
   f = d2*v*noEvent(abs(v));
   annotation (
     __Workbench(effect(
-      size="d2", step=2e-8, matters=5e-8,
+      size="d2", matters=5e-8,
       separation="how free swings fade")),
     Documentation(info="<html>
 <p><code>f = d2*v*|v|</code>.</p>

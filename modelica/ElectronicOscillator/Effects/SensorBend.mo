@@ -6,7 +6,7 @@ equation
   y = u*(1.0 + bend*u^2);
   annotation (
     __Workbench(effect(
-      size="bend", step=0.02, matters=0.05, slots={"sensor"}, after="CubicSpring",
+      size="bend", matters=0.05, slots={"sensor"}, after="CubicSpring",
       separation="the reading beside that of another card")),
     Documentation(info="<html>
 <p><code>y = u*(1 + bend*u^2)</code>.</p>

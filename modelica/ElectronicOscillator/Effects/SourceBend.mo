@@ -6,7 +6,7 @@ equation
   y = u*(1.0 + bend*u^2);
   annotation (
     __Workbench(effect(
-      size="bend", step=0.2, matters=0.5, slots={"source"},
+      size="bend", matters=0.5, slots={"source"},
       separation="static force over input")),
     Documentation(info="<html>
 <p><code>y = u*(1 + bend*u^2)</code>: an amplifier close to its limit.</p>

@@ -3,7 +3,7 @@ model SourceLag "a force that lags behind"
   extends Common.Signals.Lag(window=5e-4, lag(max=0.01));
   annotation (
     __Workbench(effect(
-      size="lag", step=5e-6, matters=2e-5, slots={"source"},
+      size="lag", matters=2e-5, slots={"source"},
       separation="the phase at high frequencies")),
     Documentation(info="<html>
 <p>Of an amplifier.</p>

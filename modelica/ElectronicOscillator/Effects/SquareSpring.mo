@@ -6,7 +6,7 @@ equation
   f = k2*y^2;
   annotation (
     __Workbench(effect(
-      size="k2", step=0.005, matters=0.01,
+      size="k2", matters=0.01,
       separation="static force over displacement")),
     Documentation(info="<html>
 <p><code>f = k2*y^2</code>: a component that is not symmetric.</p>

@@ -16,7 +16,7 @@ equation
   rate = share*(warming - (kappa*theta - 1.0)*escape*pAir);
   annotation (
     __Workbench(effect(
-      size="share", step=0.02, matters=0.1, shapes(tau={1.0, 3.0, 10.0, 30.0}),
+      size="share", matters=0.1, shapes(tau={1.0, 3.0, 10.0, 30.0}),
       separation="a wall filled with steel wool, which keeps the temperature")),
     Documentation(info="<html>
 <p>Energy of the air that stays, <code>m*cv*der(T) = H*(TWall - T) - R*T*q</code>: it does the work of

@@ -8,7 +8,7 @@ equation
   y = u + drift*t;
   annotation (
     __Workbench(effect(
-      size="drift", step=1.0, matters=17.0, slots={"gauge"},
+      size="drift", matters=17.0, slots={"gauge"},
       separation="its reading at a pressure that is kept")),
     Documentation(info="<html>
 <p>A sensor that warms up. 17 Pa/s are 20 mbar in two minutes.</p>

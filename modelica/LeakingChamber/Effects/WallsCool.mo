@@ -7,7 +7,7 @@ equation
   rate = pAir/T*slope;
   annotation (
     __Workbench(effect(
-      size="slope", step=1e-3, matters=6e-3,
+      size="slope", matters=6e-3,
       separation="a thermometer at the wall")),
     Documentation(info="<html>
 <p>After it was handled, or filled with warm air, a wall comes back to the temperature of the room;

@@ -10,7 +10,7 @@ equation
   rate = pAir*excess/T*der(left);
   annotation (
     __Workbench(effect(
-      size="excess", step=0.2, matters=10.0, shapes(tau={3.0, 10.0, 30.0}),
+      size="excess", matters=10.0, shapes(tau={3.0, 10.0, 30.0}),
       separation="the same again some minutes after filling")),
     Documentation(info="<html>
 <p>Filling compresses the air that is there, and warms it by tens of kelvin; the walls take that up

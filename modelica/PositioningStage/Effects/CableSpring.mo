@@ -6,7 +6,7 @@ equation
   f = k*position;
   annotation (
     __Workbench(effect(
-      size="k", step=3.0, matters=3.0,
+      size="k", matters=3.0,
       separation="the carriage at rest along its way")),
     Documentation(info="<html>
 <p>Of a chain that bends, too.</p>

@@ -3,7 +3,7 @@ model DriveDeadZone "a drive that does nothing at small commands"
   extends Common.Signals.DeadZone(zone(unit="N", max=100.0));
   annotation (
     __Workbench(effect(
-      size="zone", step=0.5, matters=0.5, slots={"drive"}, after="DryFriction",
+      size="zone", matters=0.5, slots={"drive"}, after="DryFriction",
       separation="the force at a blocked carriage")),
     Documentation(info="<html>
 <p>Of an amplifier.</p>

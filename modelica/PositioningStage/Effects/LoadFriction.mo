@@ -3,7 +3,7 @@ model LoadFriction "dry friction of the nut that grows with the force of the dri
   extends Common.Friction.LoadDependent(v0=1e-3, mu(max=0.9));
   annotation (
     __Workbench(effect(
-      size="mu", step=0.01, matters=0.01,
+      size="mu", matters=0.01,
       separation="the same motion with a heavier load")),
     Documentation(info="<html>
 <p>The nut carries the force that the screw passes on.</p>

@@ -7,7 +7,7 @@ equation
   f = slant*noEvent(abs(v));
   annotation (
     __Workbench(effect(
-      size="slant", step=5.0, matters=5.0,
+      size="slant", matters=5.0,
       separation="runs at several constant speeds, both ways")),
     Documentation(info="<html>
 <p>A worn screw resists one way more than the other. Beside viscous friction <code>d</code> the dampings

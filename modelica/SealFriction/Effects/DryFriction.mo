@@ -3,7 +3,7 @@ model DryFriction "dry friction of the seal, at any pressure"
   extends Common.Friction.Dry(v0=5e-4, coulomb(max=100.0));
   annotation (
     __Workbench(effect(
-      size="coulomb", step=0.1, matters=0.2,
+      size="coulomb", matters=0.2,
       separation="strokes without pressure")),
     Documentation(info="<html>
 <p>A ring that is squeezed into its groove presses on the wall also without pressure.</p>

@@ -3,7 +3,7 @@ model LoadCellLag "a load cell whose amplifier is late"
   extends Common.Signals.Lag(lag(max=1.0), past(unit="N", nominal=100.0));
   annotation (
     __Workbench(effect(
-      size="lag", step=0.005, matters=0.01, slots={"loadCell"},
+      size="lag", matters=0.01, slots={"loadCell"},
       separation="a blow on the load cell")),
     Documentation(info="<html>
 <p>All effects that follow the rate are seen late by as much.</p>

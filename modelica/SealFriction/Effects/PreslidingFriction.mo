@@ -10,7 +10,7 @@ equation
   f = coulomb*side;
   annotation (
     __Workbench(effect(
-      size="coulomb", step=0.1, matters=0.2, shapes(delta={1e-4, 3e-4, 1e-3}),
+      size="coulomb", matters=0.2, shapes(delta={1e-4, 3e-4, 1e-3}),
       separation="strokes of less than a millimetre")),
     Documentation(info="<html>
 <p><code>f = coulomb*side</code>, <code>delta*der(side) = v - |v|*side</code>: rubber bends before it

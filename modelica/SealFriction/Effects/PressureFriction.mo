@@ -3,7 +3,7 @@ model PressureFriction "dry friction of the seal that grows with the pressure"
   extends Common.Friction.LoadDependent(v0=5e-4, mu(unit="m2", max=1e-3));
   annotation (
     __Workbench(effect(
-      size="mu", step=1e-7, matters=3e-7,
+      size="mu", matters=3e-7,
       separation="strokes at pressures from zero to the highest")),
     Documentation(info="<html>
 <p>The pressure behind a lip or a ring presses it to the wall, over a band of some width: <code>mu</code>

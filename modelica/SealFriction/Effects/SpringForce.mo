@@ -6,7 +6,7 @@ equation
   f = c*s;
   annotation (
     __Workbench(effect(
-      size="c", step=1.0, matters=12.0,
+      size="c", matters=12.0,
       separation="strokes without pressure")),
     Documentation(info="<html>
 <p>Hoses and cables that hang on the piston are one, too.</p>

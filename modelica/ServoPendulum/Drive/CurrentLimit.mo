@@ -3,7 +3,7 @@ model CurrentLimit "A current that is limited"
   extends Common.Signals.Saturation(width=0.05, high(unit="A", min=0.2, max=5.0), share(max=1.0));
   annotation (
     __Workbench(effect(
-      size="share", step=0.1, matters=0.1, shapes(high={1.0, 1.5}), slots={"current"},
+      size="share", matters=0.1, shapes(high={1.0, 1.5}), slots={"current"},
       hidden="in position mode such servos do not limit their current",
       separation="the torque with the shaft blocked, over the duty")),
     Documentation(info="<html>

@@ -7,7 +7,7 @@ equation
   y = u + RS*duty^2;
   annotation (
     __Workbench(effect(
-      size="RS", step=0.05, matters=0.05,
+      size="RS", matters=0.05,
       separation="the voltage at the servo with the shaft blocked, over the duty")),
     Documentation(info="<html>
 <p>A bridge that is on for the share <code>duty</code> of the time draws <code>duty*i</code> from its

@@ -9,7 +9,7 @@ equation
   y = u*(1.0 + rise*heat);
   annotation (
     __Workbench(effect(
-      size="rise", step=2e-3, matters=1e-3, shapes(tau={3.0, 30.0}),
+      size="rise", matters=1e-3, shapes(tau={3.0, 30.0}),
       separation="the current with the shaft blocked, at once and after ten seconds")),
     Documentation(info="<html>
 <p>Copper gains 0.39 % per kelvin; a winding of 2 g holds 0.8 J per kelvin, which is 0.005 per joule,

@@ -3,7 +3,7 @@ model DriveFriction "Dry friction of the gear that grows with the torque of the 
   extends Common.RotationalFriction.LoadDependent(v0=1e-4, mu(max=0.9));
   annotation (
     __Workbench(effect(
-      size="mu", step=5e-3, matters=0.01, slots={"driveFriction"}, after="LoadFriction",
+      size="mu", matters=0.01, slots={"driveFriction"}, after="LoadFriction",
       separation="lifting and lowering a weight at the same speed")),
     Documentation(info="<html>
 <p>The first stages of a gear turn fast and carry little but the motor's torque: a gear that is driven

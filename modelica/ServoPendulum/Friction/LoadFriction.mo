@@ -3,7 +3,7 @@ model LoadFriction "Dry friction of the gear that grows with the torque it carri
   extends Common.RotationalFriction.LoadDependent(v0=1e-4, mu(max=0.9));
   annotation (
     __Workbench(effect(
-      size="mu", step=5e-3, matters=0.01, slots={"friction"},
+      size="mu", matters=0.01, slots={"friction"},
       separation="the same motion with a heavier weight")),
     Documentation(info="<html>
 <p>The teeth carry the torque of the motor from one side and that of the weight from the other, which

@@ -8,7 +8,7 @@ equation
   f = mu*noEvent(abs(load))*exp(-(v/vS)^2)*tanh(v/v0);
   annotation (
     __Workbench(effect(
-      size="mu", step=5e-3, matters=0.01, shapes(vS={0.1, 1.0}), slots={"friction"},
+      size="mu", matters=0.01, shapes(vS={0.1, 1.0}), slots={"friction"},
       separation="the torque at which the shaft breaks away, with two weights")),
     Documentation(info="<html>
 <p><code>f = mu*|load|*exp(-(v/vS)^2)*tanh(v/v0)</code>: what <code>Stribeck</code> adds to dry friction,

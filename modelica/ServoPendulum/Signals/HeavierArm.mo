@@ -3,7 +3,7 @@ model HeavierArm "A pendulum that is heavier than its weight alone"
   extends Common.Signals.Gain(gain(min=-0.2, max=0.2));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.01, matters=0.02, slots={"weight"},
+      size="gain", matters=0.02, slots={"weight"},
       separation="a spring balance at the end of the level arm")),
     Documentation(info="<html>
 <p>The arm itself, screws, a length that was measured to the wrong point. With all else free, masses

@@ -6,7 +6,7 @@ equation
   y = u*(1.0 + gain);
   annotation (
     __Workbench(effect(
-      size="gain", step=0.05, matters=0.2, slots={"airResistance"},
+      size="gain", matters=0.2, slots={"airResistance"},
       separation="coasting in both directions")),
     Documentation(info="<html>
 <p>Wind, or a window that is open.</p>

@@ -6,7 +6,7 @@ equation
   y = u*(1.0 - loss);
   annotation (
     __Workbench(effect(
-      size="loss", step=0.02, matters=0.06,
+      size="loss", matters=0.06,
       separation="the material of the pads, read off them")),
     Documentation(info="<html>
 <p>Another material on the whole train.</p>

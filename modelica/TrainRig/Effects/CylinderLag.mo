@@ -14,7 +14,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="lag", step=0.02, matters=0.03,
+      size="lag", matters=0.03,
       separation="a gauge at a cylinder of the bogie")),
     Documentation(info="<html>
 <p>A narrowed pipe behind the valve: first order, exactly nothing at zero.</p>

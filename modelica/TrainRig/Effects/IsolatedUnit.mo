@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="lost", step=0.1, matters=0.1, slots={"brakeUnits"}, after="WeakPads",
+      size="lost", matters=0.1, slots={"brakeUnits"}, after="WeakPads",
       separation="a look at the cocks of the axle's brake units")),
     Documentation(info="<html>
 <p>Units are cut off whole: a size far from 1 is another cause. The other discs of the axle stay as warm as

@@ -6,7 +6,7 @@ equation
   y = u*(1.0 + gain);
   annotation (
     __Workbench(effect(
-      size="gain", step=0.02, matters=0.15, slots={"adhesion"},
+      size="gain", matters=0.15, slots={"adhesion"},
       separation="the rail, looked at; sand")),
     Documentation(info="<html>
 <p>It shows only near the limit of adhesion.</p>

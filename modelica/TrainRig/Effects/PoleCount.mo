@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="gain", step=0.0005, matters=0.001, slots={"speedSensor"}, after="WheelRadius",
+      size="gain", matters=0.001, slots={"speedSensor"}, after="WheelRadius",
       separation="the poles, counted")),
     Documentation(info="<html>
 <p>The reading is off by a share, as with a wrong wheel radius; no recording of speeds tells them

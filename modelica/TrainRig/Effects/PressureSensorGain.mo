@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="gain", step=0.02, matters=0.03,
+      size="gain", matters=0.03,
       separation="the reading beside a gauge")),
     Documentation(info="<html>
 <p>The cylinders have less than what is read. Weak pads on both axles of the bogie look alike.</p>

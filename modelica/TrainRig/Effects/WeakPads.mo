@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="loss", step=0.02, matters=0.04,
+      size="loss", matters=0.04,
       separation="the pads of the axle, looked at")),
     Documentation(info="<html>
 <p>Another material, oil, or wear that tilts the pads.</p>

@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="deviation", step=0.0002, matters=0.0005, slots={"radius"},
+      size="deviation", matters=0.0005, slots={"radius"},
       separation="the wheel, measured")),
     Documentation(info="<html>
 <p>A wheel that was turned and not entered. A wrong number of poles reads alike.</p>

@@ -9,7 +9,7 @@ equation
   der(kappa) = (1.0 - kappa)*abs(Fx*w)/Er;
   annotation (
     __Workbench(effect(
-      size="gain", step=0.05, matters=0.05,
+      size="gain", matters=0.05,
       shapes(Er={0.1e6, 0.25e6, 0.5e6}),
       separation="a slip sweep by the drive at constant speed, up and down")),
     Documentation(info="<html>

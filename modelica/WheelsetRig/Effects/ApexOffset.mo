@@ -9,7 +9,7 @@ equation
   y = u + 2.0*Q0/(rW + rR)*offset;
   annotation (
     __Workbench(effect(
-      size="offset", step=2e-4, matters=1.5e-4, after="FxOffset",
+      size="offset", matters=1.5e-4, after="FxOffset",
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
 <p><code>y = u + 2*Q0*offset/(rW + rR)</code>: both wheels lean on a slope, 138 N per mm on

@@ -10,7 +10,7 @@ equation
   der(contact) = tanh(Fperp/F0);
   annotation (
     __Workbench(effect(
-      size="loss", step=0.01, matters=0.01,
+      size="loss", matters=0.01,
       shapes(tau={0.7, 1.4, 2.0, 3.0}),
       separation="dry stops from two pressures: time against energy")),
     Documentation(info="<html>

@@ -18,7 +18,7 @@ equation
   C*der(T) = share*mu*Fperp*abs(v) - cooling*(T - TAmbient);
   annotation (
     __Workbench(effect(
-      size="fade", step=3e-5, matters=3e-5,
+      size="fade", matters=3e-5,
       separation="stops repeated without cooling, then one after 20 minutes")),
     Documentation(info="<html>
 <p><code>mu = level*(1 - fade*(T - TRef))</code>, fade 0 to 1e-3 per kelvin. The disc is one lump of

@@ -22,7 +22,7 @@ equation
   rest = restBefore;
   annotation (
     __Workbench(effect(
-      size="share", step=0.01, matters=0.02,
+      size="share", matters=0.02,
       falling(signal="pB", because="brake pressure never falls in these stops"),
       separation="drag braking at constant roller speed, with a staircase of pressure up and down")),
     Documentation(info="<html>

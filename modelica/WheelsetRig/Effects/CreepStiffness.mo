@@ -4,7 +4,7 @@ model CreepStiffness "A contact softer or stiffer than Kalker's theory"
   extends Common.Signals.Gain(gain(min=-0.9, max=1.0));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.01, matters=0.02,
+      size="gain", matters=0.02,
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
 <p><code>y = u*(1 + gain)</code>: a layer between wheel and roller. Equal to a gain of

@@ -8,7 +8,7 @@ equation
   rest = restBefore;
   annotation (
     __Workbench(effect(
-      size="lag", step=0.005, matters=0.003,
+      size="lag", matters=0.003,
       separation="a sine on the pressure at constant speed")),
     Documentation(info="<html>
 <p>10 to 100 ms between sensor and cylinder are usual.</p>

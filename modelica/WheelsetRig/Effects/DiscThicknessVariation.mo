@@ -11,7 +11,7 @@ equation
   der(phi) = v/rB;
   annotation (
     __Workbench(effect(
-      size={"cosine", "sine"}, step=0.002, matters=0.001,
+      size={"cosine", "sine"}, matters=0.001,
       separation="order tracking in a slow run-down, with and without brake")),
     Documentation(info="<html>
 <p><code>mu = level*(1 + cosine*cos(n*phi) + sine*sin(n*phi))</code>, <code>der(phi) = v/rB</code>.

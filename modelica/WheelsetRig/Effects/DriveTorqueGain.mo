@@ -6,7 +6,7 @@ equation
   y = u/(1.0 + gain);
   annotation (
     __Workbench(effect(
-      size="gain", step=0.002, matters=0.002,
+      size="gain", matters=0.002,
       separation="a run-up with the wheelset lifted, and dead weights on the load cells")),
     Documentation(info="<html>
 <p><code>y = u/(1 + gain)</code>: the reading is the true torque times <code>1 +

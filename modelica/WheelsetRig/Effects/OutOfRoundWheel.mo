@@ -10,7 +10,7 @@ equation
   der(phi) = omega;
   annotation (
     __Workbench(effect(
-      size={"cosine", "sine"}, step=2e-5, matters=1e-5,
+      size={"cosine", "sine"}, matters=1e-5,
       separation="order tracking in a slow run-down, with and without brake")),
     Documentation(info="<html>
 <p><code>y = u + cosine*cos(n*phi) + sine*sin(n*phi)</code>, order 1: 0.05 to 0.5 mm, 2

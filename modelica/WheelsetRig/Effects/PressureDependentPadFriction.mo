@@ -8,7 +8,7 @@ equation
   mu = level*(noEvent(max(Fperp, FMin))/FRef)^(-exponent);
   annotation (
     __Workbench(effect(
-      size="exponent", step=0.005, matters=0.004,
+      size="exponent", matters=0.004,
       separation="drag braking at constant roller speed, with a staircase of pressure up and down")),
     Documentation(info="<html>
 <p><code>mu = level*(Fperp/FRef)^(-exponent)</code>, exponent 0 to 0.10: the area of true contact

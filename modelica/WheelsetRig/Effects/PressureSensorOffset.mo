@@ -7,7 +7,7 @@ equation
   rest = restBefore + offset;
   annotation (
     __Workbench(effect(
-      size="offset", step=500.0, matters=500.0,
+      size="offset", matters=500.0,
       separation="its reading on a vented cylinder")),
     Documentation(info="<html>
 <p><code>p = pB - offset</code>; with an empty cylinder the sensor reads <code>offset</code>, which

@@ -8,7 +8,7 @@ equation
   rest = restBefore;
   annotation (
     __Workbench(effect(
-      size="increase", step=500.0, matters=500.0,
+      size="increase", matters=500.0,
       separation="the pressure of first contact, read at standstill")),
     Documentation(info="<html>
 <p><code>p = pB - increase</code>: a constant loss of force while the pads touch. The contact

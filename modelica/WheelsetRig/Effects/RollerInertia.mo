@@ -4,7 +4,7 @@ model RollerInertia "An inertia of the roller other than nominal"
   extends Common.Signals.Gain(gain(min=-0.05, max=0.05));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.005, matters=0.002, after="FxGain",
+      size="gain", matters=0.002, after="FxGain",
       separation="a spin-down of the roller alone, the drive off")),
     Documentation(info="<html>
 <p><code>y = u*(1 + gain)</code>. A drive that imitates a train takes a torque that goes with

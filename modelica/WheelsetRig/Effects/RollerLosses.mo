@@ -7,7 +7,7 @@ equation
   tau = (1.0 + gain)*known.tau;
   annotation (
     __Workbench(effect(
-      size="gain", step=0.1, matters=0.1, slots={"rollerLoss"},
+      size="gain", matters=0.1, slots={"rollerLoss"},
       separation="a long coast-down without brake, in both directions")),
     Documentation(info="<html>
 <p><code>tau = (1 + gain)*known.tau</code>. Estimates of bearings and windage are good to a factor

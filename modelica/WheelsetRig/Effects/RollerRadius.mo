@@ -6,7 +6,7 @@ equation
   y = u + delta;
   annotation (
     __Workbench(effect(
-      size="delta", step=2e-4, matters=1e-4,
+      size="delta", matters=1e-4,
       separation="a tape measure on wheel and roller")),
     Documentation(info="<html>
 <p><code>y = u + delta</code>. Shows while coasting as a ratio of the speeds, as a wheel

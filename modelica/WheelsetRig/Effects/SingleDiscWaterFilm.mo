@@ -3,7 +3,7 @@ model SingleDiscWaterFilm "Water on one disc, until its friction has dried it"
   extends WaterFilm(wet=1.0/3.0);
   annotation (
     __Workbench(effect(
-      size="film", step=0.1, matters=0.05,
+      size="film", matters=0.05,
       shapes(E0={0.1e6, 0.3e6, 0.45e6, 1e6}),
       unless(condition="discs", is="wet",
         because="the conditions of the stops say which discs are wet"),

@@ -8,7 +8,7 @@ equation
   mu = level*(1.0 + slope*(1.0 - abs(v)/vRef));
   annotation (
     __Workbench(effect(
-      size="slope", step=0.02, matters=0.01,
+      size="slope", matters=0.01,
       separation="drag braking at constant roller speed, with a staircase of pressure up and down")),
     Documentation(info="<html>
 <p><code>mu = level*(1 + slope*(1 - |v|/vRef))</code>. Organic pads rub harder at low speed: slope

@@ -15,7 +15,7 @@ equation
   der(E) = (level - loss)*Fperp*abs(v);
   annotation (
     __Workbench(effect(
-      size="film", step=0.03, matters=0.02,
+      size="film", matters=0.02,
       shapes(E0={0.1e6, 0.3e6, 0.45e6, 1e6}),
       where(condition="discs", is="wet", share="wet"),
       separation="venting the brake units one by one")),

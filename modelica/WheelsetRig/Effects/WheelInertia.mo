@@ -4,7 +4,7 @@ model WheelInertia "An inertia of the wheelset other than nominal"
   extends Common.Signals.Gain(gain(min=-0.5, max=0.5));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.05, matters=0.2,
+      size="gain", matters=0.2,
       hidden="stops without slides show less of it than noise of the torque fakes",
       separation="a lifted spin-down")),
     Documentation(info="<html>

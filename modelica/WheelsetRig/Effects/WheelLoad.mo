@@ -4,7 +4,7 @@ model WheelLoad "A wheel load other than nominal"
   extends Common.Signals.Gain(gain(min=-0.3, max=0.3));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.01, matters=0.02,
+      size="gain", matters=0.02,
       separation="a step of the vertical load by 10 %")),
     Documentation(info="<html>
 <p><code>y = u*(1 + gain)</code>. Changes adhesion in proportion and the stiffness of the

@@ -6,7 +6,7 @@ equation
   y = u + delta;
   annotation (
     __Workbench(effect(
-      size="delta", step=1e-4, matters=5e-5,
+      size="delta", matters=5e-5,
       separation="a tape measure on wheel and roller")),
     Documentation(info="<html>
 <p><code>y = u + delta</code>; wear takes up to 35 mm. Shows while coasting as a ratio of

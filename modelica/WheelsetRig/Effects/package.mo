@@ -9,9 +9,8 @@ bound it for a fit. Errors of sensors are in <code>Sensors</code>.</p>
 <ul>
 <li><code>size</code>: the parameter that is zero in the nominal model, or <code>{\"cosine\",
 \"sine\"}</code> of an effect that turns with a shaft;</li>
-<li><code>step</code>: a small change of it that is clearly visible; <code>matters</code>: the least
-size worth a finding; <code>separation</code>: the experiment that tells the effect from its
-twins;</li>
+<li><code>matters</code>: the least size worth a finding; <code>separation</code>: the experiment that
+tells the effect from its twins;</li>
 <li><code>shapes(p={...})</code>: other parameters to fit, with values to try;
 <code>hidden</code>: why recorded stops cannot show it;</li>
 <li><code>where(condition, is, share)</code>: it is only in stops whose condition is so, if any is;

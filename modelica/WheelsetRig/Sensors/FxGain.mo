@@ -4,7 +4,7 @@ model FxGain "Load cells with a wrong gain"
   extends Common.Signals.Gain(gain(min=-0.1, max=0.1));
   annotation (
     __Workbench(effect(
-      size="gain", step=0.002, matters=0.002,
+      size="gain", matters=0.002,
       separation="a run-up with the wheelset lifted, and dead weights on the load cells")),
     Documentation(info="<html>
 <p>0.1 to 1 % after calibration.</p>

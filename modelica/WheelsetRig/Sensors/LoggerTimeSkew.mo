@@ -8,7 +8,7 @@ equation
   y = late.y;
   annotation (
     __Workbench(effect(
-      size="skew", step=0.001, matters=0.001, slots={"speedSensorW", "speedSensorR"},
+      size="skew", matters=0.001, slots={"speedSensorW", "speedSensorR"},
       separation="a step of the drive's torque, compared with steady braking")),
     Documentation(info="<html>
 <p>As <code>SpeedSignalDelay</code>, for each sensor on the same logger: all of them have the same

@@ -10,7 +10,7 @@ equation
   der(phi) = u;
   annotation (
     __Workbench(effect(
-      size={"cosine", "sine"}, step=1e-4, matters=5e-5, slots={"speedSensorW"},
+      size={"cosine", "sine"}, matters=5e-5, slots={"speedSensorW"},
       separation="order tracking in a slow run-down, with and without brake")),
     Documentation(info="<html>
 <p><code>y = u*(1 + cosine*cos(n*phi) + sine*sin(n*phi))</code>. An eccentricity of 0.05

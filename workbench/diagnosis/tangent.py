@@ -1,0 +1,204 @@
+"""Derivatives of a simulation by parameters, made beside it.
+
+What a small change of a parameter does to the motion obeys the model's equations, linearised along
+the motion: dS/dt = df/dx S + df/dp. They are stepped as the motion is, by the FMU's directional
+derivatives, for all parameters at once.
+Source: E. Hairer, S. P. Norsett, G. Wanner (1993), Solving Ordinary Differential Equations I,
+section I.14.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.fmu import FMU, Matrix, References, Vector
+from workbench.kernel import Instance, compiled, differentiate, direction, solve
+
+_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+
+
+class Tangent(NamedTuple):
+    """Derivatives by p columns, and work space.
+
+    Attributes
+    ----------
+    knowns, edges, seeds : (r,) parameters of all columns, (p + 1,) where each column's begin, (r,)
+        ones.
+    states : (n, p) derivatives of the states.
+    errors : (k, c, p) derivatives of the prediction errors of each sample.
+    turn : (1,) which of two points is the present one; the other is where a step begins.
+    by_columns : (2, p, n + c) derivatives of the rates and the predicted outputs by the columns.
+    entries, rows, by, slopes : (2,) and (2, n * (n + c)) those by the states that are not zero: how
+        many, of what, by which.
+    """
+
+    knowns: References
+    edges: NDArray[np.intp]
+    seeds: Vector
+    states: Matrix
+    errors: NDArray[np.float64]
+    turn: NDArray[np.intp]
+    by_columns: NDArray[np.float64]
+    entries: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    by: NDArray[np.intp]
+    slopes: Matrix
+    first: Matrix
+    second: Matrix
+    moved: Matrix
+    rates: Matrix
+    system: Matrix
+
+
+def tangent(
+    fmu: FMU,
+    model: Instance,
+    columns: Sequence[Sequence[str]],
+    samples: int,
+    stiff: int,
+) -> Tangent:
+    """Prepare derivatives for a run.
+
+    Parameters
+    ----------
+    columns : variables of the FMU that each column varies together, of a state its start.
+    samples : of the run.
+    stiff : number of states that are stepped implicitly.
+    """
+    n, p, c = len(fmu.states), len(columns), model.y.size
+    acting = [[name for name in column if name not in fmu.states] for column in columns]
+    names = [name for column in acting for name in column]
+    begin = [[float(state in column) for column in columns] for state in fmu.states]
+    return Tangent(
+        fmu.variables(names).references,
+        np.cumsum([0, *(len(column) for column in acting)]),
+        np.ones(len(names)),
+        np.reshape(begin, (n, p)),
+        np.zeros((samples if p else 1, c, p)),
+        np.zeros(1, np.intp),
+        np.zeros((2, p, n + c)),
+        np.zeros(2, np.intp),
+        *(np.zeros((2, n * (n + c)), np.intp), np.zeros((2, n * (n + c)), np.intp)),
+        np.zeros((2, n * (n + c))),
+        *(np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p))),
+        np.zeros((stiff, stiff + p)),
+    )
+
+
+@compiled
+def renew(model, tangent):  # type: ignore[no-untyped-def]
+    """Take the derivatives of the model at the present point; returns a status.
+
+    The point before is where a step begins.
+    """
+    n, p = tangent.states.shape
+    unknowns = n + tangent.errors.shape[1]
+    now, found = 1 - tangent.turn[0], 0
+    tangent.turn[0] = now
+    for j in range(n):
+        if differentiate(model, j, unknowns):
+            return 1
+        for i in range(unknowns):
+            slope = model.jacobian[j, i]
+            if slope != 0.0:
+                tangent.rows[now, found] = i
+                tangent.by[now, found] = j
+                tangent.slopes[now, found] = slope
+                found += 1
+    tangent.entries[now] = found
+    for q in range(p):
+        first = tangent.edges[q]
+        knowns, seeds = tangent.knowns[first:], tangent.seeds[first:]
+        number = tangent.edges[q + 1] - first
+        if number and direction(model, knowns, number, seeds, tangent.by_columns[now, q], unknowns):
+            return 1
+    return 0
+
+
+@compiled
+def _product(tangent, at, states, first, result):  # type: ignore[no-untyped-def]
+    """Derivatives of rates or outputs from number `first` on, by way of the states and directly."""
+    p, size = states.shape[1], result.shape[0]
+    by_columns = tangent.by_columns[at]
+    for i in range(size):
+        for q in range(p):
+            result[i, q] = by_columns[q, first + i]
+    for k in range(tangent.entries[at]):
+        i, j, slope = tangent.rows[at, k] - first, tangent.by[at, k], tangent.slopes[at, k]
+        if 0 <= i < size:
+            for q in range(p):
+                result[i, q] += slope * states[j, q]
+
+
+@compiled
+def _solved(model, tangent, stiff, h, k):  # type: ignore[no-untyped-def]
+    """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
+    a, system, s = model.jacobian, tangent.system, stiff.size
+    if s == 0:
+        return 0
+    for r in range(s):
+        for c in range(s):
+            system[r, c] = -_GAMMA * h * a[stiff[c], stiff[r]]
+        system[r, r] += 1.0
+        for q in range(k.shape[1]):
+            system[r, s + q] = k[stiff[r], q]
+    status = solve(system)
+    for c in range(s):
+        for i in range(k.shape[0]):
+            slope = _GAMMA * h * a[stiff[c], i]
+            if slope != 0.0:
+                for q in range(k.shape[1]):
+                    k[i, q] += slope * system[c, s + q]
+    for r in range(s):
+        for q in range(k.shape[1]):
+            k[stiff[r], q] = system[r, s + q]
+    return status
+
+
+@compiled
+def advance(model, tangent, stiff, h):  # type: ignore[no-untyped-def]
+    """Advance the derivatives of the states over a step of h [s] that ended here; a status.
+
+    The method of `steps.step`, for equations that are linear.
+    """
+    if renew(model, tangent):
+        return 1
+    n, p = tangent.states.shape
+    now, before, size = tangent.turn[0], 1 - tangent.turn[0], n * p
+    S, K1, K2, M = tangent.states, tangent.first, tangent.second, tangent.moved
+    s, k1, k2, moved = S.reshape(size), K1.reshape(size), K2.reshape(size), M.reshape(size)
+    rates = tangent.rates.reshape(size)
+    _product(tangent, before, S, 0, K1)
+    for i in range(size):
+        moved[i] = s[i] + h * k1[i]
+    for i in stiff:
+        for q in range(p):
+            M[i, q] = S[i, q]
+    _product(tangent, now, M, 0, tangent.rates)
+    for i in range(size):
+        k2[i] = _GAMMA * (rates[i] - k1[i])
+        k1[i] += k2[i]
+    status = _solved(model, tangent, stiff, h, K1)
+    for i in range(size):
+        moved[i] = s[i] + h * k1[i]
+    _product(tangent, now, M, 0, tangent.rates)
+    for i in range(size):
+        k2[i] = rates[i] - 2.0 * k1[i] - k2[i]
+    status = status or _solved(model, tangent, stiff, h, K2)
+    for i in range(size):
+        s[i] += h * (1.5 * k1[i] + 0.5 * k2[i])
+    return status
+
+
+@compiled
+def tell(tangent, k):  # type: ignore[no-untyped-def]
+    """Derivatives of the prediction errors of sample k, where the model was differentiated."""
+    errors = tangent.errors[k]
+    n = tangent.states.shape[0]
+    _product(tangent, tangent.turn[0], tangent.states, n, errors)
+    for i in range(errors.shape[0]):
+        for q in range(errors.shape[1]):
+            errors[i, q] = -errors[i, q]
