@@ -1,6 +1,7 @@
 """Files of a predicted distance: distance.json, three tables, a figure."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
     write_json(out / "distance.json", {**found.to_dict(), "provenance": provenance})
     tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
     if found.safety is not None:
-        tables["safety"] = pd.DataFrame(found.safety.rows())
+        tables["safety"] = pd.DataFrame(map(asdict, found.safety.levels))
     for name, table in tables.items():
         write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
     figure = out / "distance.png"
@@ -85,9 +86,8 @@ def _past(axes: Axes, past: tuple[PastStop, ...]) -> None:
 
 
 def _levels(axes: Axes, safety: Safety) -> None:
-    rows = list(safety.rows())
-    decades = np.array([row["decade"] for row in rows])
-    ratio, low, high = (np.array([row[key] for row in rows]) for key in ("ratio", "low", "high"))
+    decades = np.array([one.decade for one in safety.levels])
+    ratio, low, high = np.array([(one.ratio, one.low, one.high) for one in safety.levels]).T
     axes.errorbar(
         *(decades, ratio),
         yerr=np.maximum(0.0, [ratio - low, high - ratio]),
@@ -103,4 +103,4 @@ def _levels(axes: Axes, safety: Safety) -> None:
         ylabel="ratio",
     )
     axes.title.set_fontsize(9)
-    axes.set_xticks(decades, [f"1e{k:.0f}" for k in decades])
+    axes.set_xticks(decades, [f"1e{k}" for k in decades])

@@ -5,7 +5,7 @@ past stops -> levels and how sure they are -> the model, drawn many times -> dis
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
 from workbench.fmu import Matrix
 from workbench.pool import Pool
-from workbench.rare_events import Level, Tail
+from workbench.rare_events import Descent, Tail
 from workbench.stopping.forecast import (
     Forecaster,
     Question,
@@ -28,11 +28,12 @@ from workbench.stopping.forecast import (
 from workbench.stopping.outcome import Distance, Forecast, PastStop, Safety
 from workbench.stopping.past import Past, fitted, places
 from workbench.stopping.recorded import Recorded, Stop, asked_stop, recorded
-from workbench.stopping.standard import equivalent_rate
 from workbench.system import System
 from workbench.system_distance import SPEED, Stopping
 
 __all__ = ["Distance", "Effort", "distance_of_stop"]
+
+_RUNS = 8  # of subset simulation: the scatter of fewer says little, and processors share them
 
 
 @dataclass(frozen=True)
@@ -42,19 +43,23 @@ class Effort:
     Attributes
     ----------
     samples : of the distribution that is asked for.
-    checked : of that of each past stop, by the others.
     decades : down to which the safety level goes; 0: none is asked for.
-    runs : of subset simulation, two or more, from whose scatter its intervals are.
-    each : samples of a decade of a run, a multiple of ten.
     seed : the same of which gives the same numbers.
     """
 
     samples: int = 4000
-    checked: int = 1000
     decades: int = 9
-    runs: int = 8
-    each: int = 2000
     seed: int = 1
+
+    @property
+    def checked(self) -> int:
+        """Samples of a past stop by the others: there are many, and 95 % need fewer than tails."""
+        return max(1, self.samples // 4)
+
+    @property
+    def each(self) -> int:
+        """Samples of a decade of a run of subset simulation, a multiple of ten."""
+        return max(1, self.samples // 20) * 10
 
 
 def distance_of_stop(
@@ -169,30 +174,26 @@ class _Forecasts:
         effort = self._effort
         if not effort.decades:
             return None, False
-        speed, response = question.stop.asked[SPEED], self._stopping.response
-        rate = equivalent_rate(speed, response, nominal)
-        runs: list[tuple[tuple[Level, ...], float]] = []
         interrupted = False
-        given = (question, rate, effort.decades, effort.each)
+        counted = Pace(self._report, "runs of subset simulation").part(_RUNS)
+        under_way: list[Future[tuple[Descent, float]]] = []
         try:
-            counted = Pace(self._report, "runs of subset simulation").part(effort.runs)
-            under_way = [
-                self._pool.submit(Forecaster.descent, *given, 1000 * effort.seed + number)
-                for number in range(effort.runs)
-            ]
-            for one in under_way:
-                one.add_done_callback(counted)
-            for one in under_way:
-                runs.append(one.result())
+            for number in range(_RUNS):
+                given = question, effort.decades, effort.each, 1000 * effort.seed + number
+                under_way.append(self._pool.submit(Forecaster.descent, *given))
+                under_way[-1].add_done_callback(counted)
+            wait(under_way)
         except KeyboardInterrupt:
             interrupted = True
             for one in under_way:
                 one.cancel()
-        if len(runs) < 2:
+        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+        if len(done) < 2:
             return None, interrupted
-        tail = Tail(tuple(levels for levels, _ in runs), effort.each)
-        spent = sum(one for _, one in runs) / tail.evaluations
-        return Safety(tail, rate, spent), interrupted
+        tail = Tail(tuple(run for run, _ in done), question.addend)
+        spent = sum(one for _, one in done) / tail.evaluations
+        speed, response = question.stop.asked[SPEED], self._stopping.response
+        return Safety.of(tail, effort.decades, speed, response, nominal, spent), interrupted
 
 
 def _forecast(drawn: tuple[Matrix, float]) -> Forecast:

@@ -10,17 +10,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtr
 from scipy.stats import norm, t
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.rare_events import Level, descend
+from workbench.rare_events import Descent, descend
 from workbench.stopping.past import Known, places
 from workbench.stopping.recorded import Stop, beyond
-from workbench.stopping.standard import equivalent_rate
 from workbench.stopping.way import Drive, Halt, Stops
 from workbench.system import System
-from workbench.system_distance import SPEED, Difference, Stopping
+from workbench.system_distance import Difference, Stopping
 from workbench.systems import open_model
 
 
@@ -40,6 +40,11 @@ class Question:
     known: Known
     left: float
     freedom: int
+
+    def addend(self, x: Vector) -> Vector:
+        """Cumulative distribution of what the model leaves of a logarithm, (n,) of (n,)."""
+        found: Vector = stdtr(self.freedom, x / self.left)
+        return found
 
     def certain(self) -> "Question":
         """The same if the machine and its model were known, so that it only differs by nature."""
@@ -89,33 +94,22 @@ class Forecaster:
         return np.array([one.distance * left for one, left in self._halts(question, points)])
 
     def descent(
-        self, question: Question, nominal: float, decades: int, samples: int, seed: int
-    ) -> tuple[tuple[Level, ...], float]:
-        """Lower tail of the equivalent deceleration over a nominal one; see `descend`.
+        self, question: Question, decades: int, samples: int, seed: int
+    ) -> tuple[Descent, float]:
+        """Lower tail of minus the logarithm of the distance, but for what the model leaves.
 
         Returns
         -------
-        levels : decade by decade.
+        run : see `descend`.
         spent : processor time of it all [s].
         """
-        begin = time.process_time()
+        begin, drawn = time.process_time(), replace(question, left=0.0)
 
-        def relative(points: Matrix) -> Vector:
-            ratios: Vector = self._rates(question, points) / nominal
-            return ratios
+        def shortness(points: Matrix) -> Vector:
+            return -np.log(self.distances(drawn, points))
 
         count = dimension(question, self._system, self._stopping)
-        return descend(relative, count, decades, samples, seed), time.process_time() - begin
-
-    def _rates(self, question: Question, points: Matrix) -> Vector:
-        """Equivalent decelerations, (n,) [m/s2]."""
-        speed, response = question.stop.asked[SPEED], self._stopping.response
-        return np.array(
-            [
-                equivalent_rate(speed, response, one)
-                for one in self.distances(question, points).tolist()
-            ]
-        )
+        return descend(shortness, count, decades, samples, seed), time.process_time() - begin
 
     def _halts(self, question: Question, points: Matrix) -> Iterator[tuple[Halt, float]]:
         """Stops, and factors of their distances for what the model leaves."""

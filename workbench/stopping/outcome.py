@@ -1,10 +1,9 @@
 """The distance of a stop as a value: sentences, numbers, tables, a figure."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import pandas as pd
@@ -100,37 +99,73 @@ class PastStop:
         return low <= self.recorded.distance <= high
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
+class SafetyLevel:
+    """A deceleration that all but one stop in so many reach.
+
+    Attributes
+    ----------
+    decade : of that number.
+    ratio : of it to the nominal one; low, high : between which it is, 95 %.
+    variation : coefficient of variation of the probability.
+    plain_stops : of plain sampling that tell as much; plain_hours : processor time.
+    """
+
+    decade: int
+    ratio: float
+    low: float
+    high: float
+    variation: float
+    plain_stops: float
+    plain_hours: float
+
+
+@dataclass(frozen=True)
 class Safety:
     """Decelerations that are reached with all but a small probability.
 
     Attributes
     ----------
-    tail : of the equivalent deceleration over the nominal one.
+    levels : by decade.
     nominal : equivalent deceleration of the model as its sheet says it [m/s2].
-    spent : processor time of a stop [s].
+    stops : that were drawn; spent : processor time of each [s].
     """
 
-    tail: Tail
+    levels: tuple[SafetyLevel, ...]
     nominal: float
+    stops: int
     spent: float
 
-    def rows(self) -> Iterator[dict[str, float]]:
-        """By decade: what is reached, how sure, and what plain sampling would take."""
-        for k in range(1, self.tail.decades + 1):
-            low, high = self.tail.interval(k)
-            variation = self.tail.variation(k)
-            runs = plain_runs(self.tail.probability(k), variation)
-            yield {
-                "decade": k,
-                "confidence": 1.0 - self.tail.probability(k),
-                "ratio": self.tail.value(k),
-                "low": low,
-                "high": high,
-                "variation": variation,
-                "plain_stops": runs,
-                "plain_hours": runs * self.spent / 3600.0,
-            }
+    @classmethod
+    def of(
+        cls,
+        tail: Tail,
+        decades: int,
+        speed: float,
+        response: float,
+        nominal: float,
+        spent: float,
+    ) -> Self:
+        """From the lower tail of minus the logarithm of the distance.
+
+        Parameters
+        ----------
+        speed : at the command [m/s]; response [s].
+        nominal : distance [m].
+        """
+        rate = equivalent_rate(speed, response, nominal)
+
+        def ratio(shortness: float) -> float:
+            return equivalent_rate(speed, response, math.exp(-shortness)) / rate
+
+        levels = []
+        for decade in range(1, decades + 1):
+            found = tail.quantile(decade)
+            plain = plain_runs(found.probability, found.variation)
+            value, low, high = (ratio(one) for one in (found.value, found.low, found.high))
+            hours = plain * spent / 3600.0
+            levels.append(SafetyLevel(decade, value, low, high, found.variation, plain, hours))
+        return cls(tuple(levels), rate, tail.evaluations, spent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,7 +347,7 @@ class Distance:
             "nominal": {"distance": self.nominal, "deceleration": self.rate(self.nominal)},
             "outside": self.ahead.outside,
             "width": self.ahead.width,
-            "safety": None if self.safety is None else list(self.safety.rows()),
+            "safety": None if self.safety is None else [asdict(one) for one in self.safety.levels],
             "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
             "held": {"of": len(self.claimed), "stops": sum(one.held for one in self.claimed)},
             "warnings": self.warnings,
@@ -340,14 +375,12 @@ def _told(safety: Safety) -> list[str]:
     """Lines on the safety level."""
     lines = [
         f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one stop in "
-        f"so many reach; {safety.tail.evaluations} stops drawn, {1e3 * safety.spent:.2g} ms each:",
+        f"so many reach; {safety.stops} stops drawn, {1e3 * safety.spent:.2g} ms each:",
         "  one in     ratio    95 %               variation   by plain sampling",
     ]
-    for row in safety.rows():
-        band = f"{row['low']:.4f} to {row['high']:.4f}"
-        plain = f"{row['plain_stops']:.1e} stops, {row['plain_hours']:.1e} h"
+    for one in safety.levels:
         lines.append(
-            f"  1e{row['decade']:<6.0f} {row['ratio']:7.4f}    {band}   {row['variation']:8.3f}"
-            f"    {plain}"
+            f"  1e{one.decade:<6} {one.ratio:7.4f}    {one.low:.4f} to {one.high:.4f}"
+            f"   {one.variation:8.3f}    {one.plain_stops:.1e} stops, {one.plain_hours:.1e} h"
         )
     return lines
