@@ -31,6 +31,7 @@ from workbench.stopping.standard import (
 )
 from workbench.system import OBSERVER, System
 from workbench.system_distance import Stopping
+from workbench.system_file import read_system
 from workbench.systems import load_system
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
@@ -365,3 +366,46 @@ def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None
         assert one.forecast.width < 1.3
     assert len(held) == 40
     assert np.mean(held) >= 0.93
+
+
+# --- what a system file says of stops ---
+
+OWN = Path(__file__).parent.parent / "modelica" / "TrainRig" / "system.toml"
+MISTAKES = {
+    "nothing that rises": (
+        ('timed_by = "pB1"', 'timed_by = "mass1"'),
+        r"\[distance\] timed_by: found 'mass1'.* expected an input that rises",
+    ),
+    "no state": (
+        ('state = "vTrain"', 'state = "omegaReading[1]"'),
+        r"\[distance\] state: found 'omegaReading\[1\]'.* expected a continuous state",
+    ),
+    "what is not asked": (
+        ('vTrain = "speed"', 'vTrain = "sped"'),
+        r"start vTrain: found 'sped' \(closest: 'speed'\); expected an asked quantity",
+    ),
+    "an input without a word": (
+        ('mass1 = { is = "mass1" }\n', ""),
+        r"inputs: found no 'mass1'",
+    ),
+    "two spreads": (
+        ("share = 0.01", "spread = 100.0\nshare = 0.01"),
+        r"differs\]\] 2: found 'spread' and 'share'; expected one of the two",
+    ),
+    "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected command or end"),
+    "no speed": (
+        ("[distance.asked.speed]", "[distance.asked.velocity]"),
+        r"expected a table 'speed' in m/s",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_what_is_said_of_stops_is_refused(mistake: str, tmp_path: Path) -> None:
+    (old, new), message = MISTAKES[mistake]
+    text = OWN.read_text().replace("../../fmus", str(OWN.parents[2] / "fmus"))
+    assert old in text
+    path = tmp_path / "system.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=message):
+        read_system(path)

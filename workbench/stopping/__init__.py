@@ -117,11 +117,10 @@ class _Forecasts:
         self._system, self._stopping = system, stopping
         self._made, self._past, self._effort = made, past, effort
         self._pool, self._report = pool, report
-        known = past.known()
         own = []
         for one, values in zip(made, past.own, strict=True):
-            at = places(known.keys, system, one.stop.conditions)
-            own.append({**{name: float(known.mean[j]) for name, j in at.items()}, **values})
+            at = places(past.joint.shared, system, one.stop.conditions)
+            own.append({**{name: float(past.mean[j]) for name, j in at.items()}, **values})
         halts = [
             pool.submit(Forecaster.halt, one.stop, values)
             for one, values in zip(made, own, strict=True)
