@@ -19,8 +19,8 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.observers.gains import matrix_names
-from workbench.report.page import standings
-from workbench.report.results import label
+from workbench.report.answers import standings
+from workbench.report.views import label
 from workbench.system import System
 
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")

@@ -16,9 +16,9 @@ from numpy.testing import assert_allclose
 from workbench.case import Case
 from workbench.observers import choose
 from workbench.report import case_figure, summarise_runs, write_estimates, write_page
+from workbench.report.answers import standings
 from workbench.report.drawing import extremes
 from workbench.report.figures import DARK, LIGHT
-from workbench.report.page import standings
 from workbench.simulation import CaseResult, prepare
 from workbench.system import System
 

@@ -1,15 +1,46 @@
-"""What made a result: versions of the software, and the models by their hash."""
+"""What made a result: command, date, versions of the software, models and data by their hash."""
 
+import hashlib
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
+from workbench.case import Case
 from workbench.resources import CHECKOUT
 from workbench.system import System
 from workbench.systems import open_model
+
+
+def run_of(command: str, system: System, data: Mapping[str, Path]) -> dict[str, Any]:
+    """Who asks when, of what, for what: the same of every command.
+
+    Parameters
+    ----------
+    data : files that were read, by recording; one that is none has no hash.
+    """
+    hashes = {
+        name: hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+        for name, path in data.items()
+    }
+    return {
+        "command": command,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "workbench": version("wheelset-workbench"),
+        "commit": commit(),
+        "system": system.name,
+        "title": system.title,
+        "data": hashes,
+    }
+
+
+def sources(cases: Iterable[Case]) -> dict[str, Path]:
+    """Files of recordings, by their names."""
+    return {case.name: case.source for case in cases}
 
 
 def software(packages: Sequence[str]) -> dict[str, Any]:

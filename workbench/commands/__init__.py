@@ -10,6 +10,7 @@ COMMANDS = {
     "observability": "show when states and estimated quantities can be observed",
     "export": "write an observer as an FMU and an SSP package",
     "fmu": "build, describe and check FMUs",
+    "results": "say what a folder of results holds, and compare two",
     "systems": "list the systems that are installed",
     "import": "turn files of recorders into case folders",
     "prepare": "turn published recordings of a system into case folders",

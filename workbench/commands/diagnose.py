@@ -14,6 +14,7 @@ from workbench.diagnosis import Effect, choose, diagnose, read_effects
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import Library, read_library
+from workbench.provenance import run_of, sources
 from workbench.report.diagnosis import write_diagnosis
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
@@ -72,6 +73,7 @@ def _run(
     )
     with open_model(system) as model:
         provenance = {
+            "run": run_of("diagnose", system, sources([*cases, *held_out])),
             "workbench": version("wheelset-workbench"),
             "system": system.name,
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},

@@ -12,6 +12,7 @@ from workbench.diagnosis.rivals import Rivals, read_rivals
 from workbench.errors import InputError
 from workbench.experiments import next_stop
 from workbench.files import claimed
+from workbench.provenance import run_of
 from workbench.recording import read_text
 from workbench.report.next_stop import write_next_stop
 from workbench.systems import load_system
@@ -29,6 +30,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     with claimed(options.out):
         found = next_stop(system, rivals, options.workers, output.stage)
         provenance = {
+            "run": run_of("next", system, {"diagnosis": file}),
             "workbench": version("wheelset-workbench"),
             "system": system.name,
             "diagnosis": str(options.result),

@@ -14,7 +14,7 @@ from workbench.files import claimed
 from workbench.fmu import Vector
 from workbench.observability import CaseObservability, case_observability, linear_test
 from workbench.pool import Pool
-from workbench.provenance import models, software
+from workbench.provenance import models, run_of, software, sources
 from workbench.report.observability import (
     draw_observability,
     format_observability,
@@ -40,6 +40,7 @@ def _run(
         with open_model(system, role) as fmu:
             linear[role] = linear_test(fmu, system)
     provenance = {
+        "run": run_of("observability", system, sources(cases)),
         **software(("fmpy", "numpy", "scipy")),
         "fmus": list(models(system, list(linear)).values()),
     }

@@ -27,6 +27,7 @@ from workbench.power.diagnosing import library_effects
 from workbench.power.planting import Group, plan_sheet_errors, some
 from workbench.power.sensitivity import values, vary_sets
 from workbench.power.sheet import summarise_sheet
+from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
 from workbench.report.power_checks import (
     format_sheet,
@@ -67,8 +68,11 @@ def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
     return tuple(one for name, one in known.items() if name in names or not names)
 
 
-def _provenance(options: argparse.Namespace, rig: VirtualRig, interrupted: bool) -> dict[str, Any]:
+def _provenance(
+    options: argparse.Namespace, system: System, rig: VirtualRig, interrupted: bool
+) -> dict[str, Any]:
     return {
+        "run": run_of("power", system, {}),
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
         "stops": list(rig.recordings),
@@ -102,7 +106,7 @@ def _usual(
     groups = _planned(options, rig, effects)
     results, interrupted = _diagnosed(options, output, groups, system, rig, effects, options.out)
     summary = summarise(results, Repertoire(rig.plantables, effects))
-    write_power(summary, effects, _provenance(options, rig, interrupted), options.out)
+    write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)
     output.result(format_power(summary))
     output.result(f"data and figures: {options.out}")
     return _told(options.out / "power.json", interrupted)
@@ -119,7 +123,7 @@ def _sheet_error(
     groups = plan_sheet_errors(rig.sheet_errors, options.repeats, options.seed)
     results, interrupted = _diagnosed(options, output, groups, system, rig, effects, out)
     rows = summarise_sheet(results)
-    write_sheet(rows, _provenance(options, rig, interrupted), out)
+    write_sheet(rows, _provenance(options, system, rig, interrupted), out)
     output.result(format_sheet(rows))
     output.result(f"data: {out}")
     return _told(out / "sheet_error.json", interrupted)
@@ -138,7 +142,7 @@ def _thresholds(
     )
     usual = values(thresholds(len(effects)))
     out = options.out / "thresholds"
-    write_thresholds(results, usual, _provenance(options, rig, interrupted), out)
+    write_thresholds(results, usual, _provenance(options, system, rig, interrupted), out)
     output.result(format_thresholds(results, usual))
     output.result(f"data: {out}")
     return _told(out / "thresholds.json", interrupted)

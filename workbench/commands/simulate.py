@@ -15,7 +15,7 @@ from workbench.cosim import Ending
 from workbench.errors import InputError
 from workbench.files import claimed, write_json
 from workbench.observers import choose
-from workbench.provenance import models, software
+from workbench.provenance import models, run_of, software, sources
 from workbench.report import (
     LiveWindow,
     case_figure,
@@ -47,7 +47,8 @@ def _run(
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
-    provenance = {**_models(simulation), **_settings(simulation, cases[0])}
+    run = run_of("simulate", system, sources(cases))
+    provenance = {"run": run, **_models(simulation), **_settings(simulation, cases[0])}
     if window is None:
         runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
     else:

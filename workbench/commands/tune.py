@@ -19,7 +19,10 @@ from workbench.commands.output import Done, Output
 from workbench.errors import InputError, WorkerError
 from workbench.files import claimed, write_whole
 from workbench.pool import Pool
-from workbench.report.tuning import format_tuned, write_tuning_page
+from workbench.provenance import run_of, sources
+from workbench.report.answers import tuned as tuned_answer
+from workbench.report.answers import with_answer
+from workbench.report.tuning import format_tuned, headline, write_tuning_page
 from workbench.system_file import with_model
 from workbench.systems import load_system
 from workbench.tuning import (
@@ -90,7 +93,9 @@ def _run(
     if tuned is None:
         output.progress("interrupted before the first generation was evaluated; nothing is written")
         return Done(status=130)
-    summary = summarise_tuning(tuned, options.folds)
+    content = summarise_tuning(tuned, options.folds)
+    content["provenance"] |= {"run": run_of("tune", problem.job.system, sources(problem.cases))}
+    summary = with_answer(tuned_answer(headline(content), content), content)
     if not (progress.kept and _written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
         return Done(status=1)
     draw_convergence(tuned.search.history, out / "convergence.png")

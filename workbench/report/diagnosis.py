@@ -12,6 +12,7 @@ import pandas as pd
 
 from workbench.diagnosis import Outcome, Residuals
 from workbench.files import write_json, write_whole
+from workbench.report.answers import diagnosed, with_answer
 from workbench.report.diagnosis_figures import (
     at_blocks,
     draw_confusability,
@@ -35,7 +36,8 @@ def write_diagnosis(
     provenance : what was run.
     workers : processes that draw.
     """
-    summary = {**outcome.to_dict(), "provenance": provenance}
+    content = {**outcome.to_dict(), "provenance": provenance}
+    summary = with_answer(diagnosed(content), content)
     write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
     figures = recording_figures(outcome)

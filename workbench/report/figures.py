@@ -19,11 +19,12 @@ from workbench.cosim import Run
 from workbench.files import replacing, spared
 from workbench.fmu import Vector
 from workbench.objective import judged_window
-from workbench.report.results import label, percent
 from workbench.report.views import (
     below,
     called,
+    label,
     per_shown,
+    percent,
     rounded,
     shown_unit,
     titled,

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from workbench.experiments import NextStop
 from workbench.files import write_json, write_whole
+from workbench.report.answers import proposed, with_answer
 from workbench.report.figures import ESTIMATORS, LIGHT, STYLE, save_figure
 from workbench.units import si_factor
 
@@ -22,7 +23,8 @@ def write_next_stop(found: NextStop, provenance: Mapping[str, Any], out: Path) -
     ----------
     provenance : what was run.
     """
-    write_json(out / "next.json", {**found.to_dict(), "provenance": provenance})
+    summary = {**found.to_dict(), "provenance": provenance}
+    write_json(out / "next.json", with_answer(proposed(summary), summary))
     write_whole(out / "experiments.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
     figure = out / "responses.png"
     save_figure(responses_figure(found), [figure, figure.with_suffix(".svg")])

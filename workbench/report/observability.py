@@ -18,6 +18,7 @@ from workbench.observability import (
     WindowTest,
     prior,
 )
+from workbench.report.answers import observed, with_answer
 from workbench.report.figures import STYLE, save_figure
 from workbench.report.views import called, per_shown, shown_unit
 from workbench.system import System
@@ -142,7 +143,7 @@ def write_observability(
             for one in done
         },
     }
-    write_json(path, summary)
+    write_json(path, with_answer(observed(system, summary), summary))
 
 
 def _linear(test: LinearTest) -> dict[str, Any]:

@@ -4,77 +4,22 @@ Numbers come from the summary, curves from the figures.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 
 from workbench.files import write_whole
+from workbench.report.answers import standings
 from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
-from workbench.report.results import label
 from workbench.report.templates import environment
-from workbench.report.views import below, called, inverse, rounded, window
+from workbench.report.views import below, called, inverse, label, rounded, window
 from workbench.system import System
 
 _SIZE = 4.5e6  # [byte] that all curves may take, so that a page opens at once
 _BLOCK = 13  # [byte] two points of a noisy curve
 _BLOCKS = (200, 1400)  # least and most per curve, each drawn by its extremes
-
-
-@dataclass(frozen=True)
-class Standing:
-    """How one estimator did on all cases; None where no case could be judged.
-
-    Attributes
-    ----------
-    name : key in the summary.
-    worst, median : error of the judged signal, rms over mean [1].
-    case : where it was worst.
-    z : largest objective z_k [1].
-    judged : number of cases with an error.
-    seconds : wall time of all its runs.
-    """
-
-    name: str
-    worst: float | None
-    median: float | None
-    case: str
-    z: float | None
-    judged: int
-    seconds: float
-
-
-def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
-    """Estimators, the one with the least worst case first; those never judged last.
-
-    Parameters
-    ----------
-    judged : name of the judged signal.
-    """
-    cases: Mapping[str, Any] = summary["cases"]
-    names = list(next(iter(cases.values()))["estimators"])
-    table = []
-    for name in names:
-        scores = {case: values["estimators"][name] for case, values in cases.items()}
-        shares = {case: s[f"{judged}_nrmse"] for case, s in scores.items()}
-        errors = {case: share for case, share in shares.items() if share is not None}
-        worst = max(errors, key=lambda case: errors[case], default="")
-        table.append(
-            Standing(
-                name=name,
-                worst=errors.get(worst),
-                median=median(errors.values()) if errors else None,
-                case=worst,
-                z=max((s["z"] for s in scores.values() if s["z"] is not None), default=None),
-                judged=len(errors),
-                seconds=sum(s["seconds"] for s in scores.values()),
-            )
-        )
-    # One that fails on a hard case must not win by having been judged on the easy ones.
-    return sorted(table, key=lambda s: (-s.judged, s.worst if s.worst is not None else np.inf))
 
 
 def write_page(

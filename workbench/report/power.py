@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from workbench.files import write_json
 from workbench.power import CLEAR, VISIBLE, Findable
+from workbench.report.answers import powered, with_answer
 from workbench.report.diagnosis_figures import draw_heat
 from workbench.report.figures import LIGHT, STYLE, save_figure
 
@@ -29,7 +30,8 @@ def write_power(
     ----------
     effects : of the library, in whose order they stand.
     """
-    write_json(out / "power.json", {"provenance": provenance, **summary})
+    content = {"provenance": provenance, **summary}
+    write_json(out / "power.json", with_answer(powered(summary), content))
     names = [effect.name for effect in effects]
     measured = summary["effects"]
     with mpl.rc_context(STYLE | {"font.size": 8}):

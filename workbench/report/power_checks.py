@@ -5,8 +5,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from workbench.answer import Answer, Measure
 from workbench.files import write_json
 from workbench.power.sensitivity import FACTORS, Varied
+from workbench.report.answers import with_answer
 
 
 def write_thresholds(
@@ -31,7 +33,13 @@ def write_thresholds(
         }
         for one in results
     ]
-    write_json(out / "thresholds.json", {"provenance": provenance, "usual": usual, "sets": sets})
+    changes = sum(bool(one.changed) for one in results)
+    sentence = (
+        f"Half or twice of a threshold changes what is said of {changes} of {len(results)} sets."
+    )
+    headline = {"sets of which something else is said": Measure(float(changes), "1", "lower")}
+    content = {"provenance": provenance, "usual": usual, "sets": sets}
+    write_json(out / "thresholds.json", with_answer(Answer(sentence, headline), content))
 
 
 def format_thresholds(results: Sequence[Varied], usual: Mapping[str, float]) -> str:
@@ -56,7 +64,11 @@ def write_sheet(
     rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
 ) -> None:
     """Write sheet_error.json."""
-    write_json(out / "sheet_error.json", {"provenance": provenance, "sets": list(rows)})
+    wrong = sum(row["wrong_name"] for row in rows)
+    sentence = f"A wrong data sheet leads to a wrong name in {wrong} of {len(rows)} sets."
+    headline = {"sets with a wrong name": Measure(float(wrong), "1", "lower")}
+    content = {"provenance": provenance, "sets": list(rows)}
+    write_json(out / "sheet_error.json", with_answer(Answer(sentence, headline), content))
 
 
 def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from workbench.files import write_whole
-from workbench.observers import estimators
-from workbench.report.views import below, window
+from workbench.report.answers import simulated, with_answer
+from workbench.report.views import below, percent, window
 from workbench.simulation import CaseResult
 from workbench.system import System
 
@@ -20,26 +20,12 @@ def summarise_runs(
     system: System, results: Sequence[CaseResult], provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Scores by case and estimator, weights of z, and what made them: the one source of numbers."""
-    return {
+    summary = {
         "provenance": provenance,
         "weights": dict(system.objective.weights),
         "cases": {result.case.name: result.to_dict() for result in results},
     }
-
-
-def label(name: str, system: System) -> str:
-    """Name of an estimator for people."""
-    known = estimators(system)
-    return known[name].label if name in known else name.replace("_", " ")
-
-
-def percent(share: float) -> str:
-    """A share in percent, as tables and figures give it.
-
-    >>> percent(0.01117)
-    '1.12 %'
-    """
-    return f"{100 * share:.2f} %"
+    return with_answer(simulated(system, summary), summary)
 
 
 def format_table(system: System, results: Sequence[CaseResult]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from workbench.report.figures import DARK, LIGHT
-from workbench.report.results import percent
+from workbench.report.views import percent
 
 
 def _spaced(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from workbench.observers import estimators
 from workbench.system import System, Threshold, View
 from workbench.units import si_factor
 
@@ -117,3 +118,18 @@ def rounded(value: float) -> str:
     ('553', '0.042')
     """
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
+
+
+def label(name: str, system: System) -> str:
+    """Name of an estimator for people."""
+    known = estimators(system)
+    return known[name].label if name in known else name.replace("_", " ")
+
+
+def percent(share: float) -> str:
+    """A share in percent, as tables and figures give it.
+
+    >>> percent(0.01117)
+    '1.12 %'
+    """
+    return f"{100 * share:.2f} %"

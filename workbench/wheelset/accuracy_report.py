@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from workbench.answer import Answer, Measure
 from workbench.files import write_json, write_whole
+from workbench.report.answers import with_answer
 from workbench.wheelset.accuracy import (
     COVERED,
     NOISE,
@@ -70,7 +72,45 @@ def write_accuracy(
             for name in stops[0].estimators
         },
     }
-    write_json(path, summary)
+    write_json(path, with_answer(_answer(stops), summary))
+
+
+def _answer(stops: Sequence[StopAccuracy]) -> Answer:
+    """The worst of each row by estimator, and whose worst force is nearest."""
+    headline, force = {}, {}
+    for name in stops[0].estimators:
+        for row in ROWS:
+            if (one := worst(row, stops, name)) is not None:
+                unit, factor = _shown(row.quantity)
+                value = _finite(factor * row.badness(one.value))
+                headline[f"{row.text}, {name}"] = Measure(value, unit, "lower")
+        errors = [stop.estimators[name].force for stop in stops]
+        if all(error is not None and math.isfinite(error) for error in errors):
+            force[name] = max(error for error in errors if error is not None)
+    details = {
+        f"{stop.name}: error of the force, {name}": Measure(100.0 * result.force, "%", "lower")
+        for stop in stops
+        for name, result in stop.estimators.items()
+        if result.force is not None and math.isfinite(result.force)
+    }
+    if not force:
+        return Answer("No estimator has a force in every stop.", headline, details)
+    best = min(force, key=lambda name: force[name])
+    share = covered(stops, best, "Fx")
+    bands = (
+        "" if share is None else f"; its 95 % bands hold {share:.1%} of the samples of the truth"
+    )
+    sentence = (
+        f"Nearest to the true force is {best}: its error is {force[best]:.2%} of the mean force in "
+        f"the worst of {len(stops)} stops{bands}."
+    )
+    return Answer(sentence, headline, details)
+
+
+def _shown(quantity: str) -> tuple[str, float]:
+    """Unit in which a quantity is compared, and the factor to it."""
+    unit = str(_QUANTITIES[quantity]["unit"])
+    return ("%", 100.0) if unit == "1" and quantity != "muDC" else (unit, 1.0)
 
 
 def _plain(result: Accuracy) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from workbench.commands.output import Done, Output, read_result
 from workbench.files import claimed
 from workbench.observers import choose, estimators
 from workbench.observers.gains_file import usual_gains
+from workbench.provenance import run_of, sources
 from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
 from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
@@ -31,6 +32,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}
         ready = [kind(models[kind.role], system, gains[name]) for name, kind in chosen.items()]
         provenance = {
+            "run": run_of("accuracy", system, sources(cases)),
             "workbench": version("wheelset-workbench"),
             "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
             "fmus": [

@@ -1,0 +1,158 @@
+"""What a folder of results holds, and what a second run did better or worse."""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.report.runs import compare_runs, differences, read_runs
+
+CASE = "01_dry_80_1.5"
+NAME = "worst error of Fx, ekf"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """One estimator on one recorded stop, through the command line."""
+    out = tmp_path_factory.mktemp("results") / "before"
+    case = root / "cases" / CASE
+    assert main(["simulate", str(case), "--estimator", "ekf", "--out", str(out)]) == 0
+    return out
+
+
+def other(results: Path, to: Path, **headline: dict[str, Any]) -> Path:
+    """A second run whose numbers are others."""
+    shutil.copytree(results, to)
+    path = to / "summary.json"
+    summary = json.loads(path.read_text())
+    for name, changed in headline.items():
+        key = NAME if name == "error" else name
+        summary["answer"]["headline"].setdefault(key, {"unit": "%", "better": "lower"})
+        summary["answer"]["headline"][key] |= {"low": None, "high": None, **changed}
+    path.write_text(json.dumps(summary))
+    return to
+
+
+def verdicts(before: Path, after: Path) -> dict[str, str]:
+    (first,), (last,) = read_runs(before), read_runs(after)
+    return {one.name: one.verdict for one in compare_runs(first, last)}
+
+
+def test_a_folder_says_command_date_version_system_answer_and_files(
+    results: Path, root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(["results", str(results.parent), "--json"]) == 0
+    (one,) = json.loads(capsys.readouterr().out)["result"]["runs"]
+    summary = json.loads((results / "summary.json").read_text())
+    error = summary["cases"][CASE]["estimators"]["ekf"]["Fx_nrmse"]
+    assert one["headline"][NAME]["value"] == 100.0 * error
+    assert (one["run"]["command"], one["run"]["system"]) == ("simulate", "wheelset")
+    measured = (root / "cases" / CASE / "measured.csv").read_bytes()
+    assert one["run"]["data"] == {CASE: hashlib.sha256(measured).hexdigest()}
+    assert one["files"] == {"csv": 1, "png": 1, "svg": 1, "html": 1, "json": 1}
+    assert main(["results", str(results.parent)]) == 0
+    said = capsys.readouterr().out
+    assert f"{100 * error:.4g} %" in said
+    assert one["run"]["date"][:10] in said
+    assert summary["answer"]["sentence"] in said
+
+
+def test_a_run_compared_with_itself_is_unchanged(results: Path) -> None:
+    assert set(verdicts(results, results).values()) == {"unchanged"}
+    (one,) = read_runs(results)
+    assert differences(one, one) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "verdict"),
+    [
+        ({"value": 0.1}, "better"),
+        ({"value": 0.9}, "worse"),
+        ({"value": None}, "gone"),
+        ({"value": 0.9, "better": ""}, "changed"),
+        ({"value": 0.9, "better": "higher"}, "better"),
+    ],
+)
+def test_the_way_that_is_better_decides(
+    results: Path, tmp_path: Path, changed: dict[str, Any], verdict: str
+) -> None:
+    after = other(results, tmp_path / "after", error=changed)
+    assert verdicts(results, after)[NAME] == verdict
+
+
+@pytest.mark.parametrize(("low", "verdict"), [(3.0, "unclear"), (3.6, "better")])
+def test_shares_whose_intervals_overlap_are_neither_better_nor_worse(
+    results: Path, tmp_path: Path, low: float, verdict: str
+) -> None:
+    ways = {"unit": "%", "better": "higher"}
+    first = {"value": 3.0, "low": 2.5, "high": 3.5, **ways}
+    before = other(results, tmp_path / "before", share=first)
+    after = other(results, tmp_path / "after", share={"value": 4.0, "low": low, "high": 5.0, **ways})
+    assert verdicts(before, after)["share"] == verdict
+
+
+def test_a_number_in_another_unit_is_not_compared(results: Path, tmp_path: Path) -> None:
+    after = other(results, tmp_path / "after", error={"value": 0.1, "unit": "N"})
+    changes = compare_runs(*read_runs(results), *read_runs(after))
+    assert [one.verdict for one in changes if one.name == NAME] == ["gone", "new"]
+
+
+def test_what_else_differs_is_said(
+    results: Path, root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same case with one reading changed, and another estimator."""
+    case = shutil.copytree(root / "cases" / CASE, tmp_path / CASE)
+    measured = case / "measured.csv"
+    measured.write_text(measured.read_text() + "\n")
+    out = tmp_path / "after"
+    asked = ["simulate", str(case), "--estimator", "ukf", "--out", str(out)]
+    assert main(asked) == 0
+    capsys.readouterr()
+    assert main(["results", str(results), str(out)]) == 0
+    said = capsys.readouterr().out
+    assert f"recordings with other content: {CASE}" in said
+    assert "settings: ekf." in said
+    assert f"gone     {NAME}" in said
+
+
+def test_runs_of_two_commands_are_not_compared(results: Path, tmp_path: Path) -> None:
+    after = shutil.copytree(results, tmp_path / "after")
+    summary = json.loads((after / "summary.json").read_text())
+    summary["provenance"]["run"]["command"] = "tune"
+    (after / "summary.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match=r"a run of 'tune'.*expected one of 'simulate'"):
+        compare_runs(*read_runs(results), *read_runs(after))
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (None, "found none of summary.json"),
+        ("{", "does not say what made it"),
+        ('{"provenance": {"run": 1}, "answer": []}', "does not say what made it"),
+        ("[" * 100_000, "does not say what made it"),
+    ],
+)
+def test_a_folder_without_results_is_refused_in_words(
+    tmp_path: Path, content: str | None, match: str
+) -> None:
+    if content is not None:
+        (tmp_path / "summary.json").write_text(content)
+    with pytest.raises(InputError, match=match):
+        read_runs(tmp_path)
+
+
+def test_results_of_other_places_are_told(results: Path, tmp_path: Path) -> None:
+    """Two runs each, and no place that both folders have."""
+    for folder, names in (("a", "12"), ("b", "34")):
+        for name in names:
+            shutil.copytree(results, tmp_path / folder / name)
+    assert main(["results", str(tmp_path / "a"), str(tmp_path / "b")]) == 2
+    shutil.copytree(results, tmp_path / "b" / "1")
+    assert main(["results", str(tmp_path / "a"), str(tmp_path / "b")]) == 0
