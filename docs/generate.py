@@ -20,13 +20,12 @@ from mkdocs.structure.pages import Page
 
 import workbench
 from workbench.commands.options import command_line, parsers
-from workbench.conditions import UNKNOWN
 from workbench.diagnosis import Effect, read_effects
 from workbench.diagnosis.thresholds import RATE, Soundness, Thresholds, thresholds
 from workbench.installed import system_files
 from workbench.modelica import Library, read_library
+from workbench.schemas import case_schema, gains_schema, summaries, system_schema
 from workbench.system import OBSERVER, System
-from workbench.system_parts import Condition
 from workbench.systems import load_system
 
 _WIDE = 90  # characters of a line of code on a page
@@ -45,8 +44,9 @@ def pages() -> dict[str, str]:
         "python.md": python_api(),
         "effects-catalogue.md": catalogue(systems),
         "thresholds.md": decisions(),
-        **{f"schemas/{one.name}.case.json": _json(case_schema(one)) for one in systems},
+        **{f"schemas/{name}": _json(schema) for name, schema in schemas(systems).items()},
         "case-file.md": case_files(systems),
+        "formats.md": formats(systems),
     }
 
 
@@ -310,6 +310,41 @@ def decisions() -> str:
 # --- file formats ---
 
 
+def schemas(systems: list[System]) -> dict[str, dict[str, Any]]:
+    """JSON Schema of every file that is read or written, by its name in the site."""
+    return {
+        "system.json": system_schema(),
+        **{f"{one.name}.case.json": case_schema(one) for one in systems},
+        **{f"{one.name}.gains.json": gains_schema(one) for one in systems},
+        **{f"{name}.summary.json": schema for name, schema in summaries().items()},
+    }
+
+
+def formats(systems: list[System]) -> str:
+    """All files with their schemas."""
+    text = ["# File formats", "", *textwrap.dedent(_FORMATS).strip().splitlines(), ""]
+    text += ["| file | written by | schema |", "| --- | --- | --- |"]
+    link = "[{0}](schemas/{0})"
+    text.append(f"| `system.toml` | people, `workbench new` | {link.format('system.json')} |")
+    for one in systems:
+        name = link.format(f"{one.name}.gains.json")
+        text.append(f"| `gains.toml` of {one.name} | `workbench tune` | {name} |")
+    files = {"thresholds": "power --thresholds", "sheet_error": "power --sheet-error"}
+    for name in summaries():
+        file = "summary" if name in ("simulate", "tune", "diagnose") else name
+        made = f"workbench {files.get(name, name)}"
+        text.append(f"| `{file}.json` | `{made}` | {link.format(f'{name}.summary.json')} |")
+    return "\n".join(text) + "\n"
+
+
+_FORMATS = """
+JSON Schema (2020-12). `case.toml` has a schema for each machine: [case.toml](case-file.md). Objects
+are closed: a file with another key is refused. Every summary begins with `answer`, the result in a
+sentence and in numbers with units, and holds `provenance.run`, what made it; [runs](results.md) are
+compared by them. In Python: `from workbench.schemas import summaries`.
+"""
+
+
 def case_files(systems: list[System]) -> str:
     """What a `case.toml` of each system says, and its schema."""
     text = ["# case.toml", "", *textwrap.dedent(_CASE).strip().splitlines(), ""]
@@ -328,63 +363,3 @@ asked for beyond `title` and `[measurement]` follows from the conditions of the
 [system](system-file.md#conditions). Editors that know JSON Schema for TOML (such as Even Better
 TOML) complete and check it with `#:schema FILE` in the first line:
 """
-
-
-def case_schema(system: System) -> dict[str, Any]:
-    """JSON Schema (2020-12) of the `case.toml` of a system."""
-    conditions = {one.name: _condition(one) for one in system.conditions}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"case.toml of {system.name}: {system.title}",
-        "type": "object",
-        "required": ["title", "measurement", *(["conditions"] if conditions else [])],
-        "properties": {
-            "title": {"type": "string", "minLength": 1},
-            "measurement": {
-                "type": "object",
-                "required": ["file"],
-                "properties": {
-                    "file": {"type": "string", "description": "recording in this folder"},
-                    "columns": {
-                        "type": "object",
-                        "properties": dict.fromkeys(("time", *system.signals), _COLUMN),
-                        "additionalProperties": False,
-                    },
-                    "counts_from": {"type": "string", "description": "time with unit"},
-                },
-            },
-            "conditions": {
-                "type": "object",
-                "required": list(conditions),
-                "properties": conditions,
-            },
-        },
-    }
-
-
-_COLUMN = {
-    "type": ["string", "object"],
-    "required": ["channel"],
-    "properties": {
-        "channel": {"type": "string", "minLength": 1},
-        "unit": {"type": "string"},
-        "reversed": {"type": "boolean"},
-    },
-    "additionalProperties": False,
-}
-
-
-def _condition(one: Condition) -> dict[str, Any]:
-    """Schema of what was set before a recording; nobody need know it, but for a sign."""
-    known = _known_condition(one)
-    return known if one.sign else {"anyOf": [known, {"const": UNKNOWN}]}
-
-
-def _known_condition(one: Condition) -> dict[str, Any]:
-    about = {"description": one.label}
-    if not one.choices:
-        return about | {"type": "string", "pattern": r"^\s*[-+0-9.eE]+ \S+", "$comment": one.unit}
-    choice: dict[str, Any] = {"enum": list(one.choices)}
-    if not one.count:
-        return about | choice
-    return about | {"type": "array", "items": choice, "minItems": one.count, "maxItems": one.count}

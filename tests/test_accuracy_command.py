@@ -37,6 +37,8 @@ from workbench.wheelset.accuracy import (
 from workbench.wheelset.accuracy_report import format_accuracy
 from workbench.wheelset.truth import Truth, read_truth
 
+from .schemas import check
+
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
 RW, RR = 0.46, 0.70  # [m]
 SYSTEM = load_system("wheelset")
@@ -203,6 +205,7 @@ def test_command_writes_every_stop_and_the_worst(
             case.name: observe_stop(case, read_truth(case, system), [ekf], system) for case in read
         }
     summary = json.loads((tmp_path / "accuracy.json").read_text())
+    check("accuracy", summary)
     table = pd.read_csv(tmp_path / "accuracy.csv").set_index(["case", "estimator"])
     for name, stop in stops.items():
         expected = {

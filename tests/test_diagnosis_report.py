@@ -22,6 +22,7 @@ from workbench.report.figures import CaseFigure
 from workbench.system import System
 
 from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
+from .schemas import check
 
 
 @pytest.fixture(scope="session")
@@ -33,6 +34,10 @@ def results(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -
 @pytest.fixture(scope="session")
 def summary(results: Path) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
+
+
+def test_the_summary_is_as_its_schema_says(summary: dict[str, Any]) -> None:
+    check("diagnose", summary)
 
 
 @pytest.fixture(scope="session")

@@ -29,6 +29,7 @@ from workbench.systems import load_system
 from .distances import parted
 from .heater import NOISE, cases, diagnosed
 from .heater import system as heater
+from .schemas import check
 
 # --- criteria ---
 
@@ -259,6 +260,7 @@ def test_the_command_writes_what_it_prints(
     options = ["--system", str(block.source), "--out", str(out), "--workers", "1"]
     assert main(["next", str(tmp_path), *options]) == 0
     said = json.loads((out / "next.json").read_text())
+    check("next", said)
     assert said["sentence"] in capsys.readouterr().out
     assert said["rivals"] == ["Draught", "Radiation"]
     assert len(pd.read_csv(out / "experiments.csv")) == len(said["tried"])

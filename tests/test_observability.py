@@ -18,6 +18,8 @@ from workbench.observers import operating
 from workbench.system import OperatingPoint
 from workbench.systems import load_system
 
+from .schemas import check
+
 ROOT = Path(__file__).parents[1]
 MINIMAL = ROOT / "fmus/fmi2/MinimalObserver.fmu"
 FULL = ROOT / "fmus/fmi2/FullObserver.fmu"
@@ -333,6 +335,7 @@ def test_command_tells_when_frictions_are_known(start_of_a_stop, tmp_path, capsy
     assert "FullObserver: rank" in capsys.readouterr().out
     assert (out / "dry.png").stat().st_size > 0
     summary = json.loads((out / "observability.json").read_text())
+    check("observability", summary)
     assert summary["linear"]["MinimalObserver"]["observable"]
     stop = summary["cases"]["dry"]["models"]
     # Pads touch within the first two of some 75 windows: 97 %.

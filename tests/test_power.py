@@ -1,6 +1,7 @@
 """Power of the diagnosis: plan, verdicts on the disk, statistics, and a small run of all."""
 
 import dataclasses
+import json
 import os
 import subprocess
 import sys
@@ -30,18 +31,27 @@ from workbench.power import (
 from workbench.power.diagnosing import build_everything, library_effects
 from workbench.power.planting import Group, Kind
 from workbench.power.statistics import intervals_cover, named_all, named_right
+from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
 from workbench.systems import load_system
 from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
 from .processes import comes_true, living
+from .schemas import check
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
 REPERTOIRE = Repertoire(PLANTABLE, library_effects(SYSTEM))
 IDENTITY = {"seed": 1}
+PROVENANCE = {
+    "run": run_of("power", SYSTEM, {}),
+    "workbench": "0.1.0",
+    "seed": 1,
+    "stops": [],
+    "interrupted": False,
+}
 
 
 def short(name: str, speed: float) -> Scenario:
@@ -238,7 +248,8 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
     assert found["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
     assert [one["said"] for one in found["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
     assert len(found["failed"]) == 1
-    write_power(found, REPERTOIRE.effects, {}, tmp_path)
+    write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
+    check("power", json.loads((tmp_path / "power.json").read_text()))
     assert {path.name for path in tmp_path.iterdir()} == {
         "power.json",
         *(

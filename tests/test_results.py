@@ -93,7 +93,9 @@ def test_shares_whose_intervals_overlap_are_neither_better_nor_worse(
     ways = {"unit": "%", "better": "higher"}
     first = {"value": 3.0, "low": 2.5, "high": 3.5, **ways}
     before = other(results, tmp_path / "before", share=first)
-    after = other(results, tmp_path / "after", share={"value": 4.0, "low": low, "high": 5.0, **ways})
+    after = other(
+        results, tmp_path / "after", share={"value": 4.0, "low": low, "high": 5.0, **ways}
+    )
     assert verdicts(before, after)["share"] == verdict
 
 

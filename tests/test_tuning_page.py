@@ -24,6 +24,7 @@ from workbench.system import System
 from workbench.systems import load_system, open_model
 
 from .processes import ending
+from .schemas import check
 
 HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
 CASES = {"03_dry_120_3.6": "03_dry_120_3.6", HOSTILE: "08_wet_120_3.6"}  # and where it is from
@@ -68,6 +69,10 @@ def results(root: Path, folder: Path, tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture(scope="module")
 def summary(results: Path) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
+
+
+def test_the_summary_is_as_its_schema_says(summary: dict[str, Any]) -> None:
+    check("tune", summary)
 
 
 @pytest.fixture(scope="module")

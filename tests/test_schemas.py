@@ -1,0 +1,128 @@
+"""Published schemas take what is there and refuse what the readers refuse."""
+
+import ast
+import copy
+import json
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import workbench.template
+from workbench.__main__ import main
+from workbench.installed import system_files
+from workbench.schemas import gains_schema, summaries, system_schema
+from workbench.systems import load_system
+
+from .schemas import check, validator
+
+PACKAGE = Path(workbench.__file__).parent
+SYSTEMS = {
+    **system_files(),
+    "template": Path(workbench.template.__file__).with_name("system.toml"),
+}
+READERS = ("system_file", "system_tables", "comparison_tables", "experiment_tables")
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_every_system_file_is_as_the_schema_says(name: str) -> None:
+    validator(system_schema()).validate(tomllib.loads(SYSTEMS[name].read_text()))
+
+
+def key_sets(schema: Any) -> Iterator[frozenset[str]]:
+    if isinstance(schema, dict):
+        if isinstance(properties := schema.get("properties"), dict):
+            yield frozenset(properties)
+        schema = list(schema.values())
+    if isinstance(schema, list):
+        for one in schema:
+            yield from key_sets(one)
+
+
+def test_the_schema_of_system_files_has_the_keys_that_the_readers_take() -> None:
+    """Each reader of a table names its keys in one text."""
+    known = set(key_sets(system_schema()))
+    read = 0
+    for reader in READERS:
+        for call in ast.walk(ast.parse((PACKAGE / f"{reader}.py").read_text())):
+            if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Attribute):
+                continue
+            if call.func.attr == "refuse_unknown" and isinstance(call.args[0], ast.Constant):
+                assert frozenset(call.args[0].value.split()) in known, call.args[0].value
+                read += 1
+    assert read > 20
+
+
+WRONG: dict[str, Callable[[dict[str, Any]], object]] = {
+    "an unknown key": lambda one: one.update(inputz={}),
+    "no outputs": lambda one: one.pop("outputs"),
+    "a unit that is a number": lambda one: one["outputs"]["h"].update(unit=1),
+    "noise that is a list": lambda one: one["outputs"]["h"].update(noise=["1 mm"]),
+    "an unknown key of a signal": lambda one: one["outputs"]["h"].update(noize="1 mm"),
+    "a model without a class": lambda one: one["models"]["observer"].pop("class"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_system_file_is_refused(name: str) -> None:
+    content = tomllib.loads(SYSTEMS["template"].read_text())
+    WRONG[name](content)
+    assert not validator(system_schema()).is_valid(content)
+
+
+def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not() -> None:
+    schema = validator(gains_schema(load_system("wheelset")))
+    files = sorted((PACKAGE / "wheelset" / "gains").glob("*.toml"))
+    assert files
+    for path in files:
+        schema.validate(tomllib.loads(path.read_text()))
+    good = tomllib.loads(files[0].read_text())
+    for wrong in (
+        {**good, "estimator": "nobody"},
+        {**good, "gains": {"L11": "1"}},
+        {**good, "gain": {}},
+        {"estimator": good["estimator"]},
+    ):
+        assert not schema.is_valid(wrong)
+
+
+@pytest.fixture(scope="module")
+def summary(tmp_path_factory: pytest.TempPathFactory, root: Path) -> dict[str, Any]:
+    """Of one estimator on one recorded stop, through the command line."""
+    out = tmp_path_factory.mktemp("schemas")
+    case = root / "cases" / "01_dry_80_1.5"
+    assert main(["simulate", str(case), "--estimator", "ekf", "--out", str(out)]) == 0
+    read: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    return read
+
+
+def test_a_summary_is_as_its_schema_says_and_of_no_other_command(summary: dict[str, Any]) -> None:
+    check("simulate", summary)
+    assert {"accuracy", "tune", "diagnose", "observability", "next", "power"} < set(summaries())
+    for command, schema in summaries().items():
+        assert validator(schema).is_valid(summary) == (command == "simulate")
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("answer", "sentence"), ""),
+        (("answer", "headline", "worst error of Fx, ekf", "better"), "larger"),
+        (("cases", "01_dry_80_1.5", "estimators", "ekf", "z"), "0.1"),
+        (("cases", "01_dry_80_1.5", "estimators", "ekf", "more"), 1),
+        (("provenance", "run", "data", "01_dry_80_1.5"), "abc"),
+        (("provenance", "run", "system"), None),
+        (("more",), {}),
+    ],
+)
+def test_a_wrong_summary_is_refused(
+    summary: dict[str, Any], path: tuple[str, ...], value: object
+) -> None:
+    wrong = copy.deepcopy(summary)
+    inner = wrong
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    assert not validator(summaries()["simulate"]).is_valid(wrong)

@@ -1,0 +1,276 @@
+"""JSON Schema of the summaries that commands write.
+
+Shapes that the code declares as dataclasses are read from them. Objects are closed: a key that a
+file has and its schema has not is a mistake in one of the two.
+"""
+
+from workbench.companion import companion_part
+from workbench.diagnosis.sample_errors import Errors
+from workbench.installed import companions
+from workbench.power.sensitivity import Changed
+from workbench.schemas.words import (
+    ANY,
+    BOTH,
+    ERROR,
+    FLAG,
+    FMU,
+    INTERVAL,
+    NAMED,
+    NUMBER,
+    RUN,
+    SHARE,
+    TEXT,
+    VALUE,
+    VERSIONS,
+    WHOLE,
+    Schema,
+    by_name,
+    closed,
+    declared,
+    listed,
+    or_null,
+    summary,
+)
+from workbench.tuning.validation import Fold
+
+
+def summaries() -> dict[str, Schema]:
+    """Schema of each summary, by the command that writes it, also those of companions."""
+    own = {
+        "simulate": _simulate(),
+        "tune": _tune(),
+        "diagnose": _diagnose(),
+        "observability": _observability(),
+        "power": _power(),
+        "thresholds": _thresholds(),
+        "sheet_error": _sheet_error(),
+        "next": _next(),
+    }
+    for name in companions():
+        if part := companion_part(name, "schemas"):
+            own |= {command: made() for command, made in part.SUMMARIES.items()}
+    return own
+
+
+def _simulate() -> Schema:
+    score = {
+        "type": "object",
+        "required": ["z", "outcome", "reason", "seconds"],
+        "properties": {
+            "z": ERROR,
+            "outcome": TEXT,
+            "reason": TEXT,
+            "seconds": {"type": "number", "minimum": 0},
+        },
+        # Of the judged signal, whatever its name.
+        "patternProperties": {r"_rms_|_nrmse$": ERROR},
+        "additionalProperties": False,
+    }
+    case = closed({"title": TEXT, "doubts": listed(TEXT), "estimators": by_name(score)})
+    provenance = {
+        **closed({"run": RUN, **VERSIONS, "fmu": FMU}),
+        "additionalProperties": {"type": "object"},  # other models, settings of each estimator
+    }
+    entries = {"weights": by_name(NUMBER), "cases": by_name(case)}
+    return summary("simulate", provenance, entries)
+
+
+def _tune() -> Schema:
+    of_gain = {name: NUMBER for name in ("value", "reasoned", "lower", "upper")}
+    gain = closed({"meaning": TEXT, "unit": TEXT, **of_gain, "at_bound": FLAG})
+    changes = {name: ERROR for name in ("less", "more", "without")}
+    work = {name: WHOLE for name in ("generations", "candidates", "crashed", "folds")}
+    provenance = closed(
+        {
+            "run": RUN,
+            **{name: one for name, one in VERSIONS.items() if name != "commit"},
+            "system": TEXT,
+            "fmu": FMU,
+            "cases": listed(TEXT),
+            "scale_errors": by_name(NUMBER),
+            "weights": by_name(NUMBER),
+            "seed": WHOLE,
+            "population": WHOLE,
+        }
+    )
+    entries = {
+        "estimator": TEXT,
+        "label": TEXT,
+        "judged": TEXT,
+        "bandwidth": ERROR,
+        "follows": or_null(closed({"quantity": TEXT, "within": NUMBER, "left": NUMBER})),
+        "z": NUMBER,
+        "z_reasoned": NUMBER,
+        "cases": by_name(closed({"z_k": NUMBER, "z_k_reasoned": NUMBER, "unstable": WHOLE})),
+        "gains": by_name(gain),
+        "sensitivity": by_name(closed({**changes, "matters": FLAG})),
+        "folds": listed(declared(Fold, nullable=True)),
+        "beside": by_name(closed({"label": TEXT, "z": ERROR, "worst": TEXT})),
+        "work": closed({**work, "seconds": NUMBER, "saved": NUMBER, "interrupted": FLAG}),
+        "convergence": listed(NUMBER),
+    }
+    return summary("tune", provenance, entries)
+
+
+def _diagnose() -> Schema:
+    cause = closed(
+        {
+            "effect": TEXT,
+            "text": TEXT,
+            "parameters": by_name(INTERVAL),
+            "phases": or_null(listed(NUMBER)),
+            "confusable_with": listed(TEXT),
+            "explained": NUMBER,
+            "separation": TEXT,
+        }
+    )
+    ends = {name: NUMBER for name in ("before", "after")}
+    gain = {"measure": TEXT, **ends, "low": NUMBER, "high": NUMBER, "recordings": by_name(BOTH)}
+    candidate = {
+        "effect": TEXT,
+        "shape": by_name(NUMBER),
+        "size": NUMBER,
+        "sigma": ERROR,
+        "unit": TEXT,
+        "shape_units": by_name(TEXT),
+        "gain": NUMBER,
+        "held_out": NUMBER,
+    }
+    step = {"before": NUMBER, "rivals": listed(closed({"effect": TEXT, "misfit": NUMBER}))}
+    matrix = listed(listed(NUMBER))
+    rival = {
+        "effects": listed(TEXT),
+        "sizes": listed({"type": "array"}),
+        "levels": listed({"type": "array"}),
+        "information": matrix,
+        "behind": NUMBER,
+        "explained": NUMBER,
+    }
+    rivals = {
+        "models": listed(closed(rival)),
+        "effects": listed(TEXT),
+        "given": by_name(NUMBER),
+        "signals": listed(TEXT),
+        "inflation": listed(NUMBER),
+    }
+    model = {"modelica": or_null(TEXT), "fmu": or_null(TEXT), "difference_from_fit": ERROR}
+    entries = {
+        "verdict": {"enum": ["nothing", "found", "unexplained"]},
+        "sentence": NAMED,
+        "interrupted": FLAG,
+        "doubts": by_name(listed(TEXT)),
+        "causes": listed(cause),
+        "gain": or_null(closed(gain)),
+        "model": closed(model),
+        "partial": listed(TEXT),
+        "lasting_errors": by_name(BOTH),
+        "dependences": listed(closed({"channel": TEXT, "influence": TEXT, **ends})),
+        "confusability": closed({"effects": listed(TEXT), "cosines": matrix}),
+        "candidates": listed(closed(candidate)),
+        "steps": listed(closed(step)),
+        "not_visible": by_name(TEXT),
+        "levels": by_name(VALUE),
+        "deviations": by_name(by_name(NUMBER)),
+        "set_aside": by_name(by_name(WHOLE)),
+        "channels": by_name(TEXT),
+        "errors": listed(declared(Errors)),
+        "start_values": by_name(by_name(NUMBER)),
+        "observers": by_name(by_name(closed({"before": ERROR, "after": ERROR}))),
+        "rivals": or_null(closed(rivals)),
+        "cases": listed(TEXT),
+    }
+    provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "model": FMU}
+    return summary("diagnose", closed({**provenance, "effects": listed(TEXT)}), entries)
+
+
+def _observability() -> Schema:
+    numbers = by_name(NUMBER)
+    model = {name: or_null(numbers) for name in ("useful", "median_bound", "states_observable")}
+    case = {
+        **closed({"title": TEXT, "judged_windows": WHOLE, "models": by_name(closed(model))}),
+        "patternProperties": {"^median_": ERROR},
+    }
+    state = closed({"at": NUMBER, "scale": NUMBER, "remaining": NUMBER})
+    linear = {
+        "observable": FLAG,
+        "rank": WHOLE,
+        "states": by_name(state),
+        "information": listed(NUMBER),
+        "unobservable": listed(TEXT),
+        "invisible": listed(TEXT),
+    }
+    entries = {
+        "operating_point": closed(
+            {"inputs": numbers, "held": by_name(TEXT), "quantities": numbers}
+        ),
+        "noise": by_name(closed({"absolute": NUMBER, "relative": NUMBER})),
+        "window_s": NUMBER,
+        "stride_s": NUMBER,
+        "prior": numbers,
+        "useful": numbers,
+        "linear": by_name(closed(linear)),
+        "cases": by_name(case),
+    }
+    provenance = closed({"run": RUN, **VERSIONS, "fmus": listed(FMU)})
+    return summary("observability", provenance, entries)
+
+
+_SETS = closed(
+    {"run": RUN, "workbench": TEXT, "seed": WHOLE, "stops": listed(TEXT), "interrupted": FLAG}
+)
+
+
+def _power() -> Schema:
+    shares = ("false_alarms", "right_first", "right_first_above_noise", "right_alone")
+    effect = {"rig": TEXT, "size": NUMBER, "unit": TEXT, "hidden": FLAG}
+    outside = {"size": NUMBER, "unit": TEXT, "verdicts": by_name(by_name(WHOLE))}
+    entries = {
+        "sets": WHOLE,
+        "failed": listed(closed({"rig": TEXT, "error": TEXT})),
+        **{name: SHARE for name in (*shares, "unexplained", "coverage")},
+        "pairs": closed({"both": SHARE, "both_seen_alone": SHARE}),
+        "effects": by_name(closed({**effect, "right_first": by_name(SHARE), "coverage": SHARE})),
+        "outside": by_name(closed(outside)),
+        "confusion": by_name(by_name(WHOLE)),
+        "wrong": listed(closed({"rig": TEXT, "said": listed(TEXT)})),
+    }
+    return summary("power", _SETS, entries)
+
+
+def _thresholds() -> Schema:
+    one = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
+    sets = listed(closed({**one, "changed": listed(declared(Changed))}))
+    return summary("power --thresholds", _SETS, {"usual": by_name(NUMBER), "sets": sets})
+
+
+def _sheet_error() -> Schema:
+    one = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
+    one |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
+    return summary("power --sheet-error", _SETS, {"sets": listed(closed(one))})
+
+
+def _next() -> Schema:
+    profile = closed({"profile": TEXT, "levels": listed(NUMBER), "every": NUMBER})
+    tried = closed(
+        {
+            "experiment": TEXT,
+            "groups": listed(listed(WHOLE)),
+            "separation": NUMBER,
+            "chance": NUMBER,
+            "separations": listed(listed(NUMBER)),
+            "deviation": BOTH,
+            "cost": VALUE,
+            "duration": NUMBER,
+            "inputs": by_name(profile),
+            "conditions": by_name(ANY),
+        }
+    )
+    entries = {
+        "sentence": NAMED,
+        "rivals": listed(TEXT),
+        "parts": FLAG,
+        "tried": {**listed(tried), "minItems": 1},
+        "sensors": by_name(tried),
+    }
+    provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "diagnosis": TEXT}
+    return summary("next", closed(provenance), entries)
