@@ -213,23 +213,30 @@ for (const name of ["error", "securitypolicyviolation"]) {
 }
 </script>"""
 ANSWER = """
+await ready; // figures have their samples
+if (then) await then();
 const answer = document.createElement("pre");
 answer.id = "probe";
 answer.textContent = JSON.stringify({ ...told, errors });
 document.body.append(answer);
+})();
 </script>"""
 
 
 @pytest.fixture(scope="session")
 def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, str], dict[str, Any]]:
-    """Opens a page as a file in headless Chromium, with a script that fills `told`."""
+    """Opens a page as a file in headless Chromium, with a script that fills `told`.
+
+    What needs the samples of figures goes into a function `then`.
+    """
     chromium = shutil.which("chromium")
     if chromium is None:
         pytest.skip("no chromium")
 
     def opened(page: Path, script: str) -> dict[str, Any]:
         folder = tmp_path_factory.mktemp("browser")
-        probing = f"<script>\nconst told = {{}};\n{script}{ANSWER}</body>"
+        begin = "<script>\n(async () => {\nconst told = {};\nlet then;\n"
+        probing = f"{begin}{script}{ANSWER}</body>"
         text = page.read_text().replace("<head>", "<head>" + COLLECT).replace("</body>", probing)
         (folder / "index.html").write_text(text)
         run = subprocess.run(
@@ -238,7 +245,7 @@ def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, str], dic
                 *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"),
                 *("--no-first-run", "--disable-background-networking"),
                 *("--disable-component-update", "--disable-sync", "--window-size=1200,900"),
-                *("--enable-logging=stderr", "--dump-dom"),
+                *("--enable-logging=stderr", "--virtual-time-budget=10000", "--dump-dom"),
                 f"--user-data-dir={folder / 'profile'}",
                 (folder / "index.html").as_uri(),
             ],

@@ -171,7 +171,7 @@ def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
     page: Any, summary: dict[str, Any]
 ) -> None:
     (cause,) = summary["causes"]
-    article = section(page, "causes").xpath("article")[0]
+    article = section(page, "causes").xpath(".//article")[0]
     assert cause["effect"] in text(article.find("h3"))
     for name, one in cause["parameters"].items():
         row = article.xpath(f".//tr[th='{name}']")[0]

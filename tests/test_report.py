@@ -255,6 +255,20 @@ told.hidden = [entry.getAttribute("aria-pressed"),
   [...plot.querySelectorAll("path[data-style='0']")].map((path) => path.style.display)];
 told.visible = panels.map((panel) => panel.getBoundingClientRect().height);
 told.curves = [...plot.querySelectorAll(".curve")].map((path) => path.getTotalLength());
+then = () => {
+  whole.click();
+  for (let k = 0; k < 20; k += 1) zoomIn.click();
+  told.drawn = panels[1].querySelector(".curve").getAttribute("d").match(/[ML]/g).length;
+  whole.click();
+  press(".");
+  press(".");
+  told.read = [...document.querySelector(".readout").children].map((line) => line.textContent);
+  told.spoken = document.querySelector("output.unseen").value;
+  press("Escape");
+  told.hidden_again = document.querySelector(".readout").hidden;
+  point("pointermove", 0.5);
+  told.pointed = document.querySelector(".readout b").textContent;
+};
 """
 
 
@@ -319,6 +333,45 @@ def test_zoomed_panels_fit_what_is_visible(browser: dict[str, Any]) -> None:
     whole, zoomed = np.array(browser["whole"]), np.array(browser["dragged"])
     assert (zoomed[:, 3] <= 1.13 * whole[:, 3]).all()  # the margin is 6 % on either side
     assert (zoomed[:, 3] < 0.5 * whole[:, 3]).any()
+
+
+def test_zoom_draws_every_sample_in_view(browser: dict[str, Any]) -> None:
+    """0.2 s at 200 Hz are 40 samples, and one beside the view at either end."""
+    assert 39 <= browser["drawn"] <= 43
+
+
+def shown_table(results: Path, page: Any) -> pd.DataFrame:
+    """The data of the recording whose figure comes first."""
+    return pd.read_csv(results / f"{page.xpath('string(//article/h3)')}.csv")
+
+
+def test_cursor_reads_the_recorded_values_with_units(
+    browser: dict[str, Any], results: Path, page: Any
+) -> None:
+    """One sample after the middle, by the keyboard."""
+    table = shown_table(results, page)
+    time = table["time [s]"]
+    row = table.iloc[time.searchsorted((time.iloc[0] + time.iloc[-1]) / 2) + 1]
+    lines = browser["read"]
+    assert float(lines[0].removesuffix(" s")) == pytest.approx(row["time [s]"], abs=1e-3)
+    pressure = lines[lines.index("Brake pressure pB [bar]") + 1].split()
+    # Five digits are shown; codes are 1/65534 of the range.
+    assert float(pressure[0]) == pytest.approx(row["measured.pB [Pa]"] / 1e5, rel=1e-4)
+    assert pressure[1] == "bar"
+    force = lines[lines.index("Creep force Fx [kN]") + 1 :]
+    filters = [line for line in force if line.endswith("extended Kalman filter")]
+    assert float(filters[0].split()[0]) == pytest.approx(row["ekf.Fx [N]"] / 1e3, abs=1e-3)
+    assert filters[0].split()[1] == "±"
+    assert f"Brake pressure pB [bar]: measured {pressure[0]} bar" in browser["spoken"]
+    assert browser["hidden_again"]
+
+
+def test_cursor_follows_the_pointer(browser: dict[str, Any], results: Path, page: Any) -> None:
+    time = shown_table(results, page)["time [s]"]
+    middle = (time.iloc[0] + time.iloc[-1]) / 2
+    # A pixel of the pointer is 1/900 of the time.
+    at = float(browser["pointed"].removesuffix(" s"))
+    assert at == pytest.approx(middle, abs=2e-3 * (time.iloc[-1] - time.iloc[0]))
 
 
 def test_legend_hides_an_estimator_everywhere(browser: dict[str, Any]) -> None:

@@ -15,14 +15,17 @@ from numpy.testing import assert_allclose
 
 from workbench.case import Case
 from workbench.observers import choose
+from workbench.provenance import run_of
 from workbench.report import case_figure, summarise_runs, write_estimates, write_page
 from workbench.report.answers import standings
 from workbench.report.drawing import extremes
 from workbench.report.figures import DARK, LIGHT
 from workbench.simulation import CaseResult, prepare
 from workbench.system import System
+from workbench.systems import load_system
 
 PROVENANCE = {
+    "run": run_of("simulate", load_system("wheelset"), {}),
     "workbench": "0",
     "commit": None,
     "python": "3",
@@ -109,7 +112,7 @@ def test_standard_deviations_become_bands_and_columns(
     assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]
 
 
-def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
+def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(
     uncertain: CaseResult, tmp_path: Path
 ) -> None:
     run = uncertain.runs["direct_inversion"]
@@ -128,9 +131,16 @@ def test_page_of_fourteen_cases_and_six_noisy_estimators_stays_below_5_MB(
     estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
     cases = {f"case_{k}": {"title": "", "estimators": estimators, "doubts": []} for k in range(14)}
     figures = [replace(figure, name=name) for name in cases]
-    summary = {"provenance": PROVENANCE, "weights": {"Fx": 1}, "cases": cases}
+    answer = {"answer": {"sentence": "Six estimators."}}
+    summary = {**answer, "provenance": PROVENANCE, "weights": {"Fx": 1}, "cases": cases}
     write_page(uncertain.system, summary, figures, len(cases), tmp_path / "index.html")
-    assert 1e6 < (tmp_path / "index.html").stat().st_size < 5e6
+    pages = {path.stem: lxml.html.fromstring(path.read_bytes()) for path in tmp_path.glob("*.html")}
+    assert (tmp_path / "index.html").stat().st_size > 1e6
+    assert all(path.stat().st_size < 3e6 for path in tmp_path.glob("*.html"))
+    # Each case has one figure with all its samples, here or on the page that is linked.
+    links = pages["index"].xpath("//article//a[contains(@href, '.html')]/@href")
+    assert sorted(links) == sorted(f"{name}.html" for name in pages if name != "index")
+    assert sum(len(page.xpath("//*[@class='samples']")) for page in pages.values()) == 14
 
 
 def test_an_interrupted_run_says_so(uncertain: CaseResult, tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ def recording_figure(
     for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
         factor = si_factor(balance.shown, balance.unit, balance.title)
         curve = Curve("measured", parted(values / factor))
-        panels.append(_symmetric(f"{balance.title} [{balance.shown}]", 0.8, [curve], curve.values))
+        panels.append(_symmetric(balance.title, balance.shown, 0.8, [curve], curve.values))
     legend = [
         (NOMINAL, "error of the nominal model, levels calibrated"),
         (NOISE, f"±{_BAND:g} standard deviations of the noise"),
@@ -253,7 +253,7 @@ def _measured(
     low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
     room = 0.08 * (high - low) or 1.0
     title = f"{capital(named(system, signal))}, as measured [{unit}]"
-    return Panel(title, low - room, high + room, 0.45, (curve,))
+    return Panel(title, unit, low - room, high + room, 0.45, (curve,))
 
 
 def _errors(
@@ -273,8 +273,8 @@ def _errors(
     if extended:
         curves.append(Curve(EXTENDED, parted(errors.after[:, column] / factor)))
     shown = np.concatenate([curve.values for curve in curves] + [_BAND * sigma])
-    title = f"{capital(_called(channel))}: measured - predicted [{channel.shown}]"
-    return _symmetric(title, 1.1, curves, shown)
+    title = f"{capital(_called(channel))}: measured - predicted"
+    return _symmetric(title, channel.shown, 1.1, curves, shown)
 
 
 def _called(channel: Channel) -> str:
@@ -286,9 +286,11 @@ def _shown(channel: Channel) -> float:
     return si_factor(channel.shown, channel.unit, f"channel {channel.name}")
 
 
-def _symmetric(title: str, height: float, curves: Sequence[Curve], shown: Vector) -> Panel:
+def _symmetric(
+    title: str, unit: str, height: float, curves: Sequence[Curve], shown: Vector
+) -> Panel:
     reach = _ROOM * float(np.nanmax(np.abs(shown))) or 1.0
-    return Panel(title, -reach, reach, height, tuple(curves))
+    return Panel(f"{title} [{unit}]", unit, -reach, reach, height, tuple(curves))
 
 
 def _finding(channels: Sequence[Channel], errors: Lasting, extension: str, seconds: float) -> str:

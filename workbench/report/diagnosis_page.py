@@ -12,14 +12,13 @@ import numpy as np
 from workbench.diagnosis.outcome import duration
 from workbench.files import write_whole
 from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, lasting_blocks
-from workbench.report.drawing import drawing
 from workbench.report.figures import CaseFigure
-from workbench.report.templates import environment
+from workbench.report.recordings import placed
+from workbench.report.templates import rendered
 from workbench.report.views import called, capital, named
 from workbench.system import System
 from workbench.units import si_factor
 
-_BLOCKS = 900  # of a curve, two points each
 _FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
 _SIMILAR = 0.7  # cosine from which on a pair is worth a word
 _PAIRS = 8  # that are put in words
@@ -40,31 +39,28 @@ def write_diagnosis_page(
     figures : one for each recording, the one that shows most first.
     """
     modelica = summary["model"]["modelica"]
-    text = (
-        environment()
-        .get_template("diagnosis.html")
-        .render(
-            summary=summary,
-            drawings=[drawing(figure, _BLOCKS) for figure in figures],
-            found=[cause["effect"] for cause in summary["causes"]],
-            dependences=_dependences(summary["dependences"]),
-            channels=list(summary["lasting_errors"]),
-            candidates=_candidates(summary),
-            matrix=_matrix(summary),
-            pairs=_pairs(summary["confusability"]),
-            dots=None if summary["gain"] is None else _dots(summary["gain"]),
-            errors=_errors(system, summary),
-            styles={"nominal": NOMINAL, "extended": EXTENDED},
-            flagged=_FLAGGED,
-            words=_words(system, summary, figures),
-            source=None if modelica is None else Path(modelica).read_text(),
-            # What is written into the folder is linked from there.
-            files={
-                key: Path(summary["model"][key]).relative_to(folder).as_posix()
-                for key in ("modelica", "fmu")
-                if summary["model"][key] is not None
-            },
-        )
+    text = rendered(
+        "diagnosis.html",
+        summary,
+        drawings=placed(figures, summary, folder),
+        found=[cause["effect"] for cause in summary["causes"]],
+        dependences=_dependences(summary["dependences"]),
+        channels=list(summary["lasting_errors"]),
+        candidates=_candidates(summary),
+        matrix=_matrix(summary),
+        pairs=_pairs(summary["confusability"]),
+        dots=None if summary["gain"] is None else _dots(summary["gain"]),
+        errors=_errors(system, summary),
+        styles={"nominal": NOMINAL, "extended": EXTENDED},
+        flagged=_FLAGGED,
+        words=_words(system, summary, figures),
+        source=None if modelica is None else Path(modelica).read_text(),
+        # What is written into the folder is linked from there.
+        files={
+            key: Path(summary["model"][key]).relative_to(folder).as_posix()
+            for key in ("modelica", "fmu")
+            if summary["model"][key] is not None
+        },
     )
     path = folder / "index.html"
     write_whole(path, text)

@@ -1,7 +1,7 @@
-"""A figure of a recording as geometry for a page, where it can be zoomed.
+"""A figure of a recording as geometry for a page, where it can be zoomed and read.
 
 A panel of a figure is an `svg` of its own, whose view box is time [ms] by value; zooming is a
-change of that view box.
+change of that view box, and curves are drawn anew from all samples, which come along.
 """
 
 from typing import Any
@@ -12,20 +12,21 @@ from numpy.typing import NDArray
 
 from workbench.fmu import Vector
 from workbench.report.figures import CaseFigure, Curve, Panel
+from workbench.report.packing import packed
 
 _LEVELS = 4000  # units of a panel's height: 1 % of it can be zoomed to full height
-_LEFT, _WIDTH, _RIGHT = 58, 890, 12  # of the panels [px]
+_LEFT, _WIDTH, _RIGHT = 58, 890, 40  # of the panels [px]
+_BLOCKS = 450  # of a curve before it is drawn anew, each by its extremes: a pixel each
+_MOST = 2_400_000  # [byte] of a figure's samples; of longer ones only the extremes are drawn
+FURTHER = {"m/s": ("km/h", 3.6)}  # units that people read beside the one of a panel
 _HEIGHT = 110  # of a panel of height 1 [px]
 _HEAD, _FOOT = 24, 40  # room for a panel's title, for the time axis [px]
 
 
-def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
-    """Geometry of a figure for the template, in pixels, and in the units of the panels inside.
-
-    Parameters
-    ----------
-    blocks : most per curve, each drawn by its extremes.
-    """
+def drawing(figure: CaseFigure) -> dict[str, Any]:
+    """Geometry of a figure for the template, in pixels, and in the units of the panels inside."""
+    told, samples = packed(figure)
+    whole = len(samples) <= _MOST
     begin, end = float(figure.time[0]), float(figure.time[-1])
     panels = []
     top = 0
@@ -35,6 +36,8 @@ def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
         panels.append(
             {
                 "title": panel.title,
+                "unit": panel.unit,
+                "further": _further(panel, top, height),
                 "top": top,
                 "height": height,
                 "low": panel.low,
@@ -46,12 +49,16 @@ def drawing(figure: CaseFigure, blocks: int) -> dict[str, Any]:
                 "zero": round(_LEVELS * panel.high / (panel.high - panel.low))
                 if panel.low < 0 < panel.high
                 else None,
-                "curves": [_curve(figure.time, curve, panel, blocks) for curve in panel.curves],
+                "curves": [_curve(figure.time, curve, panel) for curve in panel.curves],
             }
         )
         top += height
     return {
         "figure": figure,
+        "elsewhere": "",
+        "size": (len(samples) if whole else 0) + _size(panels),  # [byte] about, on the page
+        "told": told,
+        "samples": samples if whole else "",
         "left": _LEFT,
         "width": _WIDTH,
         "total": _LEFT + _WIDTH + _RIGHT,
@@ -78,7 +85,26 @@ def ticks_within(low: float, high: float, most: int) -> list[tuple[float, str]]:
     return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]
 
 
-def _curve(time: Vector, curve: Curve, panel: Panel, blocks: int) -> dict[str, Any]:
+def _size(panels: list[dict[str, Any]]) -> int:
+    """Bytes of all paths."""
+    curves = [curve for panel in panels for curve in panel["curves"]]
+    return sum(len(curve["path"]) + len(curve["band"]) for curve in curves)
+
+
+def _further(panel: Panel, top: float, height: float) -> dict[str, Any] | None:
+    """Ticks of a further unit at the right, None where there is none."""
+    if panel.unit not in FURTHER:
+        return None
+    unit, factor = FURTHER[panel.unit]
+    low, high = factor * panel.low, factor * panel.high
+    ticks = [
+        (top + height * (high - value) / (high - low), text)
+        for value, text in ticks_within(low, high, max(3, round(height) // 28))
+    ]
+    return {"unit": unit, "factor": factor, "ticks": ticks}
+
+
+def _curve(time: Vector, curve: Curve, panel: Panel) -> dict[str, Any]:
     """Path of a curve, and of the band of one standard deviation if it has one."""
     milliseconds = np.rint(1e3 * (time - time[0]))
     scale = _LEVELS / (panel.high - panel.low)
@@ -87,13 +113,13 @@ def _curve(time: Vector, curve: Curve, panel: Panel, blocks: int) -> dict[str, A
         # Values far outside are seen nowhere; cut, they cost fewer digits.
         return np.clip(np.rint((panel.high - values) * scale), -_LEVELS, 2 * _LEVELS)
 
-    kept = extremes(curve.values, blocks)
+    kept = extremes(curve.values, _BLOCKS)
     x, y = milliseconds[kept], levels(curve.values[kept])
     known = np.isfinite(y)
     runs = np.split(np.arange(y.size), np.flatnonzero(np.diff(known)) + 1)
     band = ""
     if curve.sigma is not None:
-        kept = extremes(curve.values, blocks // 4)
+        kept = extremes(curve.values, _BLOCKS // 2)
         kept = kept[np.isfinite(curve.values[kept] + curve.sigma[kept])]
         if kept.size:
             values, sigma, there = curve.values[kept], curve.sigma[kept], milliseconds[kept]

@@ -96,6 +96,7 @@ class Panel:
     """Curves on one axis from `low` to `high`; `height` is relative to the other panels."""
 
     title: str
+    unit: str
     low: float
     high: float
     height: float
@@ -158,7 +159,7 @@ def run_figure(run: Run) -> CaseFigure:
     for name, unit in run.columns.items():
         if not np.isnan(run.signal(name)).all():
             curve = Curve("2", run.signal(name), _known(run.deviation(name)))
-            panels.append(_panel(f"{name} [{unit}]", _claimed(curve, run, name), height=1.0))
+            panels.append(_panel(name, unit, _claimed(curve, run, name)))
     panels += [panel for panel in [_probabilities([run])] if panel.curves]
     legend = (("2", run.estimator),)
     return CaseFigure(run.case, run.summary(), "", run.time, None, legend, tuple(panels))
@@ -268,6 +269,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     low, high = _range(signals) if measured is None else _range([measured], margin=0.25)
     return Panel(
         titled(view, unit),
+        unit,
         low if view.low is None else view.low,
         high if view.high is None else view.high,
         view.height,
@@ -289,7 +291,7 @@ def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Pane
     reach = _reach([np.abs(curve.values[window]) for curve in curves])
     within = f", {below(system)}" if below(system) else ""
     title = f"Error of {judged}, estimated - measured{within} [{unit}]"
-    return Panel(title, -reach, reach, 1.1, tuple(curves))
+    return Panel(title, unit, -reach, reach, 1.1, tuple(curves))
 
 
 def _probabilities(runs: Iterable[Run]) -> Panel:
@@ -297,7 +299,7 @@ def _probabilities(runs: Iterable[Run]) -> Panel:
     modes = [one for run in runs for one in run.probability.items()]
     title = "Probability of " + ", ".join(name.replace("_", " ") for name, _ in modes) + " [1]"
     curves = [Curve(ESTIMATORS[i % len(ESTIMATORS)], one) for i, (_, one) in enumerate(modes)]
-    return Panel(title, -0.05, 1.05, 0.6, tuple(curves))
+    return Panel(title, "1", -0.05, 1.05, 0.6, tuple(curves))
 
 
 def _estimated(
@@ -332,8 +334,9 @@ def _known(sigma: Vector) -> Vector | None:
     return None if np.isnan(sigma).all() else sigma
 
 
-def _panel(title: str, curves: Sequence[Curve], height: float) -> Panel:
-    return Panel(title, *_range([c.values for c in curves]), height, tuple(curves))
+def _panel(name: str, unit: str, curves: Sequence[Curve]) -> Panel:
+    low, high = _range([curve.values for curve in curves])
+    return Panel(f"{name} [{unit}]", unit, low, high, 1.0, tuple(curves))
 
 
 def _range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:

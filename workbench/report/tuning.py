@@ -12,7 +12,7 @@ import numpy as np
 
 from workbench.files import write_whole
 from workbench.report.drawing import ticks_within
-from workbench.report.templates import environment
+from workbench.report.templates import rendered
 from workbench.tuning.validation import NEGLIGIBLE, STEP
 
 _REASONED, _TUNED = "0", "2"  # styles of curves
@@ -92,25 +92,22 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
     ----------
     summary : as written to summary.json.
     """
-    text = (
-        environment()
-        .get_template("tuning.html")
-        .render(
-            summary=summary,
-            headline=headline(summary),
-            news=bad_news(summary),
-            cases=_worst_first(summary),
-            gains=_gains(summary),
-            folds=_folds(summary),
-            compared=_compared(summary),
-            dots=_dots(summary),
-            curve=_convergence(summary),
-            styles={"reasoned": _REASONED, "tuned": _TUNED},
-            gains_path=shlex.quote(str(folder / "gains.toml")),
-            follows=summary["follows"],
-            negligible=NEGLIGIBLE,
-            step=STEP,
-        )
+    text = rendered(
+        "tuning.html",
+        summary,
+        headline=headline(summary),
+        news=bad_news(summary),
+        cases=_worst_first(summary),
+        gains=_gains(summary),
+        folds=_folds(summary),
+        compared=_compared(summary),
+        dots=_dots(summary),
+        curve=_convergence(summary),
+        styles={"reasoned": _REASONED, "tuned": _TUNED},
+        gains_path=shlex.quote(str(folder / "gains.toml")),
+        follows=summary["follows"],
+        negligible=NEGLIGIBLE,
+        step=STEP,
     )
     path = folder / "index.html"
     write_whole(path, text)
