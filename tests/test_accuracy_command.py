@@ -37,6 +37,7 @@ from workbench.wheelset.accuracy import (
 from workbench.wheelset.accuracy_report import format_accuracy
 from workbench.wheelset.truth import Truth, read_truth
 
+from .page_rules import check_page
 from .schemas import check
 
 DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
@@ -206,6 +207,9 @@ def test_command_writes_every_stop_and_the_worst(
         }
     summary = json.loads((tmp_path / "accuracy.json").read_text())
     check("accuracy", summary)
+    page = check_page(tmp_path / "index.html", summary)
+    assert len(page.get_element_by_id("stop-table").xpath("tbody/tr")) == len(cases)
+    assert len(page.get_element_by_id("worst-table").xpath("tbody/tr")) == len(ROWS)
     table = pd.read_csv(tmp_path / "accuracy.csv").set_index(["case", "estimator"])
     for name, stop in stops.items():
         expected = {

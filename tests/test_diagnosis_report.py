@@ -22,6 +22,7 @@ from workbench.report.figures import CaseFigure
 from workbench.system import System
 
 from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
+from .page_rules import check_page
 from .schemas import check
 
 
@@ -36,8 +37,9 @@ def summary(results: Path) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
 
-def test_the_summary_is_as_its_schema_says(summary: dict[str, Any]) -> None:
+def test_summary_and_page_are_as_all_are(results: Path, summary: dict[str, Any]) -> None:
     check("diagnose", summary)
+    check_page(results / "index.html", summary)
 
 
 @pytest.fixture(scope="session")

@@ -29,6 +29,7 @@ from workbench.systems import load_system
 from .distances import parted
 from .heater import NOISE, cases, diagnosed
 from .heater import system as heater
+from .page_rules import check_page
 from .schemas import check
 
 # --- criteria ---
@@ -261,6 +262,8 @@ def test_the_command_writes_what_it_prints(
     assert main(["next", str(tmp_path), *options]) == 0
     said = json.loads((out / "next.json").read_text())
     check("next", said)
+    page = check_page(out / "index.html", said)
+    assert len(page.get_element_by_id("tried-table").xpath("tbody/tr")) == len(said["tried"])
     assert said["sentence"] in capsys.readouterr().out
     assert said["rivals"] == ["Draught", "Radiation"]
     assert len(pd.read_csv(out / "experiments.csv")) == len(said["tried"])

@@ -18,6 +18,7 @@ from workbench.observers import operating
 from workbench.system import OperatingPoint
 from workbench.systems import load_system
 
+from .page_rules import check_page
 from .schemas import check
 
 ROOT = Path(__file__).parents[1]
@@ -336,6 +337,11 @@ def test_command_tells_when_frictions_are_known(start_of_a_stop, tmp_path, capsy
     assert (out / "dry.png").stat().st_size > 0
     summary = json.loads((out / "observability.json").read_text())
     check("observability", summary)
+    page = check_page(out / "index.html", summary)
+    (row,) = page.get_element_by_id("case-table").xpath("tbody/tr")
+    told = summary["cases"]["dry"]["models"]["MinimalObserver"]["useful"]
+    assert f"{100 * told['dmuDC']:.0f}" in [cell.text_content() for cell in row]
+    assert page.get_element_by_id("linear-FullObserver").xpath("tbody/tr")
     assert summary["linear"]["MinimalObserver"]["observable"]
     stop = summary["cases"]["dry"]["models"]
     # Pads touch within the first two of some 75 windows: 97 %.

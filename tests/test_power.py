@@ -37,6 +37,7 @@ from workbench.systems import load_system
 from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
 
+from .page_rules import check_page
 from .processes import comes_true, living
 from .schemas import check
 
@@ -249,9 +250,13 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
     assert [one["said"] for one in found["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
     assert len(found["failed"]) == 1
     write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
-    check("power", json.loads((tmp_path / "power.json").read_text()))
+    written = json.loads((tmp_path / "power.json").read_text())
+    check("power", written)
+    page = check_page(tmp_path / "index.html", written)
+    assert len(page.get_element_by_id("effect-table").xpath("tbody/tr")) == len(found["effects"])
     assert {path.name for path in tmp_path.iterdir()} == {
         "power.json",
+        "index.html",
         *(
             f"{name}.{kind}"
             for name in ("power", "confusion", "coverage")
@@ -264,7 +269,7 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
 def test_run_that_ended_early_is_reported(results: list[Diagnosed], tmp_path: Path) -> None:
     found = summarise(results, REPERTOIRE)
-    write_power(found, REPERTOIRE.effects, {}, tmp_path)
+    write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
     assert f"{len(results)} sets" in format_power(found)
 
 

@@ -23,6 +23,8 @@ from workbench.report.answers import standings
 from workbench.report.views import label
 from workbench.system import System
 
+from .page_rules import check_page
+
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
 UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
 
@@ -53,6 +55,10 @@ def summary(results: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def page(results: Path) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
+
+
+def test_page_is_as_all_are(results: Path, summary: dict[str, Any]) -> None:
+    check_page(results / "index.html", summary)
 
 
 def columns(table: Any) -> list[str]:

@@ -23,6 +23,7 @@ from workbench.report.tuning import write_tuning_page
 from workbench.system import System
 from workbench.systems import load_system, open_model
 
+from .page_rules import check_page
 from .processes import ending
 from .schemas import check
 
@@ -71,8 +72,9 @@ def summary(results: Path) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
 
-def test_the_summary_is_as_its_schema_says(summary: dict[str, Any]) -> None:
+def test_summary_and_page_are_as_all_are(results: Path, summary: dict[str, Any]) -> None:
     check("tune", summary)
+    check_page(results / "index.html", summary)
 
 
 @pytest.fixture(scope="module")

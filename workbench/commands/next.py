@@ -35,10 +35,10 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "system": system.name,
             "diagnosis": str(options.result),
         }
-        figure = write_next_stop(found, provenance, options.out)
+        page = write_next_stop(found, provenance, options.out)
     output.stage("done")
     output.result(found.summary())
-    output.result(f"to see: {figure}, data beside it")
+    output.result(f"to read: {page}, data and figure beside it")
     return Done(read_result(options.out / "next.json"), {"duration": "s", "every": "s"})
 
 

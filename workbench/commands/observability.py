@@ -21,6 +21,7 @@ from workbench.report.observability import (
     write_observability,
     write_windows,
 )
+from workbench.report.observability_page import write_observability_page
 from workbench.system import FULL, OBSERVER, System
 from workbench.systems import open_model
 
@@ -64,8 +65,10 @@ def _run(
         output.result(format_observability(system, tests, done))
         path = options.out / "observability.json"
         write_observability(system, tests, done, provenance, path)
-        output.result(f"{len(done)} of {len(cases)} cases; figures, CSV and JSON in {options.out}")
         summary = read_result(path)
+        page = write_observability_page(summary, done, len(cases), options.out)
+        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(told)
     return Done(summary, _units(system), 130 if interrupted else 0)
 
 

@@ -108,7 +108,7 @@ def _usual(
     summary = summarise(results, Repertoire(rig.plantables, effects))
     write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)
     output.result(format_power(summary))
-    output.result(f"data and figures: {options.out}")
+    output.result(f"to read: {options.out / 'index.html'}, data and figures beside it")
     return _told(options.out / "power.json", interrupted)
 
 

@@ -168,9 +168,10 @@ def observed(system: System, summary: Mapping[str, Any]) -> Answer:
             middle = float(np.median(list(shares.values())))
             headline[f"time in which {one.name} can be told, median"] = _percent(middle, "higher")
             low, high = min(shares.values()), max(shares.values())
+            between = f" ({_whole(low)} to {_whole(high)})" if len(shares) > 1 else ""
             words.append(
-                f"{one.label} {one.name} to {one.useful:g}{_unit(one.unit)} in {middle:.0%} of the "
-                "judged time" + (f" ({low:.0%} to {high:.0%})" if len(shares) > 1 else "")
+                f"{one.label} {one.name} to {one.useful:g}{_unit(one.unit)} in {_whole(middle)} of "
+                f"the judged time{between}"
             )
     first, test = next(iter(summary["linear"].items()))
     seen = "can" if test["observable"] else "cannot"
@@ -220,7 +221,7 @@ def proposed(summary: Mapping[str, Any]) -> Answer:
     if several:
         headline["separation"] = Measure(best["separation"], "1", "higher")
         headline["chance that the right cause is named"] = _percent(best["chance"], "higher")
-        sure = f" The right one is then named with a chance of {best['chance']:.0%}."
+        sure = f" The right one is then named with a chance of {_whole(best['chance'])}."
         return Answer(summary["sentence"] + sure * summary["parts"], headline)
     before, after = best["deviation"]["before"], best["deviation"]["after"]
     headline["times as sure"] = Measure(before / after, "1", "higher")
@@ -241,10 +242,19 @@ def _share(one: Mapping[str, Any], better: Better) -> Measure:
 
 def _interval(one: Mapping[str, Any]) -> str:
     return (
-        f"{one['hits']} of {one['of']} sets ({one['share']:.0%}, 95 %: {one['low']:.0%} to "
-        f"{one['high']:.0%})"
+        f"{one['hits']} of {one['of']} sets ({_whole(one['share'])}, 95 %: {_whole(one['low'])} "
+        f"to {_whole(one['high'])})"
     )
 
 
 def _unit(unit: str) -> str:
     return "" if unit == "1" else f" {unit}"
+
+
+def _whole(share: float) -> str:
+    """A share in whole percent.
+
+    >>> _whole(0.906)
+    '91 %'
+    """
+    return f"{100.0 * share:.0f} %"

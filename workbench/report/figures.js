@@ -6,7 +6,10 @@ const MARGIN = 0.06; // of a fitted panel, above and below its curves
 function ticks(low, high, most) {
   const rough = (high - low) / most;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
+  const first = [1, 2, 5, 10].find((factor) => factor * power >= rough);
+  let step = power * first;
+  // Two marks make an axis.
+  if (Math.floor(high / step) - Math.ceil(low / step) < 1) step /= first === 5 ? 2.5 : 2;
   const values = [];
   for (let k = Math.ceil(low / step); k * step <= high; k += 1) values.push(k * step);
   return values.map((value) => [value, String(Number(value.toPrecision(6))).replace("-", "−")]);

@@ -11,24 +11,26 @@ from workbench.experiments import NextStop
 from workbench.files import write_json, write_whole
 from workbench.report.answers import proposed, with_answer
 from workbench.report.figures import ESTIMATORS, LIGHT, STYLE, save_figure
+from workbench.report.next_stop_page import write_next_stop_page
 from workbench.units import si_factor
 
 _BAND = 2.0  # standard deviations of a block's mean
 
 
 def write_next_stop(found: NextStop, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write next.json, experiments.csv and the figure of the best ones; returns the figure.
+    """Write next.json, experiments.csv, the figure of the best ones and the page; returns this.
 
     Parameters
     ----------
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    write_json(out / "next.json", with_answer(proposed(summary), summary))
+    told = with_answer(proposed(summary), summary)
+    write_json(out / "next.json", told)
     write_whole(out / "experiments.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
     figure = out / "responses.png"
     save_figure(responses_figure(found), [figure, figure.with_suffix(".svg")])
-    return figure
+    return write_next_stop_page(found, told, out)
 
 
 def responses_figure(found: NextStop) -> Figure:

@@ -13,6 +13,7 @@ from workbench.power import CLEAR, VISIBLE, Findable
 from workbench.report.answers import powered, with_answer
 from workbench.report.diagnosis_figures import draw_heat
 from workbench.report.figures import LIGHT, STYLE, save_figure
+from workbench.report.power_page import write_power_page
 
 _COLUMNS = 5  # of power curves
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
@@ -31,7 +32,9 @@ def write_power(
     effects : of the library, in whose order they stand.
     """
     content = {"provenance": provenance, **summary}
-    write_json(out / "power.json", with_answer(powered(summary), content))
+    told = with_answer(powered(summary), content)
+    write_json(out / "power.json", told)
+    write_power_page(told, out)
     names = [effect.name for effect in effects]
     measured = summary["effects"]
     with mpl.rc_context(STYLE | {"font.size": 8}):

@@ -12,6 +12,8 @@ import pandas as pd
 from workbench.answer import Answer, Measure
 from workbench.files import write_json, write_whole
 from workbench.report.answers import with_answer
+from workbench.report.views import label, percent
+from workbench.system import System
 from workbench.wheelset.accuracy import (
     COVERED,
     NOISE,
@@ -45,7 +47,7 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
 
 
 def write_accuracy(
-    stops: Sequence[StopAccuracy], provenance: Mapping[str, Any], path: Path
+    system: System, stops: Sequence[StopAccuracy], provenance: Mapping[str, Any], path: Path
 ) -> None:
     """Write accuracy.json: each estimator in each stop, and the worst of them by row.
 
@@ -72,10 +74,10 @@ def write_accuracy(
             for name in stops[0].estimators
         },
     }
-    write_json(path, with_answer(_answer(stops), summary))
+    write_json(path, with_answer(_answer(system, stops), summary))
 
 
-def _answer(stops: Sequence[StopAccuracy]) -> Answer:
+def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
     """The worst of each row by estimator, and whose worst force is nearest."""
     headline, force = {}, {}
     for name in stops[0].estimators:
@@ -97,12 +99,12 @@ def _answer(stops: Sequence[StopAccuracy]) -> Answer:
         return Answer("No estimator has a force in every stop.", headline, details)
     best = min(force, key=lambda name: force[name])
     share = covered(stops, best, "Fx")
-    bands = (
-        "" if share is None else f"; its 95 % bands hold {share:.1%} of the samples of the truth"
-    )
+    held = ""
+    if share is not None:
+        held = f"; its 95 % bands hold the truth in {100.0 * share:.1f} % of the time"
     sentence = (
-        f"Nearest to the true force is {best}: its error is {force[best]:.2%} of the mean force in "
-        f"the worst of {len(stops)} stops{bands}."
+        f"Nearest to the true force is the {label(best, system)}: its error is "
+        f"{percent(force[best])} of the mean force in the worst of {len(stops)} stops{held}."
     )
     return Answer(sentence, headline, details)
 
@@ -134,7 +136,7 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
     lines = ["Worst over the stops that a row concerns, below 5 Hz", header, "-" * len(header)]
     for row in ROWS:
         cells = (
-            f"  {_cell(row, worst(row, stops, name)):>{max(_CELL, len(name))}}" for name in names
+            f"  {cell(row, worst(row, stops, name)):>{max(_CELL, len(name))}}" for name in names
         )
         lines.append(f"{row.text:<{width}}{''.join(cells)}")
     lines.append("-" * len(header))
@@ -170,12 +172,12 @@ def _covers(stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str) 
     return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
 
 
-def _cell(row: Row, found: Worst | None) -> str:
+def cell(row: Row, found: Worst | None) -> str:
     """A value as a text; empty if there is nothing to judge.
 
-    >>> _cell(ROWS[0], Worst("01", 0.00271)), _cell(ROWS[4], Worst("09", 0.0729))
+    >>> cell(ROWS[0], Worst("01", 0.00271)), cell(ROWS[4], Worst("09", 0.0729))
     ('0.27 %', '+7.3 %')
-    >>> _cell(ROWS[5], Worst("01", math.inf)), _cell(ROWS[6], Worst("01", 0.02))
+    >>> cell(ROWS[5], Worst("01", math.inf)), cell(ROWS[6], Worst("01", 0.02))
     ('never', 'none')
     """
     if found is None:

@@ -13,6 +13,7 @@ from workbench.observers.gains_file import usual_gains
 from workbench.provenance import run_of, sources
 from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
+from workbench.wheelset.accuracy_page import write_accuracy_page
 from workbench.wheelset.accuracy_report import format_accuracy, write_accuracies, write_accuracy
 from workbench.wheelset.truth import read_truth
 
@@ -47,7 +48,8 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             output.step(len(stops), len(cases), case.name, begin)
         output.result(format_accuracy(stops))
         write_accuracies(stops, options.out / "accuracy.csv")
-        write_accuracy(stops, provenance, options.out / "accuracy.json")
-    output.result(f"every stop: {options.out / 'accuracy.csv'}, accuracy.json beside it")
-    summary = read_result(options.out / "accuracy.json")
+        write_accuracy(system, stops, provenance, options.out / "accuracy.json")
+        summary = read_result(options.out / "accuracy.json")
+        page = write_accuracy_page(system, summary, stops, options.out)
+    output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
     return Done(summary, {name: one["unit"] for name, one in summary["quantities"].items()})

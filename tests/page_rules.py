@@ -1,0 +1,46 @@
+"""What holds of every page: one answer at the top, rules of accessible pages, no network."""
+
+import re
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import lxml.html
+import numpy as np
+
+_MOST = 3e6  # [byte] of a page
+
+
+def check_page(path: Path, summary: dict[str, Any]) -> Any:
+    """Refuse a page that breaks a rule; returns it."""
+    assert path.stat().st_size < _MOST
+    page = lxml.html.fromstring(path.read_bytes())
+    (answer,) = page.xpath("//header//p[@class='headline']")
+    assert " ".join(answer.text_content().split()).endswith(summary["answer"]["sentence"])
+    run = summary["provenance"]["run"]
+    assert run["title"] in page.xpath("string(//header/p[@class='kicker'])")
+    levels = [int(heading.tag[1]) for heading in page.xpath("//main//*[self::h2 or self::h3]")]
+    assert levels[0] == 2
+    assert max(np.diff(levels), default=0) <= 1
+    assert len(page.xpath("//h1")) == 1
+    # What shows the answer is open, the rest is folded.
+    assert [one.get("open") is not None for one in page.xpath("//section/details")].count(True) == 1
+    assert page.xpath("//section/details")[0].get("open") is not None
+    ids = page.xpath("//@id")
+    assert len(ids) == len(set(ids))
+    assert set(page.xpath("//@aria-labelledby")) <= set(ids)
+    for table in page.xpath("//table"):
+        assert table.xpath("string(caption)").strip()
+        assert all(cell.get("scope") == "col" for cell in table.xpath("thead//th"))
+        width = len(table.xpath("thead/tr/th"))
+        for row in table.xpath("tbody/tr"):
+            assert row[0].get("scope") == "row"
+            assert len(row) == width
+    for drawing in page.xpath("//svg[not(ancestor::svg)]"):
+        assert drawing.get("role") == "img"
+        assert drawing.get("aria-label").strip()
+    for link in map(unquote, page.xpath("//a/@href")):
+        assert link[1:] in ids if link.startswith("#") else (path.parent / link).is_file(), link
+    text = re.sub(r"data:,", "", path.read_text())
+    assert not re.search(r"(?:src|href)=\"(?:https?:)?//|url\(|@import", text)
+    return page
