@@ -144,6 +144,15 @@ class Simulation:
                 for name, kind in self.kinds.items()
             }
 
+    def meanings(self) -> dict[str, dict[str, tuple[str, str]]]:
+        """What each gain of each estimator does, and its unit."""
+        with ExitStack() as stack:
+            models = _models(stack, self.system, self.kinds)
+            return {
+                name: kind.meanings(models[kind.role], self.system, self.gains[name])
+                for name, kind in self.kinds.items()
+            }
+
     def run(self, case: Case) -> CaseResult:
         """All estimators on one case, in this process."""
         with self.estimators() as estimators:

@@ -48,7 +48,13 @@ def _run(
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
     run = run_of("simulate", system, sources(cases))
-    provenance = {"run": run, **_models(simulation), **_settings(simulation, cases[0])}
+    settings = _settings(simulation, cases[0])
+    provenance = {"run": run, **_models(simulation), **settings}
+    provenance["meanings"] = {
+        name: {gain: {"text": text, "unit": unit} for gain, (text, unit) in one.items()}
+        for name, one in simulation.meanings().items()
+        if name in settings
+    }
     if window is None:
         runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
     else:

@@ -18,6 +18,7 @@ from workbench.diagnosis.search import Step
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
+from workbench.lab import with_interval
 from workbench.system import Channel, Signal, System
 from workbench.units import si_factor
 
@@ -111,8 +112,8 @@ class Outcome:
         for cause in found.causes:
             label, one = next(iter(cause.parameters.items()))
             twins = f" (or {', '.join(cause.confusable_with)})" if cause.confusable_with else ""
-            unit = "" if one.unit == "1" else f" {one.unit}"
-            names.append(f"{cause.effect.name}{twins}, {label} {one.value:.3g}{unit}")
+            size = with_interval(one.value, one.low, one.high, one.unit)
+            names.append(f"{cause.effect.name}{twins}, {label} {size}, {cause.effect.text}")
         assert found.gain is not None
         more = " The search was interrupted: more may be missing." if found.interrupted else ""
         return (

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from workbench.lab import said
 from workbench.power import VISIBLE
 from workbench.report.parts import Cell, Column, Dot, Dots, Part, Table, number, write_parts
 
@@ -71,8 +72,8 @@ def _effects(summary: Mapping[str, Any]) -> Table:
     ]
     rows = []
     for name, one in effects.items():
-        unit = "" if one["unit"] == "1" else f" {one['unit']}"
-        cells = [Cell(f"{one['size']:g}{unit}")]
+        (size,), unit = said([one["size"]], one["unit"])
+        cells = [Cell(f"{size:.3g} {unit}")]
         cells += [_share(one["right_first"].get(size)) for size in sizes]
         cells += [_share(one["coverage"]), Cell("hidden" if one["hidden"] else "")]
         rows.append((name, tuple(cells)))

@@ -9,6 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from workbench.lab import with_interval
 from workbench.report.figures import DARK, LIGHT
 from workbench.report.views import percent
 
@@ -61,9 +62,15 @@ def _environment(label: Callable[[str], str]) -> Environment:
         "anchor": _anchor,
         "significant": _significant,
         "day": _day,
+        "lab": _lab,
     }
     found.globals["colours"] = {"light": LIGHT, "dark": DARK}
     return found
+
+
+def _lab(one: Mapping[str, Any]) -> str:
+    """A size with its interval, as people in a laboratory say it."""
+    return with_interval(one["value"], one["low"], one["high"], one["unit"])
 
 
 def _day(date: str) -> str:

@@ -67,8 +67,9 @@ def _simulate() -> Schema:
         "additionalProperties": False,
     }
     case = closed({"title": TEXT, "doubts": listed(TEXT), "estimators": by_name(score)})
+    meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
     provenance = {
-        **closed({"run": RUN, **VERSIONS, "fmu": FMU}),
+        **closed({"run": RUN, **VERSIONS, "fmu": FMU, "meanings": meanings}),
         "additionalProperties": {"type": "object"},  # other models, settings of each estimator
     }
     entries = {"weights": by_name(NUMBER), "cases": by_name(case)}
