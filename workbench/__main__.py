@@ -11,6 +11,7 @@ from pathlib import Path
 
 from workbench.commands.options import command_line
 from workbench.commands.output import Output
+from workbench.commands.pdf import browser, print_page
 from workbench.confinement import confine
 from workbench.errors import FMUError, InputError, WorkerError
 from workbench.supervision import run_program, supervised
@@ -53,7 +54,13 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         if getattr(options, "isolated", False) and not confined:
             folders = json.dumps([str(folder) for folder in _written(options)])
             return run_program([sys.executable, "-c", _CONFINED, folders, *given])
-        return output.close(command, import_module(options.work).run(options, output))
+        printing = getattr(options, "pdf", False)
+        if printing:
+            browser()  # one that is missing is told before the work
+        done = import_module(options.work).run(options, output)
+        if printing and done.page is not None:
+            output.result(f"printed: {print_page(done.page)}")
+        return output.close(command, done)
     except InputError as error:
         return output.fail(command, 2, error)
     except (FMUError, WorkerError, OSError) as error:

@@ -97,6 +97,15 @@ def add_out(parser: argparse.ArgumentParser, folder: str) -> None:
     )
 
 
+def add_pdf(parser: argparse.ArgumentParser) -> None:
+    """Add whether the page is printed."""
+    parser.add_argument(
+        "--pdf",
+        action="store_true",
+        help="also print the page, as a report to sign (report.pdf); needs Chromium",
+    )
+
+
 def add_seed(parser: argparse.ArgumentParser, of: str) -> None:
     """Add the seed, the same of which gives the same numbers."""
     parser.add_argument(

@@ -84,4 +84,4 @@ def _run(
     output.stage("done")
     output.result(f"to read: {page}, data and figures beside it")
     status = 130 if outcome.diagnosis.interrupted else 0
-    return Done(read_result(options.out / "summary.json"), {}, status)
+    return Done(read_result(options.out / "summary.json"), {}, status, page)

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     output.stage("done")
     output.result(found.summary())
     output.result(f"to read: {page}, data and figure beside it")
-    return Done(read_result(options.out / "next.json"), {"duration": "s", "every": "s"})
+    return Done(read_result(options.out / "next.json"), {"duration": "s", "every": "s"}, page=page)
 
 
 def _read(file: Path) -> dict[str, Any]:

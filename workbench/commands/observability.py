@@ -59,6 +59,7 @@ def _run(
             interrupted = True
             pool.finish()
     summary: dict[str, Any] = {}
+    page: Path | None = None
     if done:
         done.sort(key=lambda one: one.case.name)
         tests = list(linear.values())
@@ -69,7 +70,7 @@ def _run(
         page = write_observability_page(summary, done, len(cases), options.out)
         told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
         output.result(told)
-    return Done(summary, _units(system), 130 if interrupted else 0)
+    return Done(summary, _units(system), 130 if interrupted else 0, page)
 
 
 def _units(system: System) -> dict[str, str]:

@@ -22,11 +22,13 @@ class Done:
     result : what it found, which --json prints; also the values that stand in its files.
     units : by key of `result`, at any depth; what is not named has the unit 1.
     status : of the process.
+    page : that shows it; None without.
     """
 
     result: Mapping[str, Any] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     status: int = 0
+    page: Path | None = None
 
 
 @dataclass(frozen=True)

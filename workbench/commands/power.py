@@ -109,7 +109,8 @@ def _usual(
     write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)
     output.result(format_power(summary))
     output.result(f"to read: {options.out / 'index.html'}, data and figures beside it")
-    return _told(options.out / "power.json", interrupted)
+    done = _told(options.out / "power.json", interrupted)
+    return replace(done, page=options.out / "index.html")
 
 
 def _sheet_error(

@@ -73,6 +73,7 @@ def _run(
     except InputError as error:  # such as a full disk: what was estimated is told all the same
         failure = error
     summary: dict[str, Any] = {}
+    page: Path | None = None
     if done:
         done.sort(key=lambda result: result.case.name)
         output.result(format_table(system, done))
@@ -88,13 +89,13 @@ def _run(
         raise failure
     units = _units(system)
     if interrupted:
-        return Done(summary, units, 130)
+        return Done(summary, units, 130, page)
     idle = _idle(done)
     for name in idle:
         print(
             f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
         )
-    return Done(summary, units, 1 if idle else 0)
+    return Done(summary, units, 1 if idle else 0, page)
 
 
 def _units(system: System) -> dict[str, str]:

@@ -103,7 +103,8 @@ def _run(
     output.result(format_tuned(summary))
     page = write_tuning_page(summary, out)
     output.result(f"written: {page}, gains.toml, summary and figures beside it")
-    return Done(summary, {"seconds": "s", "bandwidth": "Hz"}, 130 if tuned.interrupted else 0)
+    status = 130 if tuned.interrupted else 0
+    return Done(summary, {"seconds": "s", "bandwidth": "Hz"}, status, page)
 
 
 def _check(options: argparse.Namespace, cases: Sequence[Case]) -> None:

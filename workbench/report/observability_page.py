@@ -33,7 +33,7 @@ def write_observability_page(
     names = ", ".join(capital(one.label) for one in system.estimated) or "States"
     parts = [
         Part("shown", "Where the samples tell least", (_EXPLAINED,), recordings=tuple(drawn[:1])),
-        Part("cases", "Recordings", tables=(_cases(system, summary),)),
+        Part("cases", "Recordings", tables=(_cases(system, summary),), printed=True),
         Part("linear", "Linear test of the models", (_LINEAR,), tables=tuple(_states(summary))),
         Part("definitions", "Definitions", terms=_terms(summary)),
     ]

@@ -56,6 +56,9 @@ function start() {
   document.querySelectorAll("table.sortable").forEach(sortable);
   const figures = [...document.querySelectorAll("figure.zoomable")].map(zoomable);
   addEventListener("hashchange", reveal);
+  addEventListener("beforeprint", () => {
+    for (const one of document.querySelectorAll(".printed > details")) one.open = true;
+  });
   reveal();
   return Promise.all(figures);
 }

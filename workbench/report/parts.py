@@ -132,6 +132,7 @@ class Part:
 
     Attributes
     ----------
+    printed : whether it is in the printed report though it is folded on the page.
     text : paragraphs.
     recordings : geometry of figures, see `recordings.placed`.
     terms : definitions by what is defined.
@@ -144,6 +145,7 @@ class Part:
     recordings: tuple[Mapping[str, Any], ...] = ()
     tables: tuple[Table, ...] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
+    printed: bool = False
 
 
 def number(value: float | None, text: Callable[[float], str], heat: float | None = None) -> Cell:

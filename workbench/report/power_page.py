@@ -34,7 +34,7 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
     ]
     if summary["effects"]:
         tables = (_effects(summary),)
-        parts.insert(1, Part("effects", "By effect and size", tables=tables))
+        parts.insert(1, Part("effects", "By effect and size", tables=tables, printed=True))
     if summary["confusion"]:
         parts.insert(-1, Part("confusion", "What is taken for what", tables=(_confusion(summary),)))
     path = out / "index.html"

@@ -33,7 +33,7 @@ def rendered(
     """
     run = summary["provenance"]["run"]
     found = _environment(label).get_template(template)
-    return found.render(summary=summary, run=run, number=number_of(summary), **content)
+    return found.render(summary=summary, run=run, report=number_of(summary), **content)
 
 
 def number_of(summary: Mapping[str, Any]) -> str:

@@ -36,7 +36,7 @@ def write_accuracy_page(
             ("Each dot is a stop: error of the estimated force, rms over the mean of the truth.",),
             dots=(_forces(stops, names),),
         ),
-        Part("worst", "Worst stop by quantity", tables=(_worst(stops, names),)),
+        Part("worst", "Worst stop by quantity", tables=(_worst(stops, names),), printed=True),
         Part("stops", "Every stop", tables=(_stops(stops, names),)),
         Part(
             "definitions",

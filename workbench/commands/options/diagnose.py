@@ -7,6 +7,7 @@ from workbench.commands.arguments import (
     Commands,
     add_effects,
     add_isolated,
+    add_pdf,
     add_recordings,
     add_system,
     add_workers,
@@ -61,5 +62,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="of the extended FMU: this machine's, or all (default: %(default)s)",
     )
     add_workers(parser)
+    add_pdf(parser)
     add_isolated(parser)
     return parser

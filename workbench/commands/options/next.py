@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, add_isolated, add_out, add_workers
+from workbench.commands.arguments import Commands, add_isolated, add_out, add_pdf, add_workers
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -34,5 +34,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     add_out(parser, "results/next")
     add_workers(parser)
+    add_pdf(parser)
     add_isolated(parser)
     return parser

@@ -6,6 +6,7 @@ from workbench.commands.arguments import (
     Commands,
     add_isolated,
     add_models,
+    add_pdf,
     add_recordings,
     add_system,
     add_workers,
@@ -32,5 +33,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     add_system(observability)
     add_models(observability)
     add_workers(observability)
+    add_pdf(observability)
     add_isolated(observability)
     return observability

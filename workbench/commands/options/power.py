@@ -8,6 +8,7 @@ from workbench.commands.arguments import (
     add_effects,
     add_isolated,
     add_out,
+    add_pdf,
     add_reference,
     add_seed,
     add_system,
@@ -42,6 +43,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     add_system(parser)
     add_reference(parser, "that makes the recordings")
     add_out(parser, "results/power")
+    add_pdf(parser)
     add_isolated(parser)
     return parser
 

@@ -7,6 +7,7 @@ from workbench.commands.arguments import (
     Commands,
     add_isolated,
     add_models,
+    add_pdf,
     add_recordings,
     add_system,
     add_workers,
@@ -59,5 +60,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         action="store_true",
         help="show each run in a window as it goes, one after the other",
     )
+    add_pdf(parser)
     add_isolated(parser)
     return parser

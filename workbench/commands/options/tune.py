@@ -7,6 +7,7 @@ from workbench.commands.arguments import (
     Commands,
     add_isolated,
     add_map,
+    add_pdf,
     add_seed,
     add_system,
     add_told,
@@ -53,6 +54,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     add_map(parser)
     _add_search(parser)
     _add_work(parser)
+    add_pdf(parser)
     add_isolated(parser)
     return parser
 

@@ -52,4 +52,5 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         summary = read_result(options.out / "accuracy.json")
         page = write_accuracy_page(system, summary, stops, options.out)
     output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
-    return Done(summary, {name: one["unit"] for name, one in summary["quantities"].items()})
+    units = {name: one["unit"] for name, one in summary["quantities"].items()}
+    return Done(summary, units, page=page)

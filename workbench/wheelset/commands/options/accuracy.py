@@ -4,6 +4,7 @@ import argparse
 
 from workbench.commands.arguments import (
     Commands,
+    add_pdf,
     add_recordings,
     add_system,
     example_case,
@@ -36,4 +37,5 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="judge this one, may be repeated (default: all)",
     )
     add_system(accuracy)
+    add_pdf(accuracy)
     return accuracy
