@@ -21,6 +21,7 @@ from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.counting import BEYOND
 from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
+from workbench.provenance import run_of
 from workbench.report.diagnosis import write_diagnosis
 from workbench.system import System
 
@@ -190,7 +191,8 @@ def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
 ) -> None:
     recordings = cases(heater, [simulated(k, LOSS, 0.0) for k in range(3)])
     outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
-    page = lxml.html.fromstring(write_diagnosis(outcome, {}, tmp_path, 1).read_bytes())
+    provenance = {"run": run_of("diagnose", outcome.system, {})}
+    page = lxml.html.fromstring(write_diagnosis(outcome, provenance, tmp_path, 1).read_bytes())
     rows = page.xpath("//table[@id='error-table']/tbody/tr")
     assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out"]
     table = pd.read_csv(tmp_path / "errors.csv", dtype={"recording": str})

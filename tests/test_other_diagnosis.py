@@ -25,6 +25,7 @@ from workbench.diagnosis import Outcome, diagnose, read_effects
 from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.modelica import read_library
+from workbench.provenance import run_of
 from workbench.report.diagnosis import write_diagnosis
 from workbench.system import System
 from workbench.system_file import with_model
@@ -327,7 +328,7 @@ def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed: Diagnosed) -> N
 @pytest.mark.parametrize("load", [rubbing, nothing, gusts])
 def test_page_and_files_speak_of_the_fan(load: Torque, diagnosed: Diagnosed) -> None:
     outcome, out = diagnosed(load)
-    page = write_diagnosis(outcome, {"workbench": "0"}, out, 1)
+    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
     tree = lxml.html.fromstring(page.read_bytes())
     lxml.etree.strip_elements(tree, "script", "style", with_tail=False)
     text = tree.text_content()

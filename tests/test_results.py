@@ -150,6 +150,19 @@ def test_a_folder_without_results_is_refused_in_words(
         read_runs(tmp_path)
 
 
+def test_what_does_not_say_what_made_it_is_warned_of_beside_others(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(results, tmp_path / "one")
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "summary.json").write_text('{"cases": {}}')
+    capsys.readouterr()
+    assert main(["results", str(tmp_path)]) == 0
+    told = capsys.readouterr()
+    assert "old/summary.json: found a summary that does not say what made it" in told.err
+    assert "one: simulate" in told.out
+
+
 def test_results_of_other_places_are_told(results: Path, tmp_path: Path) -> None:
     """Two runs each, and no place that both folders have."""
     for folder, names in (("a", "12"), ("b", "34")):

@@ -21,7 +21,7 @@ _SAID = {
     "kg/(s.Pa)": (("g/(min.bar)", 1e-8 / 60.0), ("mg/(min.bar)", 1e-11 / 60.0)),
     "m3/(s.Pa)": (("l/(min.bar)", 1e-8 / 60.0), ("ml/(min.bar)", 1e-11 / 60.0)),
 }
-_STEPS = (1, 10, 100, 1000)  # of what a share is said per
+_STEPS = (1, 10, 100)  # of what a share is said per
 _WHOLE = 0.01  # share from which on it reads as whole percents
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from workbench.answer import Answer, Measure
 from workbench.benchmark.calls import points
 from workbench.case import Case
 from workbench.commands.bench_observers import bench_observers
@@ -17,6 +18,7 @@ from workbench.commands.extras import require_compiler
 from workbench.commands.inputs import given_cases
 from workbench.commands.output import Done, Output
 from workbench.files import claimed, write_json
+from workbench.provenance import run_of, sources
 from workbench.system import System
 from workbench.systems import load_system, open_model
 
@@ -46,6 +48,8 @@ def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> D
     observers = bench_observers(system, cases, case, output)
     tuning = bench_tuning(system, cases, case, output)
     content: dict[str, Any] = {
+        "answer": _answer(calls).to_dict(),
+        "provenance": {"run": run_of("bench", system, sources(cases))},
         "machine": {"processor": platform.machine(), "system": platform.platform()},
         "seed": _SEED,
         "calls": {
@@ -75,6 +79,17 @@ def _time_models(system: System) -> "dict[str, CallTimes]":
             at = points(fmu, system, np.random.default_rng(_SEED))
             calls[model.name] = time_sources(fmu.description, at, system.sample_time)
     return calls
+
+
+def _answer(calls: "dict[str, CallTimes]") -> Answer:
+    """Times of calls, which are those of this machine."""
+    headline, told = {}, []
+    for name, times in calls.items():
+        headline[f"{name}: derivatives through FMI"] = Measure(times.derivatives_fmi, "s", "lower")
+        headline[f"{name}: Jacobian through FMI"] = Measure(times.jacobian_fmi, "s", "lower")
+        headline[f"{name}: Co-Simulation steps"] = Measure(1.0 / times.step, "1/s", "higher")
+        told.append(f"{times.derivatives_fmi / times.derivatives:.1f} times for {name}")
+    return Answer(f"Derivatives through FMI take, over a plain call: {', '.join(told)}.", headline)
 
 
 def _format_calls(calls: "dict[str, CallTimes]", step: float) -> str:

@@ -1,6 +1,7 @@
 """`workbench results`: what a folder holds, and two runs side by side."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,12 @@ from workbench.report.runs import (
 
 def run(options: argparse.Namespace, output: Output) -> Done:
     """List the runs of a folder, or compare them with those of another."""
-    found = read_runs(options.folder)
+    found = read_runs(options.folder, _warn)
     if options.other is None:
         output.result(format_runs(found))
         return Done({"runs": [one.to_dict() for one in found]})
     told: list[dict[str, Any]] = []
-    for before, after in _pairs(found, read_runs(options.other), options.other):
+    for before, after in _pairs(found, read_runs(options.other, _warn), options.other):
         changes = compare_runs(before, after)
         output.result(f"{chr(10) * bool(told)}{format_changes(before, after, changes)}")
         told.append(
@@ -35,6 +36,10 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             }
         )
     return Done({"comparisons": told})
+
+
+def _warn(error: InputError) -> None:
+    print(f"warning: {error}", file=sys.stderr, flush=True)
 
 
 def _pairs(before: list[Ran], after: list[Ran], other: Path) -> list[tuple[Ran, Ran]]:

@@ -206,7 +206,7 @@ def powered(summary: Mapping[str, Any]) -> Answer:
     if (false := summary["false_alarms"])["of"]:
         words.append(f"names one where there is none in {_interval(false)}")
     if (hold := summary["coverage"])["of"]:
-        words.append(f"its 95 % intervals hold the truth in {_interval(hold)}")
+        words.append(f"its 95 % intervals hold the truth in {_interval(hold, 'intervals')}")
     said = "; ".join(words) or "too few sets for a share"
     return Answer(f"{said[:1].upper()}{said[1:]}.", headline, details)
 
@@ -240,11 +240,10 @@ def _share(one: Mapping[str, Any], better: Better) -> Measure:
     return Measure(value, "%", better, low, high)
 
 
-def _interval(one: Mapping[str, Any]) -> str:
-    return (
-        f"{one['hits']} of {one['of']} sets ({_whole(one['share'])}, 95 %: {_whole(one['low'])} "
-        f"to {_whole(one['high'])})"
-    )
+def _interval(one: Mapping[str, Any], of: str = "sets") -> str:
+    low, high = 100.0 * one["low"], 100.0 * one["high"]
+    share = _whole(one["share"])
+    return f"{one['hits']} of {one['of']} {of}, {share} (95 %: {low:.0f} to {high:.0f})"
 
 
 def _unit(unit: str) -> str:

@@ -1,7 +1,7 @@
 """Runs in a folder, by what they say of themselves, and two of them side by side."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -83,8 +83,12 @@ class Change:
         return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **told}
 
 
-def read_runs(folder: Path) -> list[Ran]:
+def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) -> list[Ran]:
     """All runs in a folder and below, by their place.
+
+    Parameters
+    ----------
+    warn : told of a summary that cannot be read, where others can; by default that is an error.
 
     Raises
     ------
@@ -99,7 +103,17 @@ def read_runs(folder: Path) -> list[Ran]:
             remedy="correct the path",
         )
     paths = sorted(path for name in SUMMARIES for path in folder.rglob(name))
-    found = [_read(path, folder) for path in paths]
+    found, wrong = [], []
+    for path in paths:
+        try:
+            found.append(_read(path, folder))
+        except InputError as problem:
+            wrong.append(problem)
+    if wrong and (warn is None or not found):
+        raise wrong[0]
+    if warn is not None:
+        for one in wrong:
+            warn(one)
     if not found:
         raise InputError(
             where=str(folder),

@@ -40,7 +40,7 @@ def number_of(summary: Mapping[str, Any]) -> str:
     """Number of the report on a summary: its date, and the first digits of its SHA-256.
 
     >>> number_of({"provenance": {"run": {"date": "2026-11-23T04:05:06+00:00"}}})
-    '20261123-4d1f98e1'
+    '20261123-00e93ccf'
     """
     content = json.dumps(summary, sort_keys=True).encode()
     date = str(summary["provenance"]["run"]["date"])[:10].replace("-", "")
