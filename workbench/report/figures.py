@@ -33,8 +33,8 @@ from workbench.report.views import (
 from workbench.simulation import OVERCONFIDENT, CaseResult
 from workbench.system import View
 
-# On white and on near black; at least 3:1 to the ground as WCAG 2.2 asks of graphics, and
-# differing in lightness or in the blue-yellow axis, which colour-blind readers keep.
+# On white and near black: 3:1 to the ground or more, as WCAG 2.2 asks of graphics, differing in
+# lightness or in the blue-yellow axis, which colour-blind readers keep.
 LIGHT = {
     "measured": "#111111",
     "raw": "#8c8c8c",
@@ -134,10 +134,10 @@ def case_figure(result: CaseResult) -> CaseFigure:
     system, case = result.system, result.case
     styles = dict(zip(result.runs, cycle(ESTIMATORS), strict=False))
     window = judged_window(case, system)
-    panels, judged = [], system.objective.judged
+    panels = []
     for view in views(system):
         panels.append(_seen(result, styles, view))
-        if judged in view.signals:
+        if system.objective.judged in view.signals:
             panels.append(_residual(result, styles, window))
     panels.append(_probabilities(result.runs.values()))
     return CaseFigure(
@@ -167,8 +167,8 @@ def run_figure(run: Run) -> CaseFigure:
 
 def sheet(figure: CaseFigure) -> Figure:
     """Draw a figure with matplotlib."""
-    style = STYLE | {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
-    with mpl.rc_context(style):
+    own = {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
+    with mpl.rc_context(STYLE | own):
         drawn = Figure(figsize=_SHEET)
         rows = drawn.subplots(
             len(figure.panels),
@@ -282,9 +282,8 @@ def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Pane
     system = result.system
     judged = system.objective.judged
     unit = shown_unit(system, judged)
-    factor = per_shown(system, judged, unit)
     curves = [
-        Curve(styles[name], error / factor)
+        Curve(styles[name], error / per_shown(system, judged, unit))
         for name in result.runs
         if (error := result.error(name)) is not None
     ]
@@ -335,8 +334,8 @@ def _known(sigma: Vector) -> Vector | None:
 
 
 def _panel(name: str, unit: str, curves: Sequence[Curve]) -> Panel:
-    low, high = _range([curve.values for curve in curves])
-    return Panel(f"{name} [{unit}]", unit, low, high, 1.0, tuple(curves))
+    ends = _range([curve.values for curve in curves])
+    return Panel(f"{name} [{unit}]", unit, *ends, 1.0, tuple(curves))
 
 
 def _range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
