@@ -1,6 +1,9 @@
 """The page of `simulate` of results made by hand: bands, size, ranking, contrast of colours."""
 
+import base64
+import json
 import re
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +21,9 @@ from workbench.observers import choose
 from workbench.provenance import run_of
 from workbench.report import case_figure, summarise_runs, write_estimates, write_page
 from workbench.report.answers import standings
-from workbench.report.drawing import extremes
+from workbench.report.drawing import drawing, extremes
 from workbench.report.figures import DARK, LIGHT
+from workbench.report.packing import packed
 from workbench.simulation import CaseResult, prepare
 from workbench.system import System
 from workbench.systems import load_system
@@ -110,6 +114,42 @@ def test_standard_deviations_become_bands_and_columns(
     write_estimates(uncertain, tmp_path / "case.csv")
     table = pd.read_csv(tmp_path / "case.csv")
     assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]
+
+
+def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain: CaseResult) -> None:
+    """10 m/s are 36 km/h: both scales of a panel agree at every tick."""
+    figure = case_figure(uncertain)
+    panel = replace(figure.panels[0], unit="m/s", low=-1.0, high=21.0)
+    (drawn,) = drawing(replace(figure, panels=(panel,)))["panels"]
+    assert drawn["further"]["unit"] == "km/h"
+    for y, text in drawn["further"]["ticks"]:
+        level = panel.high - (y - drawn["top"]) / drawn["height"] * (panel.high - panel.low)
+        assert float(text) == pytest.approx(3.6 * level)
+    others = drawing(figure)["panels"]
+    assert not any(one["further"] for one in others if one["unit"] != "m/s")
+
+
+def test_samples_are_those_of_the_curves(uncertain: CaseResult) -> None:
+    """What packing.py says of its codes, taken back by hand."""
+    figure = case_figure(uncertain)
+    told, text = packed(figure)
+    count = json.loads(told)["samples"]
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    low, high = planes.reshape(2, -1, count).astype(np.int64)
+    folded = low | (high << 8)
+    codes = np.cumsum((folded >> 1) ^ -(folded & 1), axis=1) & 0xFFFF
+    ticks = (codes[0] << 16 | codes[1]) / (2**32 - 1)
+    span = figure.time[-1] - figure.time[0]
+    assert_allclose(figure.time[0] + ticks * span, figure.time, atol=1e-8 * span)
+    rows = iter(codes[2:])
+    curves = [curve for panel in figure.panels for curve in panel.curves]
+    for curve, ranges in zip(curves, json.loads(told)["curves"], strict=True):
+        for values, (least, most) in zip((curve.values, curve.sigma), ranges, strict=False):
+            row = next(rows)
+            assert values is not None
+            found = np.where(row == 65535, np.nan, least + (most - least) * row / 65534)
+            # Half a code of rounding.
+            assert_allclose(found, values, rtol=0, atol=0.51 * (most - least) / 65534 + 1e-12)
 
 
 def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(
