@@ -147,6 +147,8 @@ def system_schema() -> Schema:
         "redundancies": listed(closed(redundancy, optional="slack only_while")),
         "next": _experiments(formula, made, measured),
         "cutting": closed(cutting, optional="released before after"),
+        "work": by_name(closed({"is": formula, "label": TEXT}, optional="label")),
+        "distance": {"type": "object"},  # see docs/distance.md
     }
     needed = {"title", "models", "outputs", "sample_time"}
     optional = " ".join(name for name in entries if name not in needed)
@@ -173,7 +175,7 @@ def _estimated() -> Schema:
         **dict.fromkeys(("correction", "label", "unit", "acts_on"), NAMED),
         **dict.fromkeys(("range", "prior"), PAIR),
         **dict.fromkeys(
-            ("walk", "start", "spread", "relative_error", "memory", "useful"), QUANTITY
+            ("walk", "start", "spread", "relative_error", "scatter", "memory", "useful"), QUANTITY
         ),
         "claimed": by_name(TEXT),
     }
