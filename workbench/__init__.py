@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
+    from workbench.api import monitor as monitor
     from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
     from workbench.api import prepare_cases as prepare_cases
@@ -23,6 +24,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.errors import InputError as InputError
     from workbench.experiments import NextStop as NextStop
     from workbench.fmu import FMU as FMU
+    from workbench.monitoring import Monitored as Monitored
     from workbench.observers import Gains as Gains
     from workbench.system import System as System
     from workbench.systems import load_system as load_system

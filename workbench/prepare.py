@@ -39,6 +39,7 @@ class Recording:
     conditions : of the case, as `case.toml` has them.
     held_out : it is there to judge a fit to the others by.
     machine : that it was recorded on, where a set has several; each is diagnosed for itself.
+    date : when it was recorded, ISO 8601; empty: unknown.
     counts_from : time before which samples only lead to those that count [s]; None: all count.
     """
 
@@ -51,6 +52,7 @@ class Recording:
     conditions: Mapping[str, Any] = field(default_factory=dict)
     held_out: bool = False
     machine: str = ""
+    date: str = ""
     counts_from: float | None = None
 
 
@@ -266,7 +268,8 @@ def _texts(one: Recording) -> dict[str, str]:
     measurement = {"file": "measured.csv"}
     if one.counts_from is not None:
         measurement["counts_from"] = f"{one.counts_from!r} s"
-    case = {"title": one.title, "measurement": measurement}
+    dated = {"date": one.date} if one.date else {}
+    case = {"title": one.title, **dated, "measurement": measurement}
     conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
     rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
     lines = [",".join(one.columns), *(",".join(map(repr, row)) for row in rows)]

@@ -110,6 +110,7 @@ class System:
     cutting : how a long recording is cut into several, or None.
     cases : folder of recordings that come with the system, or None.
     experiments : what may be run next, or None where nobody said so.
+    work : powers of friction by what they wear, in measured signals and parameters [W].
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -153,6 +154,7 @@ class System:
     redundancies: tuple[Redundancy, ...] = ()
     experiments: Experiments | None = None
     cutting: Cutting | None = None
+    work: tuple[Derived, ...] = ()
 
     @property
     def signals(self) -> dict[str, Signal]:

@@ -63,6 +63,7 @@ def _recording(folder: Path) -> Recording:
             "satellite speed left out: it is missing in tunnels",
         ),
         {"rail": conditions.take("rail", str)},
+        date=conditions.text("date", ""),
     )
 
 
