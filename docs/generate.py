@@ -340,6 +340,7 @@ def case_schema(system: System) -> dict[str, Any]:
         "required": ["title", "measurement", *(["conditions"] if conditions else [])],
         "properties": {
             "title": {"type": "string", "minLength": 1},
+            "date": {"type": "string", "description": "when it was recorded, ISO 8601"},
             "measurement": {
                 "type": "object",
                 "required": ["file"],

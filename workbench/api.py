@@ -36,7 +36,7 @@ from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
 from workbench.observers.gains_file import usual_gains
 from workbench.plausibility import Origin, doubts
-from workbench.prepare import write_cases
+from workbench.prepare import read_recorded, write_cases
 from workbench.recording import header
 from workbench.system import OBSERVER, System
 from workbench.systems import load_system, open_model
@@ -280,7 +280,7 @@ def monitor(
     history: str | Path,
     *,
     out: str | Path | None = None,
-    rate: float = RATE,
+    false_alarms: float = RATE,
     workers: int | None = None,
 ) -> Monitored:
     """Say what has changed on a machine over many recordings; see `workbench.monitoring.monitor`.
@@ -290,7 +290,7 @@ def monitor(
     history : folder that holds a folder for each recording of one machine.
     out : folder of the state, from which the next call goes on; a temporary one unless another is
         given.
-    rate : alarms by recording that a sound machine may raise, all quantities together.
+    false_alarms : alarms by recording that a sound machine may raise, all quantities together.
     workers : processes, one per processor unless another number is given.
 
     Raises
@@ -302,7 +302,12 @@ def monitor(
     with tempfile.TemporaryDirectory(prefix="monitor-") as scratch:
         folder = Path(out) if out is not None else Path(scratch)
         with claimed(folder):
-            return watch_machine(system, Path(history), folder, rate=rate, workers=number)
+            return watch_machine(
+                *(system, Path(history), folder),
+                rate=false_alarms,
+                workers=number,
+                read=read_recorded,
+            )
 
 
 def next_stop(

@@ -20,6 +20,7 @@ from workbench.tables import Table, read_table
 from workbench.units import si_factor
 
 _NOTHING = Told()
+KEYS = ("title", "date", "conditions", "measurement", "model")  # of case.toml
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +199,7 @@ def read_case(folder: Path, system: System) -> Case:
         "give a folder that holds case.toml and the recording",
         'title = "..."',
     )
-    document.refuse_unknown(("title", "date", "conditions", "measurement", "model"))
+    document.refuse_unknown(KEYS)
     title = document.take("title", str)
     if system.conditions:
         document.take("conditions", dict)
@@ -234,9 +235,10 @@ def _date(document: Table) -> str:
         return ""
     try:
         known = datetime.fromisoformat(document.take("date", str))
-        return (known if known.tzinfo is None else known.astimezone(UTC)).isoformat()
+        stamp = (known if known.tzinfo is None else known.astimezone(UTC)).isoformat()
     except (ValueError, OverflowError):
         raise document.wrong("date", 'a date as of ISO 8601, such as "2026-01-31"') from None
+    return stamp.removesuffix("T00:00:00")
 
 
 def _recorded(

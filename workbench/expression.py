@@ -137,7 +137,7 @@ class Expression:
                 return name
             case ast.Attribute(value=value, attr=name):
                 return f"{self._name(value)}.{name}"
-            case ast.Subscript(value=value, slice=ast.Constant(value=int() as place)):
+            case ast.Subscript(value=value, slice=ast.Constant(value=int() as place)) if place > 0:
                 return f"{self._name(value)}[{place}]"
         raise self._wrong(ast.unparse(node))
 

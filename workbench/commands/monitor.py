@@ -7,6 +7,7 @@ from functools import partial
 from workbench.commands.output import Done, Output, read_result
 from workbench.files import claimed
 from workbench.monitoring import monitor
+from workbench.prepare import read_recorded
 from workbench.provenance import models, software
 from workbench.report.monitoring import write_monitored
 from workbench.system import OBSERVER
@@ -22,8 +23,9 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             system,
             options.history,
             options.out,
-            rate=options.rate,
+            rate=options.false_alarms,
             workers=options.workers,
+            read=read_recorded,
             step=partial(output.step, begin=begin),
         )
         provenance = {

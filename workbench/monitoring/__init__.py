@@ -110,4 +110,6 @@ def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Told:
         date, estimate = case.date, appraiser(case)
     except InputError as error:
         refusal = str(error)
+    except Exception as error:  # one recording must not cost the others; it is listed
+        refusal = f"{delivery.path}: found what no reader expects ({error!r})"
     return Told(delivery.name, delivery.content, date, estimate, refusal)

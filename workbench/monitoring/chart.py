@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtri, stdtr
+from scipy.special import ndtri, stdtr, stdtrit
 from scipy.stats import chi2, norm
 
 from workbench.fmu import Matrix, Vector
@@ -104,10 +104,10 @@ class Scatter:
         One far off counts as the largest that chance makes: a quantity that moves is not to hide
         the move of another, nor its own.
         """
-        known = self.variance
-        self.squares += self.share * (
-            square if np.isnan(known) else min(square, LARGEST**2 * known)
-        )
+        if self.freedom >= 1.0:
+            furthest = float(stdtrit(self.freedom, norm.cdf(LARGEST)))
+            square = min(square, furthest**2 * self.variance)
+        self.squares += self.share * square
         self.freedom += self.share
 
 
@@ -120,6 +120,7 @@ class Change:
     raised : number of the recording at which it was told.
     last : number of the last recording before it.
     earliest, latest : likewise, of the 95 % range.
+    returns : whether it leads back to the level before the last change, and so takes that back.
     before, after : levels, and their standard deviations.
     """
 
@@ -127,6 +128,7 @@ class Change:
     last: int
     earliest: int
     latest: int
+    returns: bool
     before: tuple[float, float]
     after: tuple[float, float]
 
@@ -221,9 +223,16 @@ class Chart:
         raised = self.numbers[-1]
         self.numbers, self.values = self.numbers[first:], self.values[first:]
         self.variances, self.up, self.down = self.variances[first:], 0.0, 0.0
-        change = Change(raised, last, earliest, latest, before.level, self.level)
+        change = Change(raised, last, earliest, latest, self._returned(), before.level, self.level)
         self.changes.append(change)
         return change
+
+    def _returned(self) -> bool:
+        """Whether the level is what it was before the last change, as far as is known."""
+        if not self.changes:
+            return False
+        (old, doubt), (new, own) = self.changes[-1].before, self.level
+        return abs(new - old) < norm.isf(0.5 * (1.0 - SURE)) * np.hypot(doubt, own)
 
 
 def _gains(values: Vector, weight: Vector) -> Vector:

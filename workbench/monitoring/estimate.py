@@ -1,5 +1,6 @@
 """One recording becomes one value of each estimated quantity, with its covariance."""
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -68,7 +69,7 @@ class Appraiser:
     def __init__(self, system: System) -> None:
         self.system = system
         constant = [replace(one, walk=0.0, spread=reach(one)) for one in system.estimated]
-        self._constant = replace(system, estimated=tuple(constant))
+        self._constant = replace(system, estimated=tuple(constant), learns=math.inf)
         self._model = open_model(system)
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
 

@@ -21,22 +21,23 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         description="Estimate the quantities of the system file from each recording of one "
         "machine, in the order of their dates, and say which has changed, since when, and by how "
         "much. What the folder of results knows is not estimated again: run it after each new "
-        "recording, or after many. Writes estimates.csv, alarms.csv, work.csv, summary.json, a figure (PNG, "
-        "SVG), and its state (state.sqlite). Exit status 0 with or without alarms.",
+        "recording, or after many. Writes estimates.csv, alarms.csv, work.csv, summary.json, a "
+        "figure (PNG, SVG), and its state (state.sqlite). Exit status 0 with or without alarms.",
         epilog="examples:\n"
         "  python -m workbench monitor my_recordings --system my_machine --out results/mine\n"
-        "  python -m workbench monitor stops --system train --rate 0.001",
+        "  python -m workbench monitor stops --system train --false-alarms 0.001",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "history",
         type=Path,
         metavar="HISTORY",
-        help="folder that holds a folder for each recording of one machine",
+        help="folder that holds a folder for each recording of one machine: cases, or as the "
+        "machine wrote them, where 'workbench prepare' reads that",
     )
     add_system(parser)
     parser.add_argument(
-        "--rate",
+        "--false-alarms",
         type=share,
         default=0.01,
         metavar="X",
