@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtri, stdtr, stdtrit
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
 from scipy.stats import chi2, norm
 
 from workbench.fmu import Matrix, Vector
@@ -22,7 +22,7 @@ LARGEST = 3.0
 """Standard deviations that one estimate counts as at most: a single wild one raises no alarm.
 D. M. Hawkins (1993), J. Quality Technology 25, 248-261."""
 SURE = 0.95  # probability, that of a range
-_CELLS = 250  # of the chain; run lengths are right to 1 % then
+_CELLS = 100  # of the chain; twice as many change run lengths by less than 1 %
 _REACH = (0.01, 20.0)  # of thresholds; beyond the last, an alarm in 10^8 estimates
 
 
@@ -72,7 +72,7 @@ def run_length(level: float, largest: float = LARGEST) -> float:
 
     def below(value: Matrix) -> Matrix:
         """Probability that an estimate counts as less."""
-        inside: Matrix = np.where(value > -largest, norm.cdf(value), 0.0)
+        inside: Matrix = np.where(value > -largest, ndtr(value), 0.0)
         return np.where(value > largest, 1.0, inside)
 
     chain = below(step + 0.5 * width) - below(step - 0.5 * width)
@@ -98,15 +98,21 @@ class Scatter:
         """Ratio of the variances; NaN before the past tells one."""
         return self.squares / self.freedom if self.freedom >= 1.0 else np.nan
 
+    @property
+    def largest(self) -> float:
+        """How far off an estimate may be by chance, in units of its stated deviation; or NaN."""
+        if self.freedom < 1.0:
+            return np.nan
+        return float(stdtrit(self.freedom, float(ndtr(LARGEST))) * np.sqrt(self.variance))
+
     def add(self, square: float) -> None:
         """One more estimate off its past, squared, in units of its stated variance.
 
         One far off counts as the largest that chance makes: a quantity that moves is not to hide
         the move of another, nor its own.
         """
-        if self.freedom >= 1.0:
-            furthest = float(stdtrit(self.freedom, norm.cdf(LARGEST)))
-            square = min(square, furthest**2 * self.variance)
+        if square > LARGEST**2 * self.variance:  # never so without a past
+            square = min(square, self.largest**2)
         self.squares += self.share * square
         self.freedom += self.share
 
@@ -146,6 +152,7 @@ class Chart:
     ----------
     scatter : of it, and of those like it.
     numbers, values, variances : of recordings, their estimates, and stated variances.
+    kept : estimates as they count in the level: a wild one no more than chance makes.
     up, down : sums.
     changes : that were found.
     """
@@ -154,6 +161,7 @@ class Chart:
     numbers: list[int] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     variances: list[float] = field(default_factory=list)
+    kept: list[float] = field(default_factory=list)
     up: float = 0.0
     down: float = 0.0
     changes: list[Change] = field(default_factory=list)
@@ -161,10 +169,10 @@ class Chart:
     @property
     def level(self) -> tuple[float, float]:
         """Mean since the last change, and its standard deviation; NaN before there is any."""
-        if not self.values:
+        if not self.kept:
             return np.nan, np.nan
         weight = 1.0 / np.array(self.variances)
-        mean = float(weight @ np.array(self.values) / weight.sum())
+        mean = float(weight @ np.array(self.kept) / weight.sum())
         return mean, float(np.sqrt(self.scatter.variance / weight.sum()))
 
     @property
@@ -175,7 +183,7 @@ class Chart:
         weight, numbers = 1.0 / np.array(self.variances), np.array(self.numbers, np.float64)
         away = numbers - weight @ numbers / weight.sum()
         lever = float(weight @ away**2)
-        slope = float(weight * away @ np.array(self.values) / lever)
+        slope = float(weight * away @ np.array(self.kept) / lever)
         return slope, float(np.sqrt(self.scatter.variance / lever))
 
     def surprise(self, value: float, variance: float) -> tuple[float, float]:
@@ -187,8 +195,7 @@ class Chart:
         """
         if not self.values:
             return np.nan, np.nan
-        weight = float(np.sum(1.0 / np.array(self.variances)))
-        off = (value - self.level[0]) / np.sqrt(variance + 1.0 / weight)
+        off = (value - self.level[0]) / self._expected(variance)
         # The smaller tail, which rounding does not cut off.
         tail = stdtr(self.scatter.freedom, -abs(off) / np.sqrt(self.scatter.variance))
         return float(np.copysign(ndtri(tail), off)), float(off**2)
@@ -199,9 +206,21 @@ class Chart:
             counted = float(np.clip(surprise, -LARGEST, LARGEST))
             self.up = max(0.0, self.up + counted - ALLOWANCE)
             self.down = max(0.0, self.down - counted - ALLOWANCE)
+        self.kept.append(self.bounded(value, variance, surprise))
         self.numbers.append(number)
         self.values.append(value)
         self.variances.append(variance)
+
+    def bounded(self, value: float, variance: float, surprise: float) -> float:
+        """The estimate, or as far off the level as chance makes."""
+        if not abs(surprise) > LARGEST:
+            return value
+        reach, level = self.scatter.largest * self._expected(variance), self.level[0]
+        return float(np.clip(value, level - reach, level + reach))
+
+    def _expected(self, variance: float) -> float:
+        """Deviation of an estimate from the level, as stated."""
+        return float(np.sqrt(variance + 1.0 / np.sum(1.0 / np.array(self.variances))))
 
     def raised(self, level: float) -> bool:
         """Whether a sum exceeds the threshold."""
@@ -212,27 +231,39 @@ class Chart:
 
         By the ratio of likelihoods: D. V. Hinkley (1970), Biometrika 57, 1-17.
         """
-        values, weight = np.array(self.values), 1.0 / np.array(self.variances)
-        gain = _gains(values, weight) / self.scatter.variance
+        kept, weight = np.array(self.kept), 1.0 / np.array(self.variances)
+        gain = _gains(kept, weight) / self.scatter.variance
         first = int(np.argmax(gain)) + 1  # of those after it
         likely = np.flatnonzero(gain > gain.max() - chi2.ppf(SURE, 1))
-        before = Chart(self.scatter, values=self.values[:first], variances=self.variances[:first])
+        before = Chart(self.scatter, kept=self.kept[:first], variances=self.variances[:first])
         last, earliest, latest = (
             self.numbers[k] for k in (first - 1, int(likely[0]), int(likely[-1]))
         )
         raised = self.numbers[-1]
         self.numbers, self.values = self.numbers[first:], self.values[first:]
         self.variances, self.up, self.down = self.variances[first:], 0.0, 0.0
+        self.kept = self._settled(before.level[0])
         change = Change(raised, last, earliest, latest, self._returned(), before.level, self.level)
         self.changes.append(change)
         return change
+
+    def _settled(self, old: float) -> list[float]:
+        """Estimates since a change as they count: what was wild for the old level may be the new.
+
+        The new level is about where half of them have moved less, and half more; of two, the one
+        that moved less.
+        """
+        values = sorted(self.values, key=lambda value: abs(value - old))
+        about, largest = values[(len(values) - 1) // 2], self.scatter.largest
+        reach = largest * np.sqrt(self.variances)
+        return [float(one) for one in np.clip(self.values, about - reach, about + reach)]
 
     def _returned(self) -> bool:
         """Whether the level is what it was before the last change, as far as is known."""
         if not self.changes:
             return False
         (old, doubt), (new, own) = self.changes[-1].before, self.level
-        return abs(new - old) < norm.isf(0.5 * (1.0 - SURE)) * np.hypot(doubt, own)
+        return bool(abs(new - old) < norm.isf(0.5 * (1.0 - SURE)) * np.hypot(doubt, own))
 
 
 def _gains(values: Vector, weight: Vector) -> Vector:

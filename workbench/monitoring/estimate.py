@@ -61,23 +61,21 @@ class Appraiser:
     section 3.3. Nothing is known of them before but their ranges, so that no recording leans on
     another.
 
+    Parameters
+    ----------
+    model : of the system's observer.
+
     Attributes
     ----------
     system : whose recordings they are.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, model: FMU) -> None:
         self.system = system
         constant = [replace(one, walk=0.0, spread=reach(one)) for one in system.estimated]
         self._constant = replace(system, estimated=tuple(constant), learns=math.inf)
-        self._model = open_model(system)
+        self._model = model
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
-
-    def close(self) -> None:
-        """Free the models."""
-        for one in self._filters.values():
-            one.fmu.close()
-        self._model.close()
 
     def __call__(self, case: Case) -> Estimate:
         """Estimate from one recording.
@@ -116,7 +114,7 @@ class Appraiser:
         """The filter on the model with the parameters of conditions."""
         key = tuple(sorted(parameters.items()))
         if key not in self._filters:
-            model: FMU = self._model.variant(parameters)
+            model = self._model.variant(parameters)
             gains = ExtendedKalmanFilter.reasoned(model, self._constant)
             self._filters[key] = ExtendedKalmanFilter(model, self._constant, gains)
         return self._filters[key]
@@ -131,12 +129,9 @@ class Appraiser:
 
 @contextmanager
 def appraising(system: System) -> Iterator[Appraiser]:
-    """Open an appraiser."""
-    appraiser = Appraiser(system)
-    try:
-        yield appraiser
-    finally:
-        appraiser.close()
+    """Open the system's model, and appraise with it."""
+    with open_model(system) as model:  # which closes its variants
+        yield Appraiser(system, model)
 
 
 def _parameters(case: Case, system: System) -> dict[str, float]:

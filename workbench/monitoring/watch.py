@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
-from workbench.monitoring.chart import Change, Chart, Scatter, threshold
+from workbench.monitoring.chart import LARGEST, Change, Chart, Scatter, threshold
 from workbench.monitoring.estimate import reach
 from workbench.system import Estimated
 
@@ -97,32 +98,44 @@ class _Group:
         """Take the estimates of one recording, (m,) and (m, m)."""
         told = np.diag(self.directions @ covariance @ self.directions.T)
         spread = told + np.square(self.directions) @ self.usual
-        # What has moved, and was told, is no news of the others.
-        watched = self.directions @ (values - self.moved)
-        if self.against:
-            watched[:-1] += self.moved
         shown = told < (1.0 - _TOLD) * self.known
-        watched[~shown] = np.nan
-        self.rows.append(
-            (watched, np.where(shown, np.sqrt(spread), np.nan), self._off(watched, spread))
-        )
-        found = self.rows[-1][2]
+        watched, surprises, squares = self._compared(values, spread, shown)
+        self.rows.append((watched, np.where(shown, np.sqrt(spread), np.nan), surprises))
+        for k in np.flatnonzero(np.isfinite(squares)):
+            self.charts[k].scatter.add(squares[k])
         for k in np.flatnonzero(shown):
-            self.charts[k].add(number, watched[k], spread[k], found[k])
+            self.charts[k].add(number, watched[k], spread[k], surprises[k])
         for k in np.flatnonzero(shown):
             if self.charts[k].raised(level):
                 self.charts[k].part()
             if k < len(self.members) and self.charts[k].changes:
                 self.moved[k] = self.charts[k].level[0] - self.charts[k].changes[0].before[0]
 
-    def _off(self, watched: Vector, spread: Vector) -> Vector:
-        """Surprises, (k,), all by the scatter of the past, which then takes their squares."""
-        found = np.full((len(watched), 2), np.nan)
-        for k in np.flatnonzero(np.isfinite(watched)):
-            found[k] = self.charts[k].surprise(watched[k], spread[k])
-        for k in np.flatnonzero(np.isfinite(found[:, 1])):
-            self.charts[k].scatter.add(found[k, 1])
-        return found[:, 0]
+    def _compared(
+        self, values: Vector, spread: Vector, shown: NDArray[np.bool_]
+    ) -> tuple[Vector, Vector, Vector]:
+        """What is watched, how far it is off, and that squared, (k,) each.
+
+        What has moved and was told is no news of the others, nor is more of a wild entry than
+        chance makes.
+        """
+        m, away = len(self.members), self.moved.copy()
+        for _ in range(1 + m // 2):  # of more than half, nobody could tell which are wild
+            watched = self.directions @ (values - away)
+            if self.against:
+                watched[:-1] += away
+            off = [
+                chart.surprise(*one) if there else (np.nan, np.nan)
+                for chart, there, *one in zip(self.charts, shown, watched, spread, strict=True)
+            ]
+            surprises, squares = np.array(off).T
+            left = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
+            if not self.against or not np.nanmax(left, initial=0.0) > LARGEST:
+                break
+            k = int(np.nanargmax(left))
+            bound = self.charts[k].bounded(watched[k], spread[k], surprises[k])
+            away[k] += watched[k] - bound
+        return np.where(shown, watched, np.nan), surprises, squares
 
     def tracks(self) -> list[Track]:
         """What was watched."""
