@@ -72,7 +72,10 @@ def monitor(
     with opened(out / STATE, _identity(system)) as state:
         new = state.missing(deliveries(folder))
         interrupted = _estimate(system, new, state, workers, read, step)
-        return concluded(system, state.all(), rate, folder, interrupted=interrupted)
+        told = state.all()
+        if interrupted and not any(one.estimate for one in told):
+            raise KeyboardInterrupt  # there is nothing to conclude from
+        return concluded(system, told, rate, folder, interrupted=interrupted)
 
 
 def _identity(system: System) -> dict[str, Any]:
