@@ -44,6 +44,13 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="alarms that a sound machine may raise by recording, all quantities together "
         "(default: %(default)s, one in a hundred recordings)",
     )
+    parser.add_argument(
+        "--diagnose",
+        action="store_true",
+        help="name the cause of what has changed, too: a diagnosis of the last recordings, of a "
+        "machine that those before the change have told; into OUT/cause, takes minutes, needs the "
+        "extra [compiler]",
+    )
     add_out(parser, "results/monitor")
     add_workers(parser)
     add_isolated(parser)
