@@ -120,6 +120,17 @@ def test_a_quantity_that_falls_is_told_and_no_other() -> None:
     assert abs(size + 5.0) < 3.0 * known
 
 
+def test_a_quantity_alone_that_jumps_is_told_once_and_stays() -> None:
+    def jumps(values: Matrix) -> None:
+        values[20:, 8] += 6.0
+
+    tracks = Machine(5, 60).watched(jumps)
+    assert list(changed(tracks)) == ["b"]
+    (change,) = tracks[-1].changes
+    level, known = tracks[-1].level
+    assert abs(level - change.before[0] - 6.0) < 3.0 * np.hypot(known, change.before[1])
+
+
 def test_what_is_common_to_all_is_told_of_their_mean_alone() -> None:
     def fall(values: Matrix) -> None:
         values[20:, :8] -= 9.0

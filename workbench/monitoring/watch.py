@@ -108,7 +108,7 @@ class _Group:
         for k in np.flatnonzero(shown):
             if self.charts[k].raised(level):
                 self.charts[k].part()
-            if k < len(self.members) and self.charts[k].changes:
+            if self.against and k < len(self.members) and self.charts[k].changes:
                 self.moved[k] = self.charts[k].level[0] - self.charts[k].changes[0].before[0]
 
     def _compared(
