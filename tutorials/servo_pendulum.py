@@ -45,7 +45,7 @@ print(found.summary())
 print(found.extension.modelica.read_text())
 
 # %%
-# The result at the gain that nothing was fitted to, by the mean absolute error: from 128 to 29
+# The result at the gain that nothing was fitted to, by the mean absolute error: from 125 to 29
 # mrad. The slow motion improves least, because there friction is all that counts.
 for one in found.errors:
     before, after = (1e3 * mean for mean in one.mean_absolute)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
+    from workbench.api import distance as distance
     from workbench.api import monitor as monitor
     from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
@@ -26,6 +27,8 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.fmu import FMU as FMU
     from workbench.monitoring import Monitored as Monitored
     from workbench.observers import Gains as Gains
+    from workbench.stopping import Distance as Distance
+    from workbench.stopping import Effort as Effort
     from workbench.system import System as System
     from workbench.systems import load_system as load_system
     from workbench.tuning import Tuned as Tuned

@@ -38,6 +38,7 @@ from workbench.observers.gains_file import usual_gains
 from workbench.plausibility import Origin, doubts
 from workbench.prepare import read_recorded, write_cases
 from workbench.recording import header
+from workbench.stopping import Distance, Effort, distance_of_stop
 from workbench.system import OBSERVER, System
 from workbench.systems import load_system, open_model
 from workbench.tables import Table
@@ -336,3 +337,31 @@ def next_stop(
             remedy="diagnose more recordings first",
         )
     return next_experiment(found.system, found.rivals, workers or os.cpu_count() or 1, report)
+
+
+def distance(
+    system: System,
+    stops: Sequence[Case],
+    asked: Mapping[str, Any] | None = None,
+    *,
+    effort: Effort | None = None,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+) -> Distance:
+    """Predict the distance of a stop from past ones; see `workbench.stopping`.
+
+    Parameters
+    ----------
+    stops : recordings of past stops of the same machine.
+    asked : of the stop, by the names of the system file: {"speed": "160 km/h"}; the rest is usual.
+    effort : how much is drawn, the usual unless it is given.
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If the system does not say how it stops, or a recording holds no stop.
+    """
+    number = workers or os.cpu_count() or 1
+    return distance_of_stop(system, stops, asked or {}, effort or Effort(), number, report)

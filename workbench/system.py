@@ -23,6 +23,7 @@ from workbench.system_comparison import (
     Level,
     Rest,
 )
+from workbench.system_distance import Stopping
 from workbench.system_experiments import Experiments
 from workbench.system_parts import (
     Condition,
@@ -108,6 +109,7 @@ class System:
     sampling : which times between samples are likely.
     redundancies : what tells the same in a recording.
     cutting : how a long recording is cut into several, or None.
+    stopping : how the machine comes to rest, or None where nobody said so.
     cases : folder of recordings that come with the system, or None.
     experiments : what may be run next, or None where nobody said so.
     work : powers of friction by what they wear, in measured signals and parameters [W].
@@ -154,6 +156,7 @@ class System:
     redundancies: tuple[Redundancy, ...] = ()
     experiments: Experiments | None = None
     cutting: Cutting | None = None
+    stopping: Stopping | None = None
     work: tuple[Derived, ...] = ()
 
     @property
@@ -204,6 +207,13 @@ class System:
     def condition(self, name: str) -> Condition:
         """A condition by name."""
         return next(one for one in self.conditions if one.name == name)
+
+    def set_by(self, conditions: Mapping[str, object]) -> dict[str, float]:
+        """Parameters that the conditions of a recording set, SI."""
+        found: dict[str, float] = {}
+        for one in self.conditions:
+            found |= one.parameters.get(str(conditions[one.name]), {})
+        return found
 
     def model(self, role: str) -> Model:
         """The model in a role, or the observer's where the system has none.

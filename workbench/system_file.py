@@ -6,6 +6,7 @@ from pathlib import Path
 
 from workbench.comparison_tables import read_comparison
 from workbench.description import Description, read_description
+from workbench.distance_tables import read_stopping
 from workbench.errors import InputError
 from workbench.experiment_tables import read_experiments
 from workbench.system import OBSERVER, System
@@ -48,7 +49,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases sampling redundancies next cutting work"
+        "export shortest fewest sample_time cases sampling redundancies next cutting distance work"
     )
     return _read(file, path, _models(file, path))
 
@@ -195,4 +196,5 @@ def _placed(file: Table, system: System) -> System:
         redundancies=tuple(read_redundancy(table, system) for table in file.tables("redundancies")),
         experiments=read_experiments(file.table("next"), system) if "next" in file else None,
         cutting=read_cutting(file.table("cutting"), system) if "cutting" in file else None,
+        stopping=read_stopping(file.table("distance"), system) if "distance" in file else None,
     )

@@ -58,7 +58,7 @@ class Thresholds:
     left : share of lasting errors that a right cause may leave, by its form; wrong ones leave more.
     excess : of the mean square of white errors over 1, which an estimate of noise may leave: a
         tenth of the deviation is a fifth of it, and block means keep some ringing.
-    worse : of deviance, which no step of a fit is worth: a fifteenth of what is significant.
+    worse : of deviance, which no step of a fit is worth: a thirtieth of what is significant.
     furthest : standard deviations that no tolerance goes beyond; chance makes 4 of thirty.
     furthest_level : the same of levels, which differ by nature and by more; beyond 3 a friction may
         be none.
@@ -80,7 +80,7 @@ class Thresholds:
     idle: float = 0.05
     left: float = 0.03
     excess: float = 0.3
-    worse: float = 1.0
+    worse: float = 0.5
     furthest: float = 5.0
     furthest_level: float = 3.0
     most: int = 4

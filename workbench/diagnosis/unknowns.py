@@ -4,12 +4,13 @@ In each recording, parameters may differ from their common value within the tole
 machine, and states may start elsewhere.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from workbench.case import Case
+from workbench.conditions import Value
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.cleaning import ALONG
 from workbench.diagnosis.evidence import Simulations, delay
@@ -17,6 +18,7 @@ from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Point
 from workbench.diagnosis.presence import Presence
 from workbench.diagnosis.quadratic import Key
+from workbench.system import System
 
 SENSOR = "sensor"  # in place of a choice, of a sensor's delay
 ALL = "all"  # in place of a choice, of a level that no condition changes
@@ -102,25 +104,14 @@ class Unknowns:
         return Point({}, levels, np.zeros((self.count, len(self.local))), {})
 
     def choice(self, level: str, case: Case) -> str:
-        """Which level of a parameter a recording has: of a list, the entry that is not usual."""
-        by = self._compare.levels[level].by
-        if not by:
-            return ALL
-        said = case.conditions[by]
-        entries = said if isinstance(said, tuple) else (said,)
-        usual = self._simulations.system.condition(by).choices[0]
-        return str(next((entry for entry in entries if entry != usual), usual))
+        """Which level of a parameter a recording has."""
+        return choice_of(self._simulations.system, level, case.conditions)
 
     def _usual(self, name: str, case: Case) -> float:
         """What a parameter is by the conditions of a recording, or else nominally."""
-        return self._set_by(case).get(name, self._simulations.nominal[name])
-
-    def _set_by(self, case: Case) -> dict[str, float]:
-        """Parameters that the conditions of a recording set."""
-        found: dict[str, float] = {}
-        for condition in self._simulations.system.conditions:
-            found |= condition.parameters.get(str(case.conditions[condition.name]), {})
-        return found
+        return self._simulations.system.set_by(case.conditions).get(
+            name, self._simulations.nominal[name]
+        )
 
     def values(self, point: Point) -> list[dict[str, float]]:
         """Values of the FMU's variables, and of delays, in each recording."""
@@ -136,7 +127,7 @@ class Unknowns:
 
     def _values(self, point: Point, k: int) -> dict[str, float]:
         case = self._simulations.cases[k]
-        values = {**self._simulations.given, **self._set_by(case)}
+        values = {**self._simulations.given, **self._simulations.system.set_by(case.conditions)}
         values |= {name: point.levels[name, SENSOR] for name in self.modes}
         values |= {
             name: point.levels[name, self.choice(name, case)] for name in self._compare.levels
@@ -197,3 +188,14 @@ class Unknowns:
         case = next(c for c in self._simulations.cases if self.choice(name, c) == choice)
         middle = self._usual(name, case)
         return middle, spread * abs(middle)
+
+
+def choice_of(system: System, level: str, conditions: Mapping[str, Value]) -> str:
+    """Which level of a parameter conditions have: of a list, by the entry that is not usual."""
+    by = system.comparison.levels[level].by
+    if not by:
+        return ALL
+    said = conditions[by]
+    entries = said if isinstance(said, tuple) else (said,)
+    usual = system.condition(by).choices[0]
+    return str(next((entry for entry in entries if entry != usual), usual))

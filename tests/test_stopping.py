@@ -1,0 +1,411 @@
+"""Distance of a stop: formulas of standards, the loop on the model, recordings, predictions."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+import workbench as wb
+from workbench.__main__ import main
+from workbench.case import Case
+from workbench.errors import InputError
+from workbench.fmu import CoSimulation
+from workbench.prepare import write_cases
+from workbench.rare_events import Tail
+from workbench.stopping import Distance, Effort
+from workbench.stopping.forecast import Forecaster, Question, dimension, forecasting
+from workbench.stopping.past import Known
+from workbench.stopping.recorded import Stop, asked_stop, recorded
+from workbench.stopping.standard import (
+    Conditions,
+    equivalent_rate,
+    nominal_rate,
+    percentage,
+    response_time,
+    stopping_distance,
+)
+from workbench.system import OBSERVER, System
+from workbench.system_distance import Stopping
+from workbench.system_file import read_system
+from workbench.systems import load_system
+
+RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
+
+
+@pytest.fixture(scope="module")
+def train() -> System:
+    return load_system("train")
+
+
+@pytest.fixture(scope="module")
+def stopping(train: System) -> Stopping:
+    assert train.stopping is not None
+    return train.stopping
+
+
+@pytest.fixture(scope="module")
+def forecaster(train: System) -> Iterator[Forecaster]:
+    with forecasting(train) as one:
+        yield one
+
+
+# --- formulas of standards ---
+
+
+def test_a_published_calculation_of_a_wagon_is_reproduced() -> None:
+    """RailProfAC, RailwayBrakeCalculation, BrakeCalculationAverageValuesWagon, after EN 14531-1.
+
+    Printed there: 478362 N on the blocks, 1412.6 N of resistance, 2.2 s, 0.6 m/s2, 461.7 m.
+    """
+    speed, response = 80.0 / 3.6, response_time(0.2, 4.0)
+    rate = (0.12 * 478362.0 - 1412.6) / (90000.0 + 3600.0)
+    assert f"{response:.1f} {rate:.1f}" == "2.2 0.6"
+    distance = stopping_distance(speed, response, rate)
+    assert f"{distance:.1f}" == "461.7"
+    assert_allclose(equivalent_rate(speed, response, distance), rate, rtol=1e-12)
+
+
+def test_a_published_calculation_of_a_multiple_unit_is_reproduced() -> None:
+    """The same source, BrakeCalculationAverageValues: 1.598264 s, 0.899829 m/s2, 1803.796711 m."""
+    distance = stopping_distance(200.0 / 3.6, 1.598264, 0.899829)
+    # The sixth digits of both leave 1e-3 m.
+    assert_allclose(distance, 1803.796711, atol=1.1e-3)
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate", "distance"),
+    [
+        *[(20, 0.77, 20), (30, 0.87, 40), (40, 0.95, 65), (50, 1.03, 94), (60, 1.06, 131)],
+        *[(70, 1.07, 177), (80, 1.07, 230), (90, 1.08, 290), (100, 1.09, 355)],
+    ],
+)
+def test_the_table_of_a_law_is_reproduced_to_its_digits(
+    speed: float, rate: float, distance: float
+) -> None:
+    """Austrian Strassenbahnverordnung, annex 1, table 1: mean deceleration, one unit failed."""
+    assert f"{equivalent_rate(speed / 3.6, 0.0, distance):.2f}" == f"{rate:.2f}"
+
+
+def test_a_percentage_falls_to_nothing_where_its_constants_say() -> None:
+    assert_allclose(percentage(83634.0 / 119.0, (83634.0, 19.0)), 100.0, rtol=1e-12)
+
+
+def test_a_correction_undoes_what_gradient_and_mass_do() -> None:
+    """Force in proportion to mass, m a = F - g m i, with rotating masses that stay."""
+    turning, per_mass, slope = 4000.0, 1.1, -0.008
+
+    def rate(mass: float, resistance: float) -> float:
+        return (per_mass * mass + 9.81 * resistance * mass) / (mass + turning)
+
+    made = Conditions(mass=88e3, rotating=turning, resistance=slope)
+    assert_allclose(nominal_rate(rate(88e3, slope), made, 96e3), rate(96e3, 0.0), rtol=1e-12)
+
+
+# --- one stop on the model ---
+
+
+def test_a_stop_is_that_of_the_models_own_integrator(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    """Independent: the FMU's Co-Simulation, whose inputs are set every 20 ms."""
+    stop = asked_stop({"speed": "100 km/h", "gradient": -0.005}, train, stopping)
+    found = forecaster.halt(stop, {})
+    path, h = train.model(OBSERVER).path, 0.02
+    assert path is not None
+    with CoSimulation(path) as model:
+        speed = stop.asked["speed"]
+        start = {f"omega{axle}": speed / 0.46 for axle in range(1, 9)}
+        model.start({"vTrain": speed, **start})
+        inputs = model.variables([one.name for one in stopping.driven])
+        seen = model.variables(["vTrain"])
+        way, t = 0.0, 0.0
+        while speed > 0.1:
+            for j, one in enumerate(stopping.driven):
+                risen = t + 0.5 * h - one.delay
+                share = 1.0 if one.lag == 0.0 else -np.expm1(-max(risen, 0.0) / one.lag)
+                inputs.values[j] = float(one.formula(stop.asked)) * share
+            model.set(inputs, inputs.values)
+            model.step(h)
+            before, speed = speed, float(model.get(seen)[0])
+            way, t = way + 0.5 * h * (before + speed), t + h
+    # Steps of 0.1 s that meet ramps in their middle: a few centimetres in three hundred metres.
+    assert_allclose(found.distance, way, rtol=3e-4)
+    assert_allclose(found.time, t, atol=0.15)
+
+
+def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    def distance(**said: object) -> float:
+        return forecaster.halt(asked_stop(said, train, stopping), {}).distance
+
+    usual = distance()
+    assert distance(speed="130 km/h") > usual > distance(pressure="4.2 bar")
+    assert distance(gradient=-0.01) > usual > distance(gradient=0.01)
+    # Force follows the load; what turns does not, and air is shared by more: within a percent.
+    assert_allclose(distance(mass1="55 t", mass2="55 t"), usual, rtol=0.01)
+
+
+def test_a_stop_that_does_not_end_is_told(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    stop = asked_stop({"gradient": -0.2}, train, stopping)
+    with pytest.raises(wb.FMUError, match="not at rest after 200 s"):
+        forecaster.halt(stop, {})
+
+
+def test_corrected_stops_are_those_under_nominal_conditions(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    """Made too fast, downhill and light; pads and air are not corrected for speed."""
+    said = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
+    stop, response = asked_stop(said, train, stopping), stopping.response
+    rate = equivalent_rate(stop.asked["speed"], response, forecaster.halt(stop, {}).distance)
+    made = Conditions(mass=91e3, rotating=8.0 * 110.0 / 0.46**2, resistance=-0.006)
+    fixed = stopping_distance(120.0 / 3.6, response, nominal_rate(rate, made, 96e3))
+    nominal = forecaster.halt(asked_stop({}, train, stopping), {}).distance
+    assert_allclose(fixed, nominal, rtol=0.01)
+    assert abs(forecaster.halt(stop, {}).distance / nominal - 1.0) > 0.08
+
+
+# --- what is drawn ---
+
+
+def question(train: System, stop: Stop, left: float) -> Question:
+    """Levels as the sheet says them, each unsure by a percent."""
+    keys = tuple((name, "all") for name in train.comparison.levels)
+    mean = np.array([train.values[name] for name, _ in keys])
+    return Question(stop, Known(keys, mean, np.diag((0.01 * mean) ** 2)), left, 5)
+
+
+def test_a_distribution_is_that_of_its_parts(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    """Variances of a function that is nearly linear add up: parts by differences, one by one."""
+    stop = asked_stop({}, train, stopping)
+    asked = question(train, stop, left=0.01)
+    count = dimension(asked, train, stopping)
+    steps = np.vstack([np.zeros(count), 0.5 * np.eye(count)])
+    logs = np.log(forecaster.distances(replace(asked, left=0.0), steps))
+    parts = np.square((logs[1:] - logs[0]) / 0.5).sum()
+    points = np.random.default_rng(1).standard_normal((400, count))
+    drawn = np.log(forecaster.drawn(asked, points)[0])
+    # Student's t of five: variance 5/3. Four hundred give a deviation to 3.5 %: three of that.
+    assert_allclose(drawn[0].std(), np.sqrt(parts + 0.01**2 * 5.0 / 3.0), rtol=0.11)
+    assert drawn[1].std() < drawn[0].std()
+
+
+def test_the_safety_level_agrees_with_plain_samples(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    stop = asked_stop({}, train, stopping)
+    asked = question(train, stop, left=0.005)
+    count = dimension(asked, train, stopping)
+    points = np.random.default_rng(2).standard_normal((1500, count))
+    plain = -np.log(forecaster.distances(asked, points))
+    runs = tuple(forecaster.descent(asked, 2, 150, seed)[0] for seed in range(4))
+    found = Tail(runs, asked.addend).quantile(2)
+    # The fifteenth of 1500 is known to 26 %; of both, two and a half deviations.
+    low, high = np.sort(plain)[[5, 29]]
+    assert low < found.high
+    assert found.low < high
+
+
+@pytest.mark.long
+def test_the_safety_level_agrees_with_many_plain_samples(
+    train: System, stopping: Stopping, forecaster: Forecaster
+) -> None:
+    stop = asked_stop({}, train, stopping)
+    asked = question(train, stop, left=0.005)
+    points = np.random.default_rng(3).standard_normal((100_000, dimension(asked, train, stopping)))
+    plain = np.sort(-np.log(forecaster.distances(asked, points)))
+    runs = tuple(forecaster.descent(asked, 9, 1000, seed)[0] for seed in range(8))
+    for decade, rank in ((2, 1000), (3, 100), (4, 10)):
+        found = Tail(runs, asked.addend).quantile(decade)
+        away = 2.5 * np.sqrt(rank)
+        low, high = plain[[max(0, round(rank - away)), round(rank + away)]]
+        assert low < found.high
+        assert found.low < high
+
+
+# --- recordings ---
+
+
+def made(train: System, *, rest: bool = True) -> Case:
+    """30 m/s until an equivalent step of 1 m/s2, 0.65 s after the command, on 4 permille uphill."""
+    time, command = np.arange(0.0, 60.0, 0.1), 20.02
+    speed = 30.0 - np.maximum(0.0, time - command - 0.65)
+    speed = np.where(speed > 0.3, speed, 0.0) if rest else np.maximum(speed, 5.0)
+    columns = {"time [s]": time, "a [m/s2]": np.gradient(speed, time)}
+    for j, delay in enumerate((0.2, 0.2, 0.3, 0.3), 1):
+        risen = -np.expm1(-np.maximum(0.0, time - command - delay) / 0.45)
+        columns[f"pB{j} [bar]"] = (0.25 + (2.7 - 0.25) * 48.0 / 56.0) * risen
+    columns |= {f"omega{axle} [rad/s]": speed / 0.46 for axle in range(1, 9)}
+    columns |= {f"mass{k} [t]": np.full(time.size, 48.0) for k in (1, 2)}
+    columns |= {f"slope{k} [1]": np.full(time.size, 0.004) for k in (1, 2)}
+    columns["curve [1]"] = np.zeros(time.size)
+    return wb.case_from_frame(train, pd.DataFrame(columns), {"rail": "dry"})
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # no noise, which a recorder has
+def test_a_recording_tells_its_command_its_distance_and_what_was_asked(
+    train: System, stopping: Stopping
+) -> None:
+    found = recorded(made(train), train, stopping)
+    # Half the rise is met between two samples in a line, which is 3 ms off a bent curve.
+    assert_allclose(found.command, 20.02, atol=0.01)
+    assert_allclose(found.distance, 30.0 * 0.65 + 450.0, rtol=1e-3)
+    assert_allclose(found.stop.asked["speed"], 30.0, rtol=1e-6)
+    # A quarter of a percent has not risen yet when the reading begins; less in the median.
+    assert_allclose(found.stop.asked["pressure"], 2.7e5, rtol=1e-3)
+    assert_allclose(found.resistance, 0.004, rtol=1e-6)
+    assert found.outside == ()
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_recording_without_a_stop_is_refused(train: System, stopping: Stopping) -> None:
+    with pytest.raises(InputError, match="a recording until standstill"):
+        recorded(made(train, rest=False), train, stopping)
+    coasting = made(train).with_signals({"pB1": np.zeros(600)})
+    with pytest.raises(InputError, match="nothing that rises"):
+        recorded(coasting, train, stopping)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"speeds": "120 km/h"}, r"unknown key 'speeds' \(closest: 'speed'\)"),
+        ({"speed": "120 t"}, "a unit of another dimension"),
+        ({"rail": "icy"}, "'dry' or 'wet' or 'unknown'"),
+        ({"mass1": 48.0}, "a text with a unit"),
+    ],
+)
+def test_what_no_stop_can_be_asked_for_is_refused(
+    said: dict[str, object], message: str, train: System, stopping: Stopping
+) -> None:
+    with pytest.raises(InputError, match=message):
+        asked_stop(said, train, stopping)
+
+
+def test_a_system_that_does_not_say_how_it_stops_is_refused(system: System, dry_case: Case) -> None:
+    with pytest.raises(InputError, match=r"no table \[distance\]"):
+        wb.distance(system, [dry_case, dry_case], report=lambda line: None)
+
+
+# --- recordings of an independent simulator ---
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if not RECORDINGS.exists():
+        pytest.skip("the recordings are not at hand")
+    out = tmp_path_factory.mktemp("stops")
+    write_cases("train", RECORDINGS / "healthy", out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def result(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("result")
+    told = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
+    assert main(["distance", "--system", "train", str(folder), *told, "--workers", "1"]) == 0
+    return out
+
+
+def test_bands_hold_stops_that_were_not_used(result: Path) -> None:
+    truth = json.loads((RECORDINGS / "healthy" / "truth.json").read_text())["cases"]
+    stops = pd.read_csv(result / "stops.csv", keep_default_na=False).set_index("stop")
+    true = pd.Series({name: one["stop_distance"] for name, one in truth.items()})
+    claimed = stops.index[stops["outside"] == ""]
+    # Slides of more than a second on a wet rail and two patches of leaves are beyond the model.
+    assert [name for name in stops.index if name not in claimed] == [
+        name for name, one in truth.items() if max(one["slide_seconds"]) > 0.0
+    ]
+    low, high = stops["low [m]"].astype(float), stops["high [m]"].astype(float)
+    assert ((low < true) & (true < high))[claimed].all()
+    assert (stops["width"].astype(float)[claimed] < 1.3).all()
+    # By its own wheels, which roll 0.1 % less far than the train as they brake; wet 0.4 %.
+    assert_allclose(stops["distance [m]"].astype(float)[claimed], true[claimed], rtol=4e-3)
+
+
+def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> None:
+    said = json.loads((result / "distance.json").read_text())
+    assert_allclose(said["asked"]["speed"], 140.0 / 3.6)
+    assert said["conditions"] == {"rail": "dry"}
+    low, middle, high = (said["distance"][share] for share in ("0.025", "0.5", "0.975"))
+    assert low < middle < high
+    assert_allclose(said["response"], 0.7)  # the sheet's tE
+    assert "5 stops show what happens once in 6" in said["warnings"][0]
+    (level,) = said["safety"]
+    assert level["low"] < level["ratio"] < level["high"] < 1.0
+    assert {one.name for one in result.iterdir()} == {
+        *("distance.json", "distance.png", "distance.svg"),
+        *("stops.csv", "quantiles.csv", "safety.csv"),
+    }
+
+
+@pytest.mark.long
+def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None:
+    """One axle loses 12 % of its friction on the way; each stop by the others."""
+    if not RECORDINGS.exists():
+        pytest.skip("the recordings are not at hand")
+    write_cases("train", RECORDINGS / "history", tmp_path)
+    found: Distance = wb.distance(
+        train, wb.read_cases(tmp_path, train), effort=Effort(decades=0), report=lambda line: None
+    )
+    truth = json.loads((RECORDINGS / "history" / "truth.json").read_text())["cases"]
+    held = []
+    for one in found.claimed:
+        low, high = one.forecast.band
+        held.append(low < truth[one.recorded.stop.name]["stop_distance"] < high)
+        assert one.forecast.width < 1.3
+    assert len(held) == 40
+    assert np.mean(held) >= 0.93
+
+
+# --- what a system file says of stops ---
+
+OWN = Path(__file__).parent.parent / "modelica" / "TrainRig" / "system.toml"
+MISTAKES = {
+    "nothing that rises": (
+        ('timed_by = "pB1"', 'timed_by = "mass1"'),
+        r"\[distance\] timed_by: found 'mass1'.* expected an input that rises",
+    ),
+    "no state": (
+        ('state = "vTrain"', 'state = "omegaReading[1]"'),
+        r"\[distance\] state: found 'omegaReading\[1\]'.* expected a continuous state",
+    ),
+    "what is not asked": (
+        ('vTrain = "speed"', 'vTrain = "sped"'),
+        r"start vTrain: found 'sped' \(closest: 'speed'\); expected an asked quantity",
+    ),
+    "an input without a word": (
+        ('mass1 = { is = "mass1" }\n', ""),
+        r"inputs: found no 'mass1'",
+    ),
+    "two spreads": (
+        ("share = 0.01", "spread = 100.0\nshare = 0.01"),
+        r"differs\]\] 2: found 'spread' and 'share'; expected one of the two",
+    ),
+    "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected command or end"),
+    "no speed": (
+        ("[distance.asked.speed]", "[distance.asked.velocity]"),
+        r"expected a table 'speed' in m/s",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_what_is_said_of_stops_is_refused(mistake: str, tmp_path: Path) -> None:
+    (old, new), message = MISTAKES[mistake]
+    text = OWN.read_text().replace("../../fmus", str(OWN.parents[2] / "fmus"))
+    assert old in text
+    path = tmp_path / "system.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=message):
+        read_system(path)

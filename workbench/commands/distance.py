@@ -1,0 +1,56 @@
+"""`workbench distance`: how far a stop goes that was not made, from stops that were."""
+
+import argparse
+
+from workbench.commands.inputs import given_cases
+from workbench.commands.output import Done, Output, read_result
+from workbench.errors import InputError
+from workbench.files import claimed
+from workbench.provenance import models, software
+from workbench.report.distance import write_distance
+from workbench.stopping import Effort, distance_of_stop
+from workbench.system import OBSERVER
+from workbench.system_file import with_model
+from workbench.systems import load_system
+
+_UNITS = {"distance": "m", "deceleration": "m/s2", "response": "s", "asked": "SI"}
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Predict one stop, and each past one from the others."""
+    system = load_system(options.system)
+    if options.fmu is not None:
+        system = with_model(system, OBSERVER, options.fmu)
+    said = dict(_said(one) for one in options.ask)
+    cases = given_cases(options, system)
+    effort = Effort(options.samples, options.safety, seed=options.seed)
+    with claimed(options.out):
+        found = distance_of_stop(system, cases, said, effort, options.workers, output.stage)
+        provenance = {
+            **software(["numpy", "scipy"]),
+            "system": system.name,
+            "models": models(system, [OBSERVER]),
+            "seed": options.seed,
+        }
+        figure = write_distance(found, provenance, options.out)
+    output.stage("done")
+    output.result(found.summary())
+    output.result(f"to see: {figure}, data beside it")
+    result = read_result(options.out / "distance.json")
+    return Done(result, _UNITS, 130 if found.interrupted else 0)
+
+
+def _said(text: str) -> tuple[str, str | float]:
+    """What is asked for, NAME=VALUE; a plain number where there is no unit."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise InputError(
+            where=f"command line, --ask {text}",
+            found="no '='",
+            expected="NAME=VALUE",
+            remedy="write for instance --ask speed='160 km/h'",
+        )
+    try:
+        return name, float(value)
+    except ValueError:
+        return name, value

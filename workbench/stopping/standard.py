@@ -1,0 +1,77 @@
+"""Distances as standards calculate and correct them.
+
+Sources: EN 14531-1:2015, clause 4, and ISO 20138-1 (equivalent rate and response); EN 16834
+(corrections to nominal conditions, and the percentage).
+"""
+
+from dataclasses import dataclass
+
+G = 9.81  # [m/s2]
+
+
+def response_time(delay: float, rise: float) -> float:
+    """Equivalent response te = ta + tab/2 [s], of a delay and a rise in a line.
+
+    >>> response_time(0.2, 4.0)
+    2.2
+    """
+    return delay + 0.5 * rise
+
+
+def stopping_distance(speed: float, response: float, rate: float, end: float = 0.0) -> float:
+    """Distance s = v0 te + (v0^2 - v^2)/(2 ae) [m].
+
+    Parameters
+    ----------
+    speed, end : at the command, and after the distance [m/s].
+    response : equivalent [s].
+    rate : equivalent deceleration [m/s2].
+
+    >>> round(stopping_distance(200.0 / 3.6, 1.598264, 0.899829), 2)
+    1803.8
+    """
+    return speed * response + (speed**2 - end**2) / (2.0 * rate)
+
+
+def equivalent_rate(speed: float, response: float, distance: float, end: float = 0.0) -> float:
+    """Equivalent deceleration ae [m/s2], the inverse of `stopping_distance`."""
+    return (speed**2 - end**2) / (2.0 * (distance - speed * response))
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which a stop was made.
+
+    Attributes
+    ----------
+    mass : weighed; rotating : what turns adds [kg].
+    resistance : of gradients and curves over weight, uphill positive [1].
+    """
+
+    mass: float
+    rotating: float
+    resistance: float
+
+
+def nominal_rate(rate: float, made: Conditions, mass: float) -> float:
+    """Equivalent deceleration on a level, straight way with a nominal mass [m/s2].
+
+    The force follows the weighed load: it is taken as that of the mass that was stopped.
+
+    Parameters
+    ----------
+    rate : as it was [m/s2].
+    mass : nominal [kg].
+    """
+    turning = made.mass + made.rotating
+    level = rate - G * made.resistance * made.mass / turning
+    return level * turning / made.mass * mass / (mass + made.rotating)
+
+
+def percentage(distance: float, constants: tuple[float, float]) -> float:
+    """C/s - D [%].
+
+    >>> round(percentage(1000.0, (61300.0, 8.9)), 1)
+    52.4
+    """
+    return constants[0] / distance - constants[1]
