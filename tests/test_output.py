@@ -23,6 +23,7 @@ COMMANDS = {
     "diagnose": ["diagnose", "cases/01_dry_80_1.5"],
     "export": ["export"],
     "power": ["power", "--clean", "1"],
+    "monitor": ["monitor", "cases"],
     "rig": ["rig", "--case", "01_dry_80_1.5", "--workers", "1"],
     "accuracy": ["accuracy", "cases/01_dry_80_1.5"],
 }

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 import workbench as wb
 from workbench.case import Case, read_cases
 from workbench.diagnosis import read_effects
+from workbench.diagnosis.extension import source
 from workbench.errors import InputError
 from workbench.modelica import read_library
 from workbench.prepare import write_cases
@@ -117,6 +118,13 @@ def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
     assert {"CylinderLag[4]", "PressureSensorGain[4]", "WrongMass[2]"} <= set(names)
     # Of a bogie, of a vehicle, and of the train.
     assert not {"CylinderLag[5]", "WrongMass[3]", "Glazing[1]"} & set(names)
+
+
+def test_an_extended_model_keeps_what_is_known_of_each_axle(train: System) -> None:
+    known = {f"muDC[{axle}]": axle / 16 for axle in (2, 1, 3, 4, 5, 6, 7, 8)}
+    about = (read_library(train.library), train.models[OBSERVER].name, "Extended", [], {})
+    text = source(*about, {"pads": 0.9, **known}, "as known")
+    assert "pads=0.9,\n    muDC={0.0625, 0.125, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.5}" in text
 
 
 # --- recordings of an independent simulator ---

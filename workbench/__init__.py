@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
     from workbench.api import distance as distance
+    from workbench.api import monitor as monitor
     from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
     from workbench.api import prepare_cases as prepare_cases
@@ -24,6 +25,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.errors import InputError as InputError
     from workbench.experiments import NextStop as NextStop
     from workbench.fmu import FMU as FMU
+    from workbench.monitoring import Monitored as Monitored
     from workbench.observers import Gains as Gains
     from workbench.stopping import Distance as Distance
     from workbench.stopping import Effort as Effort

@@ -26,14 +26,17 @@ from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
 from workbench.experiments import NextStop
 from workbench.experiments import next_stop as next_experiment
+from workbench.files import claimed
 from workbench.installed import usual_system
 from workbench.mapping import Told, parse_named
 from workbench.modelica import read_library
+from workbench.monitoring import RATE, Monitored
+from workbench.monitoring import monitor as watch_machine
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
 from workbench.observers.gains_file import usual_gains
 from workbench.plausibility import Origin, doubts
-from workbench.prepare import write_cases
+from workbench.prepare import read_recorded, write_cases
 from workbench.recording import header
 from workbench.stopping import Distance, Effort, distance_of_stop
 from workbench.system import OBSERVER, System
@@ -271,6 +274,41 @@ def diagnose(
     return diagnose_system(
         *(system, cases, library, chosen, folder, number, report), held_out=held_out
     )
+
+
+def monitor(
+    system: System,
+    history: str | Path,
+    *,
+    out: str | Path | None = None,
+    false_alarms: float = RATE,
+    workers: int | None = None,
+) -> Monitored:
+    """Say what has changed on a machine over many recordings; see `workbench.monitoring.monitor`.
+
+    Parameters
+    ----------
+    history : folder that holds a folder for each recording of one machine.
+    out : folder of the state, from which the next call goes on; a temporary one unless another is
+        given.
+    false_alarms : alarms by recording that a sound machine may raise, all quantities together.
+    workers : processes, one per processor unless another number is given.
+
+    Raises
+    ------
+    InputError
+        If no recording can be used, or the state is of another model.
+    """
+    number = workers or os.cpu_count() or 1
+    with tempfile.TemporaryDirectory(prefix="monitor-") as scratch:
+        folder = Path(out) if out is not None else Path(scratch)
+        with claimed(folder):
+            return watch_machine(
+                *(system, Path(history), folder),
+                rate=false_alarms,
+                workers=number,
+                read=read_recorded,
+            )
 
 
 def next_stop(

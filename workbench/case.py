@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from workbench.tables import Table, read_table
 from workbench.units import si_factor
 
 _NOTHING = Told()
+KEYS = ("title", "date", "conditions", "measurement", "model")  # of case.toml
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,7 @@ class Case:
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
+    date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
     doubts : what is unlikely in the recording, in words.
     """
@@ -48,6 +51,7 @@ class Case:
     outputs: tuple[str, ...]
     source: Path
     names: Mapping[str, str] = field(default_factory=dict)
+    date: str = ""
     counts_from: float = -np.inf
     doubts: tuple[str, ...] = ()
 
@@ -195,7 +199,7 @@ def read_case(folder: Path, system: System) -> Case:
         "give a folder that holds case.toml and the recording",
         'title = "..."',
     )
-    document.refuse_unknown(("title", "conditions", "measurement", "model"))
+    document.refuse_unknown(KEYS)
     title = document.take("title", str)
     if system.conditions:
         document.take("conditions", dict)
@@ -219,9 +223,22 @@ def read_case(folder: Path, system: System) -> Case:
         outputs=tuple(one.name for one in system.outputs),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
+        date=_date(document),
         counts_from=_counts_from(measurement, time),
         doubts=doubts(time, signals, conditions, system, origin),
     )
+
+
+def _date(document: Table) -> str:
+    """When a case was recorded, in a form whose order is that of time."""
+    if "date" not in document:
+        return ""
+    try:
+        known = datetime.fromisoformat(document.take("date", str))
+        stamp = (known if known.tzinfo is None else known.astimezone(UTC)).isoformat()
+    except (ValueError, OverflowError):
+        raise document.wrong("date", 'a date as of ISO 8601, such as "2026-01-31"') from None
+    return stamp.removesuffix("T00:00:00")
 
 
 def _recorded(

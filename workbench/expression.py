@@ -31,7 +31,7 @@ _FUNCTIONS: dict[str, np.ufunc] = {
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula over names, which may have dots; its values are floats or arrays of one shape.
+    """A formula over names, also `a.b` and `a[1]`; its values are floats or arrays of one shape.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Expression:
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
                 return np.float64(number)  # divided by zero it is infinite, as an array is
-            case ast.Name() | ast.Attribute():
+            case ast.Name() | ast.Attribute() | ast.Subscript():
                 return value_of(self._name(node))
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
                 return _OPERATORS[type(op)](self._walk(operand, value_of))
@@ -137,6 +137,8 @@ class Expression:
                 return name
             case ast.Attribute(value=value, attr=name):
                 return f"{self._name(value)}.{name}"
+            case ast.Subscript(value=value, slice=ast.Constant(value=int() as place)) if place > 0:
+                return f"{self._name(value)}[{place}]"
         raise self._wrong(ast.unparse(node))
 
     def _wrong(self, part: str) -> InputError:

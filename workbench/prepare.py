@@ -6,22 +6,26 @@ companion has as `PUBLISHED`.
 
 import hashlib
 import json
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from workbench.case import KEYS, Case, read_case
 from workbench.errors import InputError
 from workbench.files import claimed, write_json, write_whole
 from workbench.provenance import commit
 from workbench.recording import Vector
+from workbench.system import System
 from workbench.systems import system_path
 from workbench.tables import read_table
 
 PREPARED = "prepared.json"
+_CASE = "case.toml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,7 @@ class Recording:
     conditions : of the case, as `case.toml` has them.
     held_out : it is there to judge a fit to the others by.
     machine : that it was recorded on, where a set has several; each is diagnosed for itself.
+    date : when it was recorded, ISO 8601; empty: unknown.
     counts_from : time before which samples only lead to those that count [s]; None: all count.
     """
 
@@ -51,6 +56,7 @@ class Recording:
     conditions: Mapping[str, Any] = field(default_factory=dict)
     held_out: bool = False
     machine: str = ""
+    date: str = ""
     counts_from: float | None = None
 
 
@@ -65,12 +71,14 @@ class Layout:
     read : the recordings in a folder with these files.
     pattern : of files that anybody may have recorded in this format, in place of `files`; their
         checksums are noted.
+    one : reads a single recording from its own folder, where it has one with a case.toml; or None.
     """
 
     name: str
     files: Mapping[str, str]
     read: Callable[[Path], Sequence[Recording]]
     pattern: str = ""
+    one: Callable[[Path], Recording] | None = None
 
     def found(self, source: Path) -> dict[str, str]:
         """SHA-256 of the files of the layout that are in a folder, by their path there."""
@@ -124,8 +132,7 @@ def published(which: str) -> Published:
     """
     path = system_path(which)
     companion = read_table(path, "name a system", 'title = "..."').text("companion", "")
-    found = getattr(import_module(companion), "PUBLISHED", None) if companion else None
-    if not isinstance(found, Published):
+    if (found := _known(companion)) is None:
         raise InputError(
             where=str(path),
             found="no companion that knows of published recordings",
@@ -133,6 +140,12 @@ def published(which: str) -> Published:
             remedy="choose another system; write case folders for your own recordings",
         )
     return found
+
+
+def _known(companion: str) -> Published | None:
+    """What a companion knows of published recordings, if there is one, and it does."""
+    found = getattr(import_module(companion), "PUBLISHED", None) if companion else None
+    return found if isinstance(found, Published) else None
 
 
 def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
@@ -178,6 +191,34 @@ def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
             },
         )
     return recordings
+
+
+def read_recorded(folder: Path, system: System) -> Case:
+    """Read a case folder, or a recording as its machine wrote it, whose format is known.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    document = read_table(folder / _CASE, "repair the folder, or remove it", 'title = "..."')
+    known = _known(system.companion)
+    layouts = known.layouts if known else ()
+    readers = [layout.one for layout in layouts if layout.one is not None]
+    if set(document.content) <= set(KEYS) or not readers:
+        return read_case(folder, system)
+    one = readers[0](folder)
+    with tempfile.TemporaryDirectory(prefix="recorded-") as scratch:
+        for file, text in _texts(one).items():
+            write_whole(Path(scratch) / one.name / file, text)
+        try:
+            case = read_case(Path(scratch) / one.name, system)
+        except InputError as error:  # of files that are not the user's
+            where = error.where.replace(scratch, str(folder.parent))
+            raise InputError(
+                where=where, found=error.found, expected=error.expected, remedy=error.remedy
+            ) from None
+    return replace(case, source=folder.parent / one.file)
 
 
 def _described(one: Recording) -> dict[str, Any]:
@@ -266,11 +307,12 @@ def _texts(one: Recording) -> dict[str, str]:
     measurement = {"file": "measured.csv"}
     if one.counts_from is not None:
         measurement["counts_from"] = f"{one.counts_from!r} s"
-    case = {"title": one.title, "measurement": measurement}
+    dated = {"date": one.date} if one.date else {}
+    case = {"title": one.title, **dated, "measurement": measurement}
     conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
     rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
     lines = [",".join(one.columns), *(",".join(map(repr, row)) for row in rows)]
     return {
-        "case.toml": tomli_w.dumps(case | conditions),
+        _CASE: tomli_w.dumps(case | conditions),
         "measured.csv": "\n".join(lines) + "\n",
     }

@@ -112,6 +112,7 @@ class System:
     stopping : how the machine comes to rest, or None where nobody said so.
     cases : folder of recordings that come with the system, or None.
     experiments : what may be run next, or None where nobody said so.
+    work : powers of friction by what they wear, in measured signals and parameters [W].
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -156,6 +157,7 @@ class System:
     experiments: Experiments | None = None
     cutting: Cutting | None = None
     stopping: Stopping | None = None
+    work: tuple[Derived, ...] = ()
 
     @property
     def signals(self) -> dict[str, Signal]:

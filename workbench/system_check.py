@@ -92,6 +92,7 @@ def _formulas(system: System) -> Iterator[_Reference]:
         *(side for one in system.redundancies for side in (one.formula, one.other)),
         *(one.agrees.formula for one in system.conditions if one.agrees),
         *(one.recorded_as.formula for one in system.signals.values() if one.recorded_as),
+        *(one.formula for one in system.work),
         *(one.formula for one in compared.channels),
         *(one.formula for one in compared.exclusions),
         *(one.formula for one in compared.influences),

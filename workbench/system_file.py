@@ -31,6 +31,7 @@ from workbench.system_tables import (
     read_rolling,
     read_sampling,
     read_view,
+    read_work,
     within,
 )
 from workbench.tables import Table, read_table
@@ -48,7 +49,7 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases sampling redundancies next cutting distance"
+        "export shortest fewest sample_time cases sampling redundancies next cutting distance work"
     )
     return _read(file, path, _models(file, path))
 
@@ -155,6 +156,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         judged=groups["judged"],
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
+        work=read_work(file.table("work")),
         reported={name: units.get(name, "1") for name in file.texts("reported")},
         conditions=read_condition_kinds(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),

@@ -129,6 +129,7 @@ class Estimated:
     start : where filters begin, NaN: at its nominal value [unit].
     spread : standard deviation of what is known of it at the start [unit].
     relative_error : share of it by which the model lets an estimate be wrong [1].
+    scatter : standard deviation from recording to recording, of a sound machine [unit].
     memory : time in which a deviation is forgotten [s].
     useful : standard deviation from which on an estimate serves [unit].
     acts_on : state whose rate shows its effect, or output that shows it at once; a correction is in
@@ -148,6 +149,7 @@ class Estimated:
     start: float
     spread: float
     relative_error: float
+    scatter: float
     memory: float
     useful: float
     acts_on: str

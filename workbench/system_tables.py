@@ -150,14 +150,25 @@ def read_derived(table: Table) -> tuple[Derived, ...]:
     return tuple(found)
 
 
+def read_work(table: Table) -> tuple[Derived, ...]:
+    """Powers that wear what they rub, over measured signals and parameters."""
+    found = []
+    for name in table.content:
+        own = Table(table.take(name, dict), f"{table.where} {name}")
+        own.refuse_unknown("is label")
+        formula = Expression(own.take("is", str), f"{own.where} is")
+        found.append(Derived(name, "W", own.text("label", name), formula))
+    return tuple(found)
+
+
 def read_estimated(table: Table) -> tuple[Estimated, ...]:
     """Estimated quantities."""
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
         own.refuse_unknown(
-            "correction label unit range prior walk start spread relative_error memory useful "
-            "acts_on claimed"
+            "correction label unit range prior walk start spread relative_error scatter memory "
+            "useful acts_on claimed"
         )
         unit = own.unit("unit", "1")
         low, high = own.numbers("range", unit, 2)
@@ -178,6 +189,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
                 start=own.number("start", unit, math.nan),
                 spread=own.number("spread", unit, reach),
                 relative_error=own.number("relative_error", "1", 0.0),
+                scatter=own.number("scatter", unit, 0.0),
                 memory=own.number("memory", "s", math.inf),
                 useful=own.number("useful", unit, 0.1 * reach),
                 acts_on=own.text("acts_on", ""),

@@ -28,7 +28,13 @@ def commands(folder: Path) -> tuple[Command, ...]:
             "simulate",
             ("workbench", "simulate", str(folder), "--estimator", "ekf", "--out"),
             (),
-            lambda out: {path.name: path.read_bytes() for path in out.rglob("*.csv")},
+            _tables,
+        ),
+        Command(
+            "monitor",
+            (*("workbench", "monitor", str(ROOT / "cases"), "--workers", "2"), "--out"),
+            (),
+            _tables,
         ),
     )
 
@@ -40,6 +46,10 @@ def _write_cases(folder: Path) -> None:
         (folder / name / "case.toml").write_text((source / "case.toml").read_text())
         table = pd.read_csv(source / "measured.csv").iloc[SAMPLES]
         table.to_csv(folder / name / "measured.csv", index=False)
+
+
+def _tables(out: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in out.rglob("*.csv")}
 
 
 def _verdicts(out: Path) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ COMMANDS = {
     "diagnose": "find what the simulation gets wrong, name the cause, extend the model",
     "next": "say which recording would tell apart what a diagnosis could not",
     "distance": "predict the distance of a stop from past ones, with its safety level",
+    "monitor": "watch a machine over many recordings, say what has changed and since when",
     "power": "measure how often the diagnosis is right",
     "observability": "show when states and estimated quantities can be observed",
     "export": "write an observer as an FMU and an SSP package",

@@ -41,6 +41,14 @@ def above_zero(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """Type of an argument that is a number between zero and one."""
+    value = float(text)
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
+
+
 def add_isolated(parser: argparse.ArgumentParser) -> None:
     """Add the option --isolated, which `main` reads before the command is run."""
     parser.add_argument(

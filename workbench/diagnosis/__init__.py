@@ -226,6 +226,9 @@ def _extend(
     present = [effect for effect in effects if effect.name in values]
     own = {name: value for name, value in simulations.given.items() if "." not in name}
     own |= _usual_levels(simulations, diagnosis)
+    arrays = {name.partition("[")[0] for name in own if "[" in name}
+    every = {n: v for n, v in simulations.nominal.items() if n.partition("[")[0] in arrays}
+    own = {**every, **own}
     about = f"{base} with {', '.join(effect.name for effect in present)}"
     text = source(library, base, EXTENDED, present, values, own, about)
     folder = out / "model"

@@ -57,7 +57,7 @@ def source(
     name : of the extended model.
     effects : to plug in, in this order within a slot.
     values : by effect and parameter, SI; parameters that are not named keep their defaults.
-    parameters : of the base model itself, that differ from its defaults.
+    parameters : of the base model itself, that differ from its defaults; of an array, all entries.
     about : one line, for the documentation.
 
     Raises
@@ -67,7 +67,7 @@ def source(
     """
     nested: list[str] = []
     used: set[str] = set()
-    redeclared = [f"    {parameter}={float(value)!r}" for parameter, value in parameters.items()]
+    redeclared = [f"    {written}" for written in _modifiers(parameters)]
     for slot in read_slots(library, base):
         inside = _bindings([one for one in effects if slot.name in one.slots], values)
         if not inside:
@@ -92,6 +92,22 @@ def source(
         + "\n".join(nested)
         + f"end {name};\n"
     )
+
+
+def _modifiers(parameters: Mapping[str, float]) -> list[str]:
+    """Parameters as a modification has them: of an array, all entries at once, which are there."""
+    arrays: dict[str, dict[int, float]] = {}
+    written = {}
+    for name, value in parameters.items():
+        array, _, place = name.partition("[")
+        if place:
+            arrays.setdefault(array, {})[int(place.rstrip("]"))] = value
+        else:
+            written[name] = repr(float(value))
+    for array, entries in arrays.items():
+        values = ", ".join(repr(float(entries[place])) for place in sorted(entries))
+        written[array] = f"{{{values}}}"
+    return [f"{name}={value}" for name, value in written.items()]
 
 
 def _written(name: str, library: Library) -> str:

@@ -100,6 +100,8 @@ def follow_jump(model, settings, memory, h, y, row):  # type: ignore[no-untyped-
     n, last, surprise = model.x.size, row.size - 1, settings.learning.surprise
     F, best, chosen, size = memory.spread[:, n:], np.inf, memory.z.size - 1, 0.0
     for q in range(n, memory.z.size):
+        if settings.walk[q] == 0.0:
+            continue  # nothing to begin with, and it does not move
         jump, farthest = h * settings.walk[q] ** 2, settings.spread[q] ** 2
         row[last] = np.inf
         while row[last] > surprise and jump < farthest:

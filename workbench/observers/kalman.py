@@ -289,6 +289,13 @@ class ExtendedKalmanFilter(Estimator):
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._memory
 
+    @property
+    def covariance(self) -> Matrix:
+        """Of the estimated quantities after the last sample, (q, q)."""
+        n = len(self.fmu.states)
+        known: Matrix = self._memory.P[n:, n:].copy()
+        return known
+
     def _begin(self, u: Vector, y: Vector) -> None:
         memory = self._memory
         memory.z[:] = 0.0

@@ -41,7 +41,15 @@ def _recording(folder: Path) -> Recording:
     read = {
         name: one.values for name, one in read_columns(measured, ("time", *signals, "s")).items()
     }
-    size = max(1, round(_STEP / float(np.median(np.diff(read["time"])))))
+    steps = np.diff(read["time"])
+    if not (steps.size and (steps > 0.0).all()):
+        raise InputError(
+            where=str(measured),
+            found="times that do not increase" if steps.size else "one sample",
+            expected="strictly increasing time",
+            remedy="take the recording from the train again",
+        )
+    size = max(1, round(_STEP / float(np.median(steps))))
     means = {name: _means(values, size) for name, values in read.items()}
     columns = {"time [s]": means["time"]}
     columns |= {f"{name} [{unit}]": means[name] for name, unit in signals.items()}
@@ -63,6 +71,7 @@ def _recording(folder: Path) -> Recording:
             "satellite speed left out: it is missing in tunnels",
         ),
         {"rail": conditions.take("rail", str)},
+        date=conditions.text("date", ""),
     )
 
 
@@ -89,5 +98,5 @@ PUBLISHED = Published(
     licence="that of the train's owner",
     recordings="Each stop begins with 20 to 30 s of coasting and ends after standstill. A folder "
     "holds stops of one train.",
-    layouts=(Layout("one folder for each stop", {}, _read, pattern="*/*"),),
+    layouts=(Layout("one folder for each stop", {}, _read, pattern="*/*", one=_recording),),
 )

@@ -46,12 +46,13 @@ def case_schema(system: System) -> Schema:
     }
     entries = {
         "title": NAMED,
+        "date": {**TEXT, "description": "when it was recorded, ISO 8601"},
         "measurement": closed(measurement, optional="columns counts_from"),
         "conditions": closed(conditions),
         "model": closed({"names": by_name(NAMED)}, optional="names"),
     }
     title = f"case.toml of {system.name}: {system.title}"
-    optional = "model" if conditions else "model conditions"
+    optional = "date model" if conditions else "date model conditions"
     return _file(title, closed(entries, optional=optional))
 
 

@@ -1,0 +1,69 @@
+"""`workbench monitor`: what has changed on a machine, over many recordings."""
+
+import argparse
+import time
+from functools import partial
+from typing import Any
+
+from workbench.commands.extras import require_compiler
+from workbench.commands.output import Done, Output, read_result
+from workbench.diagnosis import diagnose, read_effects
+from workbench.files import claimed
+from workbench.modelica import read_library
+from workbench.monitoring import Monitored, monitor
+from workbench.monitoring.cause import known_from_before, recordings_after
+from workbench.prepare import read_recorded
+from workbench.provenance import models, software
+from workbench.report.diagnosis import write_diagnosis
+from workbench.report.monitoring import write_monitored
+from workbench.system import OBSERVER
+from workbench.systems import load_system
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Estimate what is new, and watch all."""
+    system = load_system(options.system)
+    if options.diagnose:
+        require_compiler()
+    with claimed(options.out):
+        begin = time.perf_counter()
+        found = monitor(
+            system,
+            options.history,
+            options.out,
+            rate=options.false_alarms,
+            workers=options.workers,
+            read=read_recorded,
+            step=partial(output.step, begin=begin),
+        )
+        provenance = {
+            **software(("fmpy", "numpy", "scipy", "numba")),
+            "system": system.name,
+            "fmu": models(system, [OBSERVER])[OBSERVER],
+        }
+        figure = write_monitored(found, provenance, options.out)
+        output.result(found.summary())
+        output.result(f"to see: {figure}, data beside it")
+        if found.interrupted:
+            output.progress("interrupted: what was estimated is kept; run it again to go on")
+        result = read_result(options.out / "summary.json")
+        if options.diagnose and found.changes and not found.interrupted:
+            result["cause"] = _cause(options, output, found, provenance)
+    return Done(result, {"work": "J"}, 130 * found.interrupted)
+
+
+def _cause(
+    options: argparse.Namespace, output: Output, found: Monitored, provenance: dict[str, Any]
+) -> dict[str, Any]:
+    """Diagnose what has changed; returns the summary of the diagnosis."""
+    system, out = known_from_before(found), options.out / "cause"
+    library = read_library(system.library)
+    effects = read_effects(library, system.models[OBSERVER].name)
+    names = recordings_after(found)
+    output.stage(f"cause of the change, from {', '.join(names)}")
+    cases = [read_recorded(options.history / name, system) for name in names]
+    outcome = diagnose(system, cases, library, effects, out, options.workers, output.stage)
+    page = write_diagnosis(outcome, provenance, out, options.workers)
+    output.result(outcome.summary())
+    output.result(f"to read: {page}")
+    return read_result(out / "summary.json")

@@ -1,0 +1,57 @@
+"""What lies in a folder of recordings, by content: whether it is new, whole, or there twice."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.errors import InputError
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """One recording as it lies in a folder.
+
+    Attributes
+    ----------
+    name : of its folder.
+    content : SHA-256 of all its files and their names.
+    """
+
+    name: str
+    content: str
+    path: Path
+
+
+def deliveries(folder: Path) -> list[Delivery]:
+    """All recordings in a folder, by name: each sub-folder is one, whole or not.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or no recording in it.
+    """
+    try:
+        found = sorted(
+            (one for one in folder.iterdir() if one.is_dir() and not one.name.startswith(".")),
+            key=lambda one: one.name,
+        )
+        if found:
+            return [Delivery(one.name, _content(one), one) for one in found]
+        reason = "a folder without folders"
+    except OSError as error:
+        reason = f"what cannot be read ({error.strerror or error})"
+    raise InputError(
+        where=str(folder),
+        found=reason,
+        expected="a folder that holds a folder for each recording",
+        remedy="correct the path",
+    )
+
+
+def _content(folder: Path) -> str:
+    """SHA-256 of the files in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+        own = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest.update(f"{path.relative_to(folder).as_posix()}\0{own}\n".encode())
+    return digest.hexdigest()
