@@ -27,6 +27,7 @@ from workbench.monitoring.watch import Track, watch
 from workbench.system import System
 from workbench.systems import load_system
 
+from .schemas import check
 from .train_stops import write_stop
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
@@ -327,7 +328,8 @@ def test_the_command_writes_what_it_says(
     assert set(alarms["quantity"]) == {"muDC[3] against the others"}
     estimates = pd.read_csv(tmp_path / "out" / "estimates.csv")
     assert len(estimates) == 16 * 19
-    for name in ("history.png", "history.svg", "work.csv", "summary.json", STATE):
+    check("monitor", json.loads((tmp_path / "out" / "summary.json").read_text()))
+    for name in ("history.png", "history.svg", "work.csv", STATE):
         assert (tmp_path / "out" / name).stat().st_size > 500
 
 

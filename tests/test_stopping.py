@@ -34,6 +34,8 @@ from workbench.system_distance import Stopping
 from workbench.system_file import read_system
 from workbench.systems import load_system
 
+from .schemas import check
+
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
 
 
@@ -335,6 +337,7 @@ def test_bands_hold_stops_that_were_not_used(result: Path) -> None:
 
 def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> None:
     said = json.loads((result / "distance.json").read_text())
+    check("distance", said)
     assert_allclose(said["asked"]["speed"], 140.0 / 3.6)
     assert said["conditions"] == {"rail": "dry"}
     low, middle, high = (said["distance"][share] for share in ("0.025", "0.5", "0.975"))

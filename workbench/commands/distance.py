@@ -6,7 +6,7 @@ from workbench.commands.inputs import given_cases
 from workbench.commands.output import Done, Output, read_result
 from workbench.errors import InputError
 from workbench.files import claimed
-from workbench.provenance import models, software
+from workbench.provenance import models, run_of, software, sources
 from workbench.report.distance import write_distance
 from workbench.stopping import Effort, distance_of_stop
 from workbench.system import OBSERVER
@@ -27,6 +27,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     with claimed(options.out):
         found = distance_of_stop(system, cases, said, effort, options.workers, output.stage)
         provenance = {
+            "run": run_of("distance", system, sources(cases)),
             **software(["numpy", "scipy"]),
             "system": system.name,
             "models": models(system, [OBSERVER]),

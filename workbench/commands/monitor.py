@@ -13,7 +13,7 @@ from workbench.modelica import read_library
 from workbench.monitoring import Monitored, monitor
 from workbench.monitoring.cause import known_from_before, recordings_after
 from workbench.prepare import read_recorded
-from workbench.provenance import models, software
+from workbench.provenance import models, run_of, software
 from workbench.report.diagnosis import write_diagnosis
 from workbench.report.monitoring import write_monitored
 from workbench.system import OBSERVER
@@ -37,6 +37,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             step=partial(output.step, begin=begin),
         )
         provenance = {
+            "run": run_of("monitor", system, {"history": options.history}),
             **software(("fmpy", "numpy", "scipy", "numba")),
             "system": system.name,
             "fmu": models(system, [OBSERVER])[OBSERVER],

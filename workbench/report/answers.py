@@ -11,6 +11,8 @@ from workbench.answer import Answer, Better, Measure
 from workbench.report.views import called, label, percent
 from workbench.system import System
 
+_SURE = 1.96  # standard errors, of 95 %
+
 
 def with_answer(answer: Answer, summary: Mapping[str, Any]) -> dict[str, Any]:
     """A summary that begins with its answer."""
@@ -226,6 +228,42 @@ def proposed(summary: Mapping[str, Any]) -> Answer:
     before, after = best["deviation"]["before"], best["deviation"]["after"]
     headline["times as sure"] = Measure(before / after, "1", "higher")
     return Answer(summary["sentence"], headline)
+
+
+def stopping(summary: Mapping[str, Any]) -> Answer:
+    """The answer of `distance`."""
+    shares = summary["distance"]
+    middle, low, high = (shares[share] for share in ("0.5", "0.025", "0.975"))
+    headline = {
+        "distance": Measure(middle, "m", "lower", low, high),
+        "deceleration": Measure(summary["deceleration"], "m/s2", "higher"),
+    }
+    for one in summary["safety"] or []:
+        name = f"deceleration over the nominal one, all but one stop in 1e{one['decade']}"
+        headline[name] = Measure(one["ratio"], "1", "higher", one["low"], one["high"])
+    details = {
+        f"{one['stop']}: measured over predicted distance": Measure(
+            one["distance [m]"] / one["predicted [m]"], "1"
+        )
+        for one in summary["stops"]
+    }
+    return Answer(summary["sentence"], headline, details)
+
+
+def watched(summary: Mapping[str, Any]) -> Answer:
+    """The answer of `monitor`."""
+    said, count = summary["sentences"], recordings(summary["recordings"])
+    headline = {"alarms": Measure(len(summary["alarms"]), "1", "lower")}
+    details = {}
+    for name, one in summary["quantities"].items():
+        level, sure = one["level"], one["standard_error"]
+        ends = (None, None)
+        if level is not None and sure is not None:
+            ends = (level - _SURE * sure, level + _SURE * sure)
+        details[f"level of {name}"] = Measure(level, one["unit"], "", *ends)
+    return Answer(
+        "; ".join(said) + "." if said else f"Nothing changed in {count}.", headline, details
+    )
 
 
 def _percent(share: float | None, better: Better = "lower") -> Measure:

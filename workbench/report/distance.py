@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workbench.files import write_json, write_whole
+from workbench.report.answers import stopping, with_answer
 from workbench.report.figures import LIGHT, STYLE, save_figure
 from workbench.stopping import Distance
 from workbench.stopping.outcome import QUANTILES, PastStop, Safety
@@ -26,7 +27,8 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
     ----------
     provenance : what was run.
     """
-    write_json(out / "distance.json", {**found.to_dict(), "provenance": provenance})
+    summary = {**found.to_dict(), "provenance": provenance}
+    write_json(out / "distance.json", with_answer(stopping(summary), summary))
     tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
     if found.safety is not None:
         tables["safety"] = pd.DataFrame(map(asdict, found.safety.levels))

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
 from workbench.monitoring import Monitored, Track
+from workbench.report.answers import watched, with_answer
 from workbench.report.figures import LIGHT, STYLE, save_figure
 
 _BAND = 1.96  # standard deviations, of 95 %
@@ -26,7 +27,8 @@ def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) 
     ----------
     provenance : what was run.
     """
-    write_json(out / "summary.json", {**found.to_dict(), "provenance": provenance})
+    summary = {**found.to_dict(), "provenance": provenance}
+    write_json(out / "summary.json", with_answer(watched(summary), summary))
     for name, frame in (
         ("estimates", found.to_frame()),
         ("alarms", found.alarms()),

@@ -31,6 +31,7 @@ from workbench.schemas.words import (
     or_null,
     summary,
 )
+from workbench.stopping.outcome import SafetyLevel
 from workbench.tuning.validation import Fold
 
 
@@ -45,6 +46,8 @@ def summaries() -> dict[str, Schema]:
         "thresholds": _thresholds(),
         "sheet_error": _sheet_error(),
         "next": _next(),
+        "distance": _distance(),
+        "monitor": _monitor(),
     }
     for name in companions():
         if part := companion_part(name, "schemas"):
@@ -275,3 +278,47 @@ def _next() -> Schema:
     }
     provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "diagnosis": TEXT}
     return summary("next", closed(provenance), entries)
+
+
+def _distance() -> Schema:
+    entries = {
+        "sentence": NAMED,
+        "asked": by_name(NUMBER),
+        "conditions": by_name(ANY),
+        "distance": by_name(NUMBER),
+        "deceleration": NUMBER,
+        "response": NUMBER,
+        "nominal": closed({"distance": NUMBER, "deceleration": NUMBER}),
+        "outside": ANY,
+        "width": NUMBER,
+        "safety": or_null(listed(declared(SafetyLevel))),
+        "stops": listed({"type": "object", "required": ["stop", "held"]}),
+        "held": closed({"of": WHOLE, "stops": WHOLE}),
+        "warnings": listed(TEXT),
+        "interrupted": FLAG,
+    }
+    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "models": by_name(FMU), "seed": WHOLE}
+    return summary("distance", closed(provenance), entries)
+
+
+def _monitor() -> Schema:
+    numbers = ("level", "standard_error", "trend_by_recording", "trend_standard_error", "scatter")
+    quantity = {"label": TEXT, "unit": TEXT, **{name: ERROR for name in numbers}, "told_in": WHOLE}
+    worn = {"label": TEXT, "work": NUMBER, "of_the_mean": NUMBER}
+    entries = {
+        "sentences": listed(NAMED),
+        "recordings": WHOLE,
+        "order": {"enum": ["dates", "names"]},
+        "first": NAMED,
+        "last": NAMED,
+        "rate": NUMBER,
+        "threshold": NUMBER,
+        "alarms": listed({"type": "object", "required": ["told_at", "quantity", "change"]}),
+        "quantities": by_name(closed(quantity)),
+        "work": by_name(closed(worn)),
+        "refused": by_name(TEXT),
+        "again": by_name(TEXT),
+        "interrupted": FLAG,
+    }
+    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
+    return summary("monitor", closed(provenance), entries)
