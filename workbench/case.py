@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -223,22 +222,10 @@ def read_case(folder: Path, system: System) -> Case:
         outputs=tuple(one.name for one in system.outputs),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
-        date=_date(document),
+        date=document.date("date"),
         counts_from=_counts_from(measurement, time),
         doubts=doubts(time, signals, conditions, system, origin),
     )
-
-
-def _date(document: Table) -> str:
-    """When a case was recorded, in a form whose order is that of time."""
-    if "date" not in document:
-        return ""
-    try:
-        known = datetime.fromisoformat(document.take("date", str))
-        stamp = (known if known.tzinfo is None else known.astimezone(UTC)).isoformat()
-    except (ValueError, OverflowError):
-        raise document.wrong("date", 'a date as of ISO 8601, such as "2026-01-31"') from None
-    return stamp.removesuffix("T00:00:00")
 
 
 def _recorded(

@@ -31,7 +31,6 @@ from workbench.system_tables import (
     read_rolling,
     read_sampling,
     read_view,
-    read_work,
     within,
 )
 from workbench.tables import Table, read_table
@@ -156,7 +155,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         judged=groups["judged"],
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
-        work=read_work(file.table("work")),
+        work=read_derived(file.table("work"), "W"),
         reported={name: units.get(name, "1") for name in file.texts("reported")},
         conditions=read_condition_kinds(file.table("conditions")),
         design=OperatingPoint({}, {}, {}),

@@ -139,25 +139,17 @@ def read_mode(table: Table) -> Mode:
     )
 
 
-def read_derived(table: Table) -> tuple[Derived, ...]:
-    """Signals made of measured ones and of parameters."""
+def read_derived(table: Table, unit: str = "") -> tuple[Derived, ...]:
+    """What is made of measured signals and of parameters; in one unit, or each in its own."""
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("is unit label")
+        if unit:
+            own.refuse_unknown("is label")
+        else:
+            own.refuse_unknown("is unit label")
         formula = Expression(own.take("is", str), f"{own.where} is")
-        found.append(Derived(name, own.unit("unit"), own.text("label", name), formula))
-    return tuple(found)
-
-
-def read_work(table: Table) -> tuple[Derived, ...]:
-    """Powers that wear what they rub, over measured signals and parameters."""
-    found = []
-    for name in table.content:
-        own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("is label")
-        formula = Expression(own.take("is", str), f"{own.where} is")
-        found.append(Derived(name, "W", own.text("label", name), formula))
+        found.append(Derived(name, unit or own.unit("unit"), own.text("label", name), formula))
     return tuple(found)
 
 

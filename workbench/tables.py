@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,6 +77,17 @@ class Table:
         return Table(
             content, f"{self.where} {key}" if "[" in self.where else f"{self.where}, [{key}]"
         )
+
+    def date(self, key: str) -> str:
+        """A date or time in a form whose order is that of time; empty where there is none."""
+        if key not in self:
+            return ""
+        try:
+            known = datetime.fromisoformat(self.take(key, str))
+            stamp = (known if known.tzinfo is None else known.astimezone(UTC)).isoformat()
+        except (ValueError, OverflowError):
+            raise self.wrong(key, 'a date as of ISO 8601, such as "2026-01-31"') from None
+        return stamp.removesuffix("T00:00:00")
 
     def tables(self, key: str) -> list["Table"]:
         """A list of tables within."""

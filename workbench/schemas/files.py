@@ -100,21 +100,6 @@ def system_schema() -> Schema:
         "learns": QUANTITY,
     }
     follows = closed({"quantity": NAMED, "within": QUANTITY, "left": QUANTITY})
-    objective = {
-        "judged": NAMED,
-        "weights": by_name(NUMBER),
-        "bandwidth": QUANTITY,
-        "begins": level,
-        "ends": level,
-        "when": TEXT,
-    }
-    redundancy = {
-        **dict.fromkeys(("reason", "unit"), NAMED),
-        **dict.fromkeys(("is", "equals"), formula),
-        "within": PAIR,
-        "slack": QUANTITY,
-        "only_while": below,
-    }
     cutting = {"begins": level, "ends": below}
     cutting |= dict.fromkeys(("released", "before", "after"), QUANTITY)
     figure = {"title": NAMED, "note": TEXT, "signals": listed(NAMED)}
@@ -136,7 +121,7 @@ def system_schema() -> Schema:
         "feedback": closed(feedback, optional="*"),
         "points": closed(points, optional="*"),
         "conditions": by_name(_condition_kind(formula)),
-        "objective": closed(objective, optional="*"),
+        "objective": _objective(level),
         "tuning": closed({"follows": follows}, optional="*"),
         "diagnosis": _comparison(formula, level),
         "figures": listed(closed(figure, optional="note height low high")),
@@ -145,7 +130,7 @@ def system_schema() -> Schema:
         "fewest": NUMBER,
         "cases": NAMED,
         "sampling": closed({"slowest": QUANTITY, "gaps": PAIR}, optional="*"),
-        "redundancies": listed(closed(redundancy, optional="slack only_while")),
+        "redundancies": listed(_redundancy(formula, below)),
         "next": _experiments(formula, made, measured),
         "cutting": closed(cutting, optional="released before after"),
         "work": by_name(closed({"is": formula, "label": TEXT}, optional="label")),
@@ -154,6 +139,29 @@ def system_schema() -> Schema:
     needed = {"title", "models", "outputs", "sample_time"}
     optional = " ".join(name for name in entries if name not in needed)
     return _file("system.toml", closed(entries, optional=optional))
+
+
+def _redundancy(formula: Schema, below: Schema) -> Schema:
+    redundancy = {
+        **dict.fromkeys(("reason", "unit"), NAMED),
+        **dict.fromkeys(("is", "equals"), formula),
+        "within": PAIR,
+        "slack": QUANTITY,
+        "only_while": below,
+    }
+    return closed(redundancy, optional="slack only_while")
+
+
+def _objective(level: Schema) -> Schema:
+    objective = {
+        "judged": NAMED,
+        "weights": by_name(NUMBER),
+        "bandwidth": QUANTITY,
+        "begins": level,
+        "ends": level,
+        "when": TEXT,
+    }
+    return closed(objective, optional="*")
 
 
 def _measured(made: Schema) -> Schema:

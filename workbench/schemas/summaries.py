@@ -142,21 +142,6 @@ def _diagnose() -> Schema:
     }
     step = {"before": NUMBER, "rivals": listed(closed({"effect": TEXT, "misfit": NUMBER}))}
     matrix = listed(listed(NUMBER))
-    rival = {
-        "effects": listed(TEXT),
-        "sizes": listed({"type": "array"}),
-        "levels": listed({"type": "array"}),
-        "information": matrix,
-        "behind": NUMBER,
-        "explained": NUMBER,
-    }
-    rivals = {
-        "models": listed(closed(rival)),
-        "effects": listed(TEXT),
-        "given": by_name(NUMBER),
-        "signals": listed(TEXT),
-        "inflation": listed(NUMBER),
-    }
     model = {"modelica": or_null(TEXT), "fmu": or_null(TEXT), "difference_from_fit": ERROR}
     entries = {
         "verdict": {"enum": ["nothing", "found", "unexplained"]},
@@ -180,11 +165,30 @@ def _diagnose() -> Schema:
         "errors": listed(declared(Errors)),
         "start_values": by_name(by_name(NUMBER)),
         "observers": by_name(by_name(closed({"before": ERROR, "after": ERROR}))),
-        "rivals": or_null(closed(rivals)),
+        "rivals": or_null(_rivals(matrix)),
         "cases": listed(TEXT),
     }
     provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "model": FMU}
     return summary("diagnose", closed({**provenance, "effects": listed(TEXT)}), entries)
+
+
+def _rivals(matrix: Schema) -> Schema:
+    rival = {
+        "effects": listed(TEXT),
+        "sizes": listed({"type": "array"}),
+        "levels": listed({"type": "array"}),
+        "information": matrix,
+        "behind": NUMBER,
+        "explained": NUMBER,
+    }
+    rivals = {
+        "models": listed(closed(rival)),
+        "effects": listed(TEXT),
+        "given": by_name(NUMBER),
+        "signals": listed(TEXT),
+        "inflation": listed(NUMBER),
+    }
+    return closed(rivals)
 
 
 def _observability() -> Schema:
