@@ -113,7 +113,7 @@ def plain_runs(probability: float, variation: float) -> float:
     """Evaluations by which plain sampling tells a probability as surely.
 
     >>> round(plain_runs(1e-9, 0.1))
-    100000000000
+    99999999900
     """
     return (1.0 - probability) / (probability * variation**2)
 
