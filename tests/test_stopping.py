@@ -359,7 +359,10 @@ def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None
         pytest.skip("the recordings are not at hand")
     write_cases("train", RECORDINGS / "history", tmp_path)
     found: Distance = wb.distance(
-        train, wb.read_cases(tmp_path, train), effort=Effort(decades=0), report=lambda line: None
+        train,
+        wb.read_cases(tmp_path, train),
+        effort=Effort(800, decades=0),
+        report=lambda line: None,
     )
     truth = json.loads((RECORDINGS / "history" / "truth.json").read_text())["cases"]
     held = []
