@@ -15,6 +15,7 @@ import signal
 import sys
 import tempfile
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, as_completed, wait
@@ -358,10 +359,18 @@ def start(target: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProces
 
 
 def _start(target: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess:
-    process: BaseProcess = _CONTEXT.Process(target=target, args=arguments, daemon=True)
-    with _hidden_program():
-        process.start()
-    return process
+    until = time.monotonic() + _END
+    while True:
+        process: BaseProcess = _CONTEXT.Process(target=target, args=arguments, daemon=True)
+        try:
+            with _hidden_program():
+                process.start()
+            return process
+        except (EOFError, ConnectionError):
+            # The server is dying: it refuses, and is replaced once its process has ended.
+            if time.monotonic() > until:
+                raise
+        time.sleep(0.05)
 
 
 class _Nameless(ModuleType):
