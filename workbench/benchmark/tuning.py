@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from workbench.benchmark.memory import watch_command
 from workbench.benchmark.other_ways import by_fmpy
@@ -161,7 +162,7 @@ def time_evaluation(job: Job, by_loop: Callable[[], float]) -> EvaluationTimes:
     """
     values = job.gains.values
     ours, theirs = [], []
-    with Evaluator(job) as evaluator:
+    with threadpool_limits(1), Evaluator(job) as evaluator:  # as a worker has it
         for _ in range(_REPEATS):
             for _ in range(_EVALUATIONS):
                 begin = time.perf_counter()

@@ -119,9 +119,12 @@ def swinging_states(fmu: FMU, system: System) -> tuple[str, ...]:
 
     Such as a spring and the mass on it; stepped one by one, they would swing ever more.
     """
-    settle(fmu, system, system.design, extensions=False)
-    A, corrected = fmu.state_jacobian() != 0.0, corrected_states(fmu, system)
+    corrected = corrected_states(fmu, system)
     others = np.array([name not in corrected for name in fmu.states], np.bool_)
+    if others.sum() < 2:  # each candidate of a tuning asks, and rest takes time
+        return ()
+    settle(fmu, system, system.design, extensions=False)
+    A = fmu.state_jacobian() != 0.0
     moves = A & others & others[:, None] & ~np.eye(others.size, dtype=np.bool_)
     return tuple(fmu.states[i] for i in np.flatnonzero(moves.any(axis=0) | moves.any(axis=1)))
 
