@@ -338,14 +338,8 @@ def _found_folders(path: Path) -> list[Path]:
         )
     if (path / "case.toml").exists():
         return [path]
-    folders = sorted(
-        (
-            child
-            for child in path.iterdir()
-            if child.is_dir() and (re.match(r"\d+_", child.name) or (child / "case.toml").exists())
-        ),
-        key=lambda child: child.name,
-    )
+    below = sorted((one for one in path.iterdir() if one.is_dir()), key=lambda one: one.name)
+    folders = [one for one in below if re.match(r"\d+_", one.name) or (one / "case.toml").exists()]
     if not folders:
         raise InputError(
             where=str(path),

@@ -1,10 +1,9 @@
 """Worker processes: one kind of pool for everything that takes long.
 
 No worker is a fork of this process, whose threads may hold locks. Where the system can, workers are
-forks of a server that has imported what they need, and start in milliseconds; elsewhere (Windows)
-each starts anew. No worker runs the program that made the pool again, so a script needs no
-`if __name__ == "__main__"`, and a notebook works. Loky has no time limits, and one dead worker ends
-its pool; Pebble's workers run the program again, and import everything anew.
+forks of a server that has imported what they need; elsewhere (Windows) each starts anew. None runs
+the program that made the pool again: a script needs no `if __name__ == "__main__"`. Loky has no
+time limits, and one dead worker ends its pool; Pebble's workers import everything anew.
 """
 
 import math
@@ -59,8 +58,7 @@ class Pool(Generic[State]):
     so does one that takes longer than the limit. Other tasks never notice. Workers leave Ctrl-C to
     this process, do not outlive it, and use one BLAS thread each. Leaving the pool ends them.
 
-    One worker without a limit that need not be isolated is this process: `submit` returns when the
-    task is done.
+    One worker with no limit, not isolated, is this process: `submit` returns when the task is done.
 
     Parameters
     ----------
@@ -227,8 +225,8 @@ class Pool(Generic[State]):
         with _starting:
             if self._closed:
                 raise EOFError
-            worker = self._running[number] = _Worker(self._folder)
-            return worker
+            self._running[number] = _Worker(self._folder)
+            return self._running[number]
 
     def _drop(self, number: int, *, kill: bool = False) -> str:
         """End a worker, whose place the next task fills; says how it ended."""
@@ -341,13 +339,12 @@ def preload(*modules: str) -> None:
     place = {"PYTHONPATH": paths, "PYTHONSAFEPATH": "1"}
     with _starting, _hidden_program():
         before = {name: os.environ.get(name) for name in place}
-        os.environ.update(place)
+        os.environ |= place
         forkserver.set_forkserver_preload(list(modules))
         forkserver.ensure_running()
         for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
+            del os.environ[name]
+            if value is not None:
                 os.environ[name] = value
 
 

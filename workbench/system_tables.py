@@ -380,9 +380,8 @@ def read_rolling(table: Table) -> Rolling:
 def read_following(table: Table) -> Following:
     """A quantity that gains must find in time."""
     table.refuse_unknown("quantity within left")
-    return Following(
-        table.take("quantity", str), table.number("within", "s"), table.number("left", "1")
-    )
+    quantity, within = table.take("quantity", str), table.number("within", "s")
+    return Following(quantity, within, table.number("left", "1"))
 
 
 def read_view(table: Table, system: System) -> View:
@@ -391,12 +390,11 @@ def read_view(table: Table, system: System) -> View:
     signals = table.texts("signals")
     for signal in signals:
         system.refuse_missing(signal, f"{table.where} signals")
-    low, high = (table.number(key, "1", math.nan) for key in ("low", "high"))
     return View(
         title=table.take("title", str),
         note=table.text("note", ""),
         signals=signals,
         height=table.number("height", "1", 1.0),
-        low=None if math.isnan(low) else low,
-        high=None if math.isnan(high) else high,
+        low=table.number("low", "1") if "low" in table else None,
+        high=table.number("high", "1") if "high" in table else None,
     )
