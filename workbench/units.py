@@ -53,6 +53,7 @@ henry = volt * second / ampere = H
 kelvin = [temperature] = K
 mole = [substance] = mol
 percent = 0.01
+permille = 1e-3
 """
 # As Modelica and people write them: N.m, kg.m2, m3/s, J/(kg.K), W/m^2.
 _UNIT = re.compile(

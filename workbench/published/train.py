@@ -4,6 +4,7 @@ A folder holds a folder for each stop: `case.toml` with what the crew knows, `me
 `track.csv` with gradients and radii of curves along the line.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from workbench.errors import InputError
 from workbench.prepare import Layout, Published, Recording
 from workbench.recording import Matrix, Vector, read_columns
 from workbench.tables import read_table
+from workbench.units import si_factor
 
 _CASE = "case.toml"
 _STEP = 0.1  # of a case [s]
@@ -37,10 +39,8 @@ def _recording(folder: Path) -> Recording:
     document = read_table(folder / _CASE, "describe the stop", 'title = "..."')
     conditions = document.table("conditions")
     measured = folder / document.table("measurement").take("file", str)
-    signals = dict.fromkeys(_PRESSURES, "bar") | dict.fromkeys(_SPEEDS, "rad/s") | {"a": "m/s2"}
-    read = {
-        name: one.values for name, one in read_columns(measured, ("time", *signals, "s")).items()
-    }
+    signals = dict.fromkeys(_PRESSURES, "Pa") | dict.fromkeys(_SPEEDS, "rad/s") | {"a": "m/s2"}
+    read = _columns(measured, {"time": "s", **signals, "s": "m"})
     steps = np.diff(read["time"])
     if not (steps.size and (steps > 0.0).all()):
         raise InputError(
@@ -75,6 +75,16 @@ def _recording(folder: Path) -> Recording:
     )
 
 
+def _columns(file: Path, units: Mapping[str, str]) -> dict[str, Vector]:
+    """Columns of a file, by name, in these units."""
+    found = read_columns(file, list(units))
+    where = f"{file}, line 1, column"
+    return {
+        name: found[name].values * si_factor(found[name].unit, unit, f"{where} '{name}'")
+        for name, unit in units.items()
+    }
+
+
 def _means(values: Vector, size: int) -> Vector:
     """Means of so many samples each; what is left over is dropped."""
     means: Vector = values[: values.size // size * size].reshape(-1, size).mean(axis=1)
@@ -83,11 +93,11 @@ def _means(values: Vector, size: int) -> Vector:
 
 def _along(file: Path, position: Vector) -> tuple[Matrix, Matrix]:
     """Gradient, and resistance of curves over weight, under each vehicle, (2, n)."""
-    track = read_columns(file, ("position", "gradient", "radius"))
-    rows = track["position"].values
+    track = _columns(file, {"position": "m", "gradient": "1", "radius": "m"})
+    rows = track["position"]
     at = position - np.array(_MIDDLES)[:, None]
-    slopes: Matrix = 1e-3 * np.interp(at, rows, track["gradient"].values)
-    radius = track["radius"].values[np.clip(np.searchsorted(rows, at, "right") - 1, 0, None)]
+    slopes: Matrix = np.interp(at, rows, track["gradient"])
+    radius = track["radius"][np.clip(np.searchsorted(rows, at, "right") - 1, 0, None)]
     curves: Matrix = np.divide(_CURVE, radius, out=np.zeros_like(radius), where=radius > 0.0)
     return slopes, curves
 
