@@ -112,7 +112,7 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
 
 def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden() -> None:
     named = {name for name, _, _ in PLANTED.values()}
-    hidden = {"CaliperHysteresis", "AdhesionRecovery", "WheelInertia"}
+    hidden = {"CaliperHysteresis", "AdhesionRecovery", "FallingFriction", "WheelInertia"}
     assert named | hidden == {effect.name for effect in EFFECTS}
 
 

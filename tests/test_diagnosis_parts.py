@@ -12,14 +12,7 @@ pytest.importorskip("rumoca")
 from workbench.case import Case, read_cases
 from workbench.diagnosis import choose, read_effects
 from workbench.diagnosis.cleaning import outliers
-from workbench.diagnosis.evidence import (
-    Evidence,
-    Simulated,
-    Simulations,
-    Simulator,
-    Variation,
-    delay,
-)
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
@@ -35,6 +28,7 @@ from workbench.diagnosis.quadratic import (
 )
 from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
+from workbench.diagnosis.simulator import Evidence, Simulated, Simulator, Variation, delay
 from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector

@@ -50,7 +50,7 @@ MISTAKES = {
     ),
     "type of a flag": (
         ("to_the_end = true", 'to_the_end = "yes"'),
-        r"\[\[excluded\]\] 2 to_the_end: found 'yes'; expected true or false",
+        r"\[\[excluded\]\] 3 to_the_end: found 'yes'; expected true or false",
     ),
     "number without its unit": (
         ('noise = "80 N"', "noise = 80"),
@@ -105,6 +105,14 @@ MISTAKES = {
         r"found unknown key 'unused'",
     ),
     # --- what it says of the model ---
+    "restart of what is no state": (
+        ('restarted = ["omegaW"]', 'restarted = ["Fx"]'),
+        r"\[\[diagnosis\.excluded\]\] restarted: found 'Fx'.*expected a measured output that is a",
+    ),
+    "uncertain parameter that there is none of": (
+        ("uncertain = { muWR = 0.04", "uncertain = { muWR2 = 0.04"),
+        r"\[diagnosis\.excluded\] muWR2: found 'muWR2'.*expected a parameter of the model",
+    ),
     "variable that the FMU lacks": (
         ('correction = "dmuWR"', 'correction = "dmuWR2"'),
         r"MinimalObserver\.fmu: found no variable 'dmuWR2' \(closest: 'dmuWR'\)",

@@ -107,7 +107,9 @@ def read_level(levels: Table, name: str) -> Level:
 
 def read_exclusion(table: Table, system: System) -> Exclusion:
     """Samples that do not count."""
-    table.refuse_unknown("reason is above below from_rest within smoothed only_while to_the_end")
+    table.refuse_unknown(
+        "reason is above below from_rest within smoothed only_while to_the_end restarted uncertain"
+    )
     if ("above" in table) == ("below" in table):
         raise InputError(
             where=table.where,
@@ -115,7 +117,7 @@ def read_exclusion(table: Table, system: System) -> Exclusion:
             expected="one of the two",
             remedy="say from which level on samples do not count",
         )
-    while_ = table.table("only_while")
+    while_, uncertain = table.table("only_while"), table.table("uncertain")
     return Exclusion(
         reason=table.take("reason", str),
         formula=Expression(table.take("is", str), f"{table.where} is"),
@@ -126,4 +128,6 @@ def read_exclusion(table: Table, system: System) -> Exclusion:
         smoothed=table.number("smoothed", "s", 0.0),
         only_while=read_threshold(while_, system) if "only_while" in table else None,
         to_the_end="to_the_end" in table and table.take("to_the_end", bool),
+        restarted=table.texts("restarted"),
+        uncertain={name: uncertain.number(name, "1") for name in uncertain.content},
     )

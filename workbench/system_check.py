@@ -127,6 +127,7 @@ def _parameters(system: System) -> Iterator[_Reference]:
     tables = [
         ("diagnosis.tolerances", system.comparison.tolerances),
         ("diagnosis.levels", system.comparison.levels),
+        *(("diagnosis.excluded", one.uncertain) for one in system.comparison.exclusions),
         *(
             (f"conditions.{one.name}.parameters", parameters)
             for one in system.conditions
@@ -174,6 +175,10 @@ def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference
         yield f"{system.source}, [diagnosis] rest output", rest.output, variables, output
     for name in compared.leading.together if compared.leading else ():
         yield f"{system.source}, [diagnosis] leads together", name, states, state
+    measured = [one.name for one in system.outputs if one.name in states]
+    for name in (name for one in compared.exclusions for name in one.restarted):
+        where = f"{system.source}, [[diagnosis.excluded]] restarted"
+        yield where, name, measured, "a measured output that is a continuous state of the model"
 
 
 def _of_system(system: System) -> Iterator[_Reference]:

@@ -84,6 +84,9 @@ class Exclusion:
     smoothed : [s] over which the formula is averaged.
     only_while : and only while a signal is above a level, or None.
     to_the_end : whether nothing after it counts.
+    restarted : measured outputs, which are states. Such samples do count, if each of their blocks
+        is predicted from these states as measured before it; unless errors last there nevertheless.
+    uncertain : relative standard deviation of parameters of a law that is simplified there.
     """
 
     reason: str
@@ -95,6 +98,8 @@ class Exclusion:
     smoothed: float
     only_while: Threshold | None
     to_the_end: bool
+    restarted: tuple[str, ...]
+    uncertain: Mapping[str, float]
 
 
 @dataclass(frozen=True)

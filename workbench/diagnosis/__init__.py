@@ -17,7 +17,7 @@ from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.counting import refuse_too_few
-from workbench.diagnosis.evidence import Simulations, delay, simulating
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, parameter_of, source
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.outcome import Extension, Outcome
@@ -26,6 +26,7 @@ from workbench.diagnosis.residuals import Dependence, Residuals, dependences, re
 from workbench.diagnosis.rivals import gathered
 from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors
 from workbench.diagnosis.search import Reporter
+from workbench.diagnosis.simulator import delay, simulating
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.errors import InputError
 from workbench.files import write_whole

@@ -28,6 +28,7 @@ class Counted:
     clean : (n,) by signal, bridged where it is wrong; wrong : (n,) where.
     deviation : standard deviation of the noise of a sample, by signal.
     excluded : (n,) samples that do not count, by reason.
+    spans : (n,) samples where states are restarted; if they count, they do for that.
     applied : sample at which the recording begins.
     blocks : (b, 2) first sample and end of each block that counts.
     missing : number of samples.
@@ -37,6 +38,7 @@ class Counted:
     wrong: Mapping[str, Mask]
     deviation: Mapping[str, float]
     excluded: Mapping[str, Mask]
+    spans: Mask
     applied: int
     blocks: NDArray[np.int64]
     missing: int
@@ -61,8 +63,14 @@ class Counted:
         return {MISSING: self.missing, **counts}
 
 
-def count(case: Case, system: System, names: Sequence[str], sound: Soundness) -> Counted:
+def count(
+    case: Case, system: System, names: Sequence[str], sound: Soundness, *, restarting: bool
+) -> Counted:
     """Tell which samples of a recording count, by these signals.
+
+    Parameters
+    ----------
+    restarting : whether samples count where states can be restarted.
 
     Raises
     ------
@@ -78,6 +86,11 @@ def count(case: Case, system: System, names: Sequence[str], sound: Soundness) ->
     own = {
         one.reason: excluded_by(one, clean, system, time, h, applied) for one in compare.exclusions
     }
+    restarted = [own[one.reason] for one in compare.exclusions if one.restarted]
+    spans = np.logical_or.reduce(restarted) if restarted else np.zeros(time.size, np.bool_)
+    for one in compare.exclusions if restarting else ():
+        if one.restarted:
+            own[one.reason] = np.zeros(time.size, np.bool_)
     excluded = {
         FAULTY: np.logical_or.reduce(list(faulty.values())),
         BEYOND: np.logical_or.reduce(list(beyond.values())),
@@ -89,7 +102,7 @@ def count(case: Case, system: System, names: Sequence[str], sound: Soundness) ->
     refuse_too_short(case, system, blocks, excluded)
     deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
     missing = int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1)))
-    return Counted(clean, wrong, deviation, excluded, applied, blocks, missing)
+    return Counted(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
 
 
 def refuse_too_few(cases: Sequence[Case], system: System) -> None:

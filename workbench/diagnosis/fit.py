@@ -5,7 +5,7 @@ left of a recording is a small quadratic form in the common unknowns, which sums
 leaves-one-out are made of.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -13,11 +13,12 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
-from workbench.diagnosis.evidence import Evidence, Item, Result, Simulations
+from workbench.diagnosis.evidence import Item, Result, Simulations
 from workbench.diagnosis.extension import variables
-from workbench.diagnosis.linearised import Linearised, Point, between, slowness
+from workbench.diagnosis.linearised import Linearised, Point, between, lasting, slowness
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
+from workbench.diagnosis.simulator import Evidence
 from workbench.diagnosis.thresholds import Thresholds, thresholds
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.errors import FMUError, InputError
@@ -108,6 +109,28 @@ class Fit:
         away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
+
+    def astray(self, lin: Linearised) -> list[int]:
+        """Recordings in which errors last where states are restarted: another law holds there."""
+        found = []
+        for k, (one, evidence) in enumerate(
+            zip(self._simulations.recordings, lin.evidence, strict=True)
+        ):
+            errors = evidence.errors[one.restarted]
+            if not len(errors):
+                continue
+            squares = lasting(errors, min(self.lasting, len(errors)))
+            # Few means may be larger by chance than what is wrong of many.
+            count = len(squares)
+            if squares.mean(axis=0).max() > max(
+                self.decides.wrong, self.decides.fall_of(count) / count
+            ):
+                found.append(k)
+        return found
+
+    def leave_out_restarted(self, numbers: Collection[int]) -> None:
+        """See `Simulations.leave_out_restarted`; what was fitted before has to be fitted anew."""
+        self._simulations.leave_out_restarted(numbers)
 
     def tried(self, point: Point) -> Linearised | None:
         """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""

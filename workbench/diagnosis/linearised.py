@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from workbench.diagnosis.evidence import Evidence
 from workbench.diagnosis.quadratic import Key
+from workbench.diagnosis.simulator import Evidence
 from workbench.diagnosis.thresholds import Thresholds
 from workbench.fmu import Matrix, Vector
 

@@ -35,12 +35,15 @@ class _Led(NamedTuple):
     column : of the output that leads alone.
     corrected : (p,) states that all outputs lead.
     gain : (p, l) of these corrections.
+    restarted, seen : (r,) states that restarts set, and the columns of their outputs.
     """
 
     states: NDArray[np.intp]
     column: int
     corrected: NDArray[np.intp]
     gain: Matrix
+    restarted: NDArray[np.intp]
+    seen: NDArray[np.intp]
 
 
 @compiled
@@ -74,7 +77,17 @@ def _lead(model, led, share, error, states, errors):  # type: ignore[no-untyped-
 
 
 @compiled
-def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work, tangent):  # type: ignore[no-untyped-def]
+def _restart(model, led, error, states, errors):  # type: ignore[no-untyped-def]
+    """Set states as measured, by errors (c,), and derivatives (n, p) by theirs (c, p)."""
+    for i in range(led.restarted.size):
+        at, column = led.restarted[i], led.seen[i]
+        model.x[at] += error[column]
+        for q in range(states.shape[1]):
+            states[at, q] += errors[column, q]
+
+
+@compiled
+def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work, tangent):  # type: ignore[no-untyped-def]
     """Fill `errors` (n, c), measured minus predicted, and their derivatives; returns a status."""
     varied = tangent.states.shape[1] > 0
     for i in range(x0.size):
@@ -89,6 +102,8 @@ def _predict(model, time, u, held, y, gain, led, x0, longest, errors, work, tang
     for k in range(time.size):
         if k > 0:
             before = k - 1 if varied else 0
+            if anew[k]:
+                _restart(model, led, errors[k - 1], tangent.states, tangent.errors[before])
             _lead(model, led, gain[k - 1], errors[k - 1], tangent.states, tangent.errors[before])
             if set_states(model):
                 return 1
@@ -206,6 +221,7 @@ class Predictor:
             samples.y,
             samples.gain,
             self._led(samples),
+            np.zeros(end, np.bool_) if samples.restarts is None else samples.restarts.at[:end],
             x0,
             self._longest,
             errors,
@@ -216,11 +232,16 @@ class Predictor:
         return errors, along
 
     def _led(self, samples: Samples) -> _Led:
-        lead = samples.lead
-        if lead is None:
-            return _Led(*self._leading, np.zeros(0, np.intp), np.zeros((0, 0)))
-        places = [self._fmu.states.index(name) for name in lead.states]
-        return _Led(*self._leading, np.array(places, np.intp), np.ascontiguousarray(lead.gain))
+        lead, restarts = samples.lead, samples.restarts
+        corrected = () if lead is None else lead.states
+        gain = np.zeros((0, 0)) if lead is None else np.ascontiguousarray(lead.gain)
+        restarted = () if restarts is None else tuple(restarts.noise)
+        seen = np.array([samples.signals.index(name) for name in restarted], np.intp)
+        return _Led(*self._leading, self._at(corrected), gain, self._at(restarted), seen)
+
+    def _at(self, states: Sequence[str]) -> NDArray[np.intp]:
+        """Places of states in the model."""
+        return np.array([self._fmu.states.index(name) for name in states], np.intp)
 
     def _steps(self) -> Steps:
         """Work space; which states are stiff is judged where the recording begins."""

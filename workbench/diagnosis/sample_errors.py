@@ -74,7 +74,8 @@ def held_out_errors(
     errors : of both models.
     starts : of the last model, by recording, see `Unknowns.starts`.
     """
-    with Simulations(everything, fitted.system, fitted.given, cases, workers) as simulations:
+    given = (everything, fitted.system, fitted.given, cases, workers)
+    with Simulations(*given, restarting=False) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
         ends = []
         for one in (before, after):

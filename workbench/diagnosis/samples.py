@@ -5,19 +5,16 @@ to average most of the ringing of its structure.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
-from scipy.optimize import nnls
 from scipy.signal import lfilter, lfiltic
 
 from workbench.case import Case
 from workbench.diagnosis.cleaning import (
     Mask,
-    deviation_of,
     first_value,
     smooth,
 )
@@ -30,7 +27,9 @@ from workbench.diagnosis.motion import (
     noise_of,
     random_walk,
 )
+from workbench.diagnosis.restarts import Restarts, restarts_of
 from workbench.diagnosis.thresholds import SOUND, Soundness
+from workbench.diagnosis.whitening import whitening
 from workbench.errors import InputError
 from workbench.recording import Matrix, Vector
 from workbench.system import Channel, Comparison, Mode, System
@@ -55,6 +54,7 @@ class Samples:
     limits : (2, c) of what the sensors read.
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
     lead : how all outputs correct the states, or None where one leads alone.
+    restarts : where states are set as measured, or None if nowhere.
     held : (m,) whether an input is held from a sample to the next; else it goes there.
     begin : outputs, and what rolls along, at the start.
     rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
@@ -76,6 +76,7 @@ class Samples:
     limits: Matrix
     gain: Vector
     lead: Lead | None
+    restarts: Restarts | None
     held: NDArray[np.bool_]
     begin: Mapping[str, float]
     rest: float
@@ -143,6 +144,26 @@ class Samples:
             [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
         )
 
+    @property
+    def restarted(self) -> Mask:
+        """(b,) blocks that begin with states as measured."""
+        if self.restarts is None:
+            return np.zeros(len(self.blocks), np.bool_)
+        return self.restarts.at[self.blocks[:, 0]]
+
+    def loosened(self, moved: Sequence[Matrix]) -> "Samples":
+        """The same with errors that are uncertain by more, apart from each other.
+
+        Parameters
+        ----------
+        moved : by how much one standard deviation of each cause moves block means, (b, c).
+        """
+        inverse = np.linalg.inv(self.whitening)
+        covariance = np.einsum("bij,bkj->bik", inverse, inverse)
+        for one in moved:
+            covariance += one[:, :, None] * one[:, None, :]
+        return replace(self, whitening=np.linalg.inv(np.linalg.cholesky(covariance)))
+
     def channels(self, errors: Matrix) -> Matrix:
         """Means of prediction errors (n, c, ...) over each block, by channel, (b, c, ...)."""
         total = np.zeros((len(errors) + 1, len(self.slopes), *errors.shape[2:]))
@@ -173,6 +194,8 @@ def prepare(
     values: Mapping[str, float],
     motion: Motion,
     sound: Soundness = SOUND,
+    *,
+    restarting: bool = True,
 ) -> Samples:
     """Make a recording ready.
 
@@ -182,6 +205,7 @@ def prepare(
     values : parameters of the model.
     motion : of the model at its design point.
     sound : which samples count.
+    restarting : whether samples count where states can be restarted.
 
     Raises
     ------
@@ -189,16 +213,14 @@ def prepare(
         If the recording has too little that counts.
     """
     time, h = case.time, float(np.median(np.diff(case.time)))
-    counted = count(case, system, (*case.inputs, *signals), sound)
+    names = (*case.inputs, *signals)
+    counted = count(case, system, names, sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     formed = channels(system, signals)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
     gain, lead, ahead = _led(case, system, signals, clean, deviation, counted.wrong, motion)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
-    whitening = _whitening(
-        *(system, clean, deviation, signals, slopes, blocks, counted.usable, ahead)
-    )
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
     first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
@@ -214,13 +236,14 @@ def prepare(
         limits=np.array([system.signals[name].limits for name in signals]).T,
         gain=gain,
         lead=lead,
+        restarts=restarts_of(system, counted),
         held=np.array([one.held for one in system.inputs]),
         begin=_begin(system, first, motion),
         rest=rest,
         rest_noise=rest_noise,
         blocks=blocks,
         slopes=slopes,
-        whitening=whitening,
+        whitening=whitening(system, counted, signals, slopes, ahead),
         modes=modes,
         set_aside=counted.set_aside,
     )
@@ -272,55 +295,3 @@ def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[s
     if system.rolling is None or system.rolling.leader not in measured:
         return measured
     return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}
-
-
-def _whitening(
-    system: System,
-    clean: Mapping[str, Vector],
-    deviation: Mapping[str, float],
-    signals: tuple[str, ...],
-    slopes: Matrix,
-    blocks: NDArray[np.int64],
-    usable: Mask,
-    ahead: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Inverse Cholesky factors of the covariance of block means, (b, c, c).
-
-    Noise that grows with a signal is told from what does not by the differences of a channel;
-    channels share the noise of their signals; the noise behind a structure is mostly its ringing,
-    whose block means are taken as they are.
-    """
-    size = int(blocks[0, 1] - blocks[0, 0])
-    fixed = np.array([deviation[name] ** 2 for name in signals])
-    covariance = np.tile(slopes * fixed @ slopes.T, (len(blocks), 1, 1))
-    for c, row in enumerate(slopes):
-        own = [name for name, slope in zip(signals, row, strict=True) if slope]
-        channel = sum(slope * clean[name] for name, slope in zip(signals, row, strict=True))
-        growing = [name for name in own if system.signals[name].relative_noise > 0.0]
-        shared = np.delete(np.abs(slopes), c, axis=0).sum(axis=0) > 0.0
-        if len(own) == 1 and system.signals[own[0]].mode is not None:
-            means = np.array([clean[own[0]][first:end].mean() for first, end in blocks])
-            covariance[:, c, c] = size * deviation_of(means) ** 2
-        elif growing:
-            least = 1.01 * float(row[shared] ** 2 @ fixed[shared])
-            covariance[:, c, c] = _growing(channel, clean[growing[0]], usable, blocks, least)
-    # Predicted outputs are uncertain too, by what led them.
-    predicted = np.array([ahead[first:end].mean(axis=0) for first, end in blocks])
-    covariance += slopes @ predicted @ slopes.T
-    # A signal that rests within a step of its reading is wrong by the same in all samples.
-    steps = np.array([system.signals[name].resolution ** 2 / 12.0 for name in signals])
-    return np.linalg.inv(np.linalg.cholesky(covariance / size + slopes * steps @ slopes.T))
-
-
-def _growing(
-    channel: Vector, signal: Vector, usable: Mask, blocks: NDArray[np.int64], least: float
-) -> Vector:
-    """Variance of a channel's samples in each block, part of which grows with a signal, (b,)."""
-    squares = np.diff(channel, 2) ** 2 / 6.0
-    squares = np.minimum(squares, 9.0 * median_filter(squares, 201) / 0.455)
-    counts = usable[1:-1]
-    design = np.column_stack([np.ones(counts.sum()), signal[1:-1][counts] ** 2])
-    coefficients, _ = nnls(design, squares[counts])
-    means = np.array([np.abs(signal[first:end]).mean() for first, end in blocks])
-    variance: Vector = np.maximum(coefficients[0] + coefficients[1] * means**2, least)
-    return variance

@@ -287,13 +287,14 @@ def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> li
     """Variants, best first, of effects that are large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
-    a rival, and its fit decides.
+    a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
     """
-    clear, needed = decides.significant, decides.fall
-    if best.linearised.inflation.max() > decides.wrong:
-        clear, needed = decides.hint, 0.0
+    hinted = best.linearised.inflation.max() > decides.wrong
+    clear = decides.hint if hinted else decides.significant
     able: dict[str, list[Prospect]] = {}
     for one in scores:
+        phases = len(one.phases) if one.effect.order_locked else 0
+        needed = 0.0 if hinted else decides.fall_of(1 + phases)
         significant = (
             abs(one.size) > clear * one.sigma and min(one.gain, one.held_out.sum()) > needed
         )

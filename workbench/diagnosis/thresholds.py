@@ -7,7 +7,7 @@ reason; `workbench power --thresholds` shows what half and twice of each change.
 import math
 from dataclasses import dataclass
 
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 RATE = 0.002
 """Clean sets that may be called something else: a tenth of the 2 % that power allows, since noise
@@ -91,6 +91,15 @@ class Thresholds:
     def hint(self) -> float:
         """Standard deviations of a size while much is wrong, all being weighed against that."""
         return 0.5 * self.significant
+
+    def fall_of(self, unknowns: int) -> float:
+        """Fall of chi-squared that chance makes of so many unknowns as seldom as `fall` of one.
+
+        >>> decides = thresholds(28)
+        >>> round(decides.fall_of(1), 1), round(decides.fall_of(7), 1)
+        (15.8, 30.7)
+        """
+        return float(chi2.isf(2.0 * norm.sf(self.significant), unknowns))
 
     @property
     def needed(self) -> float:

@@ -13,11 +13,12 @@ from workbench.case import Case
 from workbench.conditions import Value
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.cleaning import ALONG
-from workbench.diagnosis.evidence import Simulations, delay
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Point
 from workbench.diagnosis.presence import Presence
 from workbench.diagnosis.quadratic import Key
+from workbench.diagnosis.simulator import delay
 from workbench.system import System
 
 SENSOR = "sensor"  # in place of a choice, of a sensor's delay

@@ -13,6 +13,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.search import BEGUN, Fitted, Reporter, Step, extended, misfits
 from workbench.diagnosis.selection import Selection, select
 from workbench.diagnosis.trial import Prospect
+from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
 
 Verdict = Literal["nothing", "found", "unexplained"]
@@ -108,12 +109,12 @@ class Diagnosis:
 
 def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of recordings."""
-    chosen = select(fit, catalogue, report)
+    chosen, astray = _selected(fit, catalogue, report)
     base, best = chosen.base, chosen.best
     clean = float(best.linearised.inflation.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
     explained = _share(base, best) > 1.0 - fit.decides.left
-    if not clean and not (best.active and (chosen.interrupted or explained)):
+    if astray or (not clean and not (best.active and (chosen.interrupted or explained))):
         verdict = "unexplained"
     causes: list[Cause] = []
     rivals: tuple[Fitted, ...] = ()
@@ -142,6 +143,26 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         cosines=chosen.cosines,
         not_visible={one.name: why for one in catalogue if (why := presence.unseen(one))},
     )
+
+
+def _selected(
+    fit: Fit, catalogue: Sequence[Effect], report: Reporter
+) -> tuple[Selection, Sequence[int]]:
+    """What recordings need, and those of which parts that cannot be left out follow no law.
+
+    Where states are restarted, samples count if the law that holds there can be judged: if errors
+    last whatever is found, they are left out.
+    """
+    while True:
+        chosen = select(fit, catalogue, report)
+        astray = [] if chosen.interrupted else fit.astray(chosen.best.linearised)
+        if not astray:
+            return chosen, ()
+        report(f"once more without what follows no law in {len(astray)} recordings")
+        try:
+            fit.leave_out_restarted(astray)
+        except InputError:
+            return chosen, astray  # nearly all of them is such
 
 
 def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -> Sequence[Effect]:

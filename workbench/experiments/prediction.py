@@ -133,7 +133,7 @@ def predicted_cases(
 def _counts(case: Case, system: System) -> bool:
     """Whether a recording has enough that counts."""
     try:
-        count(case, system, tuple(case.signals), SOUND)
+        count(case, system, tuple(case.signals), SOUND, restarting=True)
     except InputError:
         return False
     return True

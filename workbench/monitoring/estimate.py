@@ -86,9 +86,8 @@ class Appraiser:
             If too little of it counts, nobody knows a condition that the model asks for, or the
             filter fails.
         """
-        counted = count(
-            case, self._constant, (*case.inputs, *compared(self._constant, [case])), SOUND
-        )
+        names = (*case.inputs, *compared(self._constant, [case]))
+        counted = count(case, self._constant, names, SOUND, restarting=False)
         end = int(np.flatnonzero(counted.usable)[-1]) + 1
         clean = case.with_signals(counted.clean)
         estimator = self._filter(_parameters(case, self._constant))
@@ -100,11 +99,11 @@ class Appraiser:
                 expected="one that the model follows",
                 remedy="leave it out; `workbench simulate` shows where it fails",
             )
-        names = [one.name for one in self._constant.estimated]
-        own = [names.index(one.name) for one in watched(self._constant)]
-        values = {name: float(run.signal(name)[-1]) for name in names}
+        estimated = [one.name for one in self._constant.estimated]
+        own = [estimated.index(one.name) for one in watched(self._constant)]
+        values = {name: float(run.signal(name)[-1]) for name in estimated}
         return Estimate(
-            values=np.array([values[names[column]] for column in own]),
+            values=np.array([values[estimated[column]] for column in own]),
             covariance=estimator.covariance[np.ix_(own, own)],
             work=self._work(clean, values),
             counted=_seconds(counted, case.time),

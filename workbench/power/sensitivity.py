@@ -14,9 +14,10 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis import Effect
-from workbench.diagnosis.evidence import Evidence, Simulations
+from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.prediction import Variation
+from workbench.diagnosis.simulator import Evidence
 from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
 from workbench.diagnosis.verdict import conclude
 from workbench.errors import InputError, WorkerError

@@ -218,6 +218,8 @@ def _comparison(formula: Schema, level: Schema) -> Schema:
         **dict.fromkeys(("above", "below", "within", "smoothed"), QUANTITY),
         **dict.fromkeys(("from_rest", "to_the_end"), FLAG),
         "only_while": level,
+        "restarted": listed(NAMED),
+        "uncertain": by_name(NUMBER),
     }
     outside = " ".join(name for name in excluded if name not in ("reason", "is"))
     either = [{"required": ["above"]}, {"required": ["below"]}]

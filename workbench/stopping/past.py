@@ -79,7 +79,8 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
     """
     path = system.model(OBSERVER).path
     assert path is not None
-    with Simulations(path, system, system.given, cases, workers, report=report) as simulations:
+    given = (path, system, system.given, cases, workers)
+    with Simulations(*given, report=report, restarting=False) as simulations:
         # Of effects none is tried; the thresholds bound steps alone.
         fit = Fit(simulations, [], thresholds(1, left=system.comparison.left))
         best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)

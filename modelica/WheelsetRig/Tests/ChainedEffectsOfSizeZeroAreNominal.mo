@@ -24,6 +24,14 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
     rest = caliper.rest;
   end Cylinder;
 
+  model Adhesion "Chain of all effects on the friction of the contact"
+    extends Contact.PartialAdhesion;
+    Effects.AdhesionRecovery cleaned(level=level, w=w, v=v, Fx=Fx);
+    Effects.FallingFriction falling(level=cleaned.mu0, w=w, v=v, Fx=Fx);
+  equation
+    mu0 = falling.mu0;
+  end Adhesion;
+
   model WheelRadius "Chain of all effects on the wheel radius"
     extends Quantities.PartialWheelRadius;
     Effects.WheelRadius wear(u=u, omega=omega);
@@ -58,7 +66,7 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
       redeclare Effects.CreepStiffness creepStiffness,
       redeclare Effects.WheelInertia wheelInertia,
       redeclare Effects.RollerInertia rollerInertia, redeclare Effects.DriveTorqueGain driveTorque,
-      redeclare Effects.AdhesionRecovery adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
+      redeclare Adhesion adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
       redeclare Effects.RollerLosses rollerLoss, redeclare SpeedSensor speedSensorW,
       redeclare Sensors.LoggerTimeSkew speedSensorR, redeclare ForceSensor forceSensor);
   end AllEffects;

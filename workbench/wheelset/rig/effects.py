@@ -40,6 +40,9 @@ class Effects:
     adhesion_recovery: float = _gain(
         "1", "contact friction times 1 + gain*(1 - exp(-E/250 kJ)), E of slip"
     )
+    falling_friction: float = _gain(
+        "1", "contact friction times 1 + gain*(1 - exp(-slip/(5 m/s)))", least=-0.9
+    )
     wheelset_losses: float = _gain("1", "losses of the wheelset times 1 + gain", least=-1.0)
     roller_losses: float = _gain("1", "losses of the roller times 1 + gain", least=-1.0)
     wheel_inertia: float = _gain("1", "inertia of the wheelset times 1 + gain", least=-0.9)

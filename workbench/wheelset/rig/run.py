@@ -20,7 +20,7 @@ from workbench.wheelset.rig.drive import Drive, Losses
 from workbench.wheelset.rig.effects import Effects
 from workbench.wheelset.rig.pads import FRICTION, Pads
 from workbench.wheelset.rig.scenarios import Scenario
-from workbench.wheelset.rig.wheel import CleanedContact, OutOfRoundWheel
+from workbench.wheelset.rig.wheel import CleanedContact, OutOfRoundWheel, falls
 
 RATE = 1000  # [Hz] of the co-simulation
 
@@ -219,7 +219,7 @@ def _brake_to_standstill(
     rW, rR = parameters["rW"], parameters["rR"]
     kappa, p0 = nominal["actuation.kappa"], parameters["actuation.p0"]
     velocity = scenario.conditions.initial_speed * scenario.conditions.direction
-    omegaW, omegaR, phiW, Fx = velocity / rW, velocity / rR, 0.0, 0.0
+    omegaW, omegaR, phiW, Fx, slip = velocity / rW, velocity / rR, 0.0, 0.0, 0.0
     states = [fmu.states.index(name) for name in ("omegaW", "omegaR", "wheelset.phi")]
     fmu.start({"omegaW": omegaW, "omegaR": omegaR}, parameters)
 
@@ -249,7 +249,8 @@ def _brake_to_standstill(
         turn = phiW + 0.5 * dt * omegaW  # in the middle of the time for which inputs are held
         mu = pads.friction(speed, force, turn)
         tauR = drive.step(omegaR, stopped=standstill is not None)
-        muWR = scenario.friction(braking) * drawn.muWR * contact.friction
+        falling = falls(effects.falling_friction, slip)
+        muWR = scenario.friction(braking) * drawn.muWR * contact.friction * falling
         # A torque on the wheelset enters the model as a change of its loss.
         push = math.copysign(1.0, omegaW) * wheel.torque(omegaW, turn, Fx)
         drag = parameters["wheelsetLoss.c0"] - push

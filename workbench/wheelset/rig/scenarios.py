@@ -144,8 +144,19 @@ _STAIRCASES = (
     _stop("17_staircase_120_rev", 120, 3.6, "dry", (), -1, steps=_stairs(1.8, 3.0, 1.2, 2.4)),
 )
 
+# Full brake on a wet rail that just does not carry it: the wheel slides, is caught, slides again.
+_SLIPPERY = 0.24
+_SLIDING = (
+    _stop("18_slide_160_4.8", 160, 4.8, "wet", (), +1, muWR=_SLIPPERY),
+    _stop("19_slide_160_4.4_rev", 160, 4.4, "wet", (), -1, muWR=_SLIPPERY),
+    _stop("20_slide_120_4.6_rev", 120, 4.6, "wet", (), -1, muWR=_SLIPPERY),
+    _stop("21_slide_120_4.9", 120, 4.9, "wet", (), +1, muWR=_SLIPPERY),
+    _stop("22_slide_100_5", 100, 5.0, "wet", (), +1, muWR=_SLIPPERY),
+    _stop("23_slide_140_4.6_rev", 140, 4.6, "wet", (), -1, muWR=_SLIPPERY),
+)
+
 STANDARD = tuple(scenario.name for scenario in _STANDARD)
-SCENARIOS = {scenario.name: scenario for scenario in _STANDARD + _DARING + _STAIRCASES}
+SCENARIOS = {scenario.name: scenario for scenario in _STANDARD + _DARING + _STAIRCASES + _SLIDING}
 
 
 def select(names: Sequence[str]) -> list[Scenario]:

@@ -1,7 +1,8 @@
-"""What turns with the wheelset and is not round, and what its slip cleans."""
+"""What turns with the wheelset and is not round, and what slip makes of friction."""
 
 import math
 
+_FALLING_SLIP = 5.0  # [m/s] that makes 1 - 1/e of a change of friction with slip
 _CLEANING_ENERGY = 250e3  # [J] of slip at one wheel leaves 1/e of what soils its contact
 
 
@@ -38,6 +39,11 @@ class OutOfRoundWheel:
         angle = phi + self._phase
         inertial = self._inertia * omega * omega / self._radius
         return self._amplitude * (Fx * math.cos(angle) - inertial * math.sin(angle))
+
+
+def falls(gain: float, slip: float) -> float:
+    """Contact friction at a slip velocity [m/s], over that which falls as Polach's."""
+    return 1.0 - gain * math.expm1(-abs(slip) / _FALLING_SLIP)
 
 
 class CleanedContact:

@@ -1,0 +1,246 @@
+"""A model along recordings, in one process: whitened prediction errors and their derivatives."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.diagnosis.prediction import Predictor, Variation
+from workbench.diagnosis.samples import Samples
+from workbench.diagnosis.thresholds import Thresholds
+from workbench.fmu import FMU, Matrix, Vector
+from workbench.system import System
+
+_DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
+_FINEST = 32  # steps of a sample time
+
+
+def delay(signal: str) -> str:
+    """Name of the delay of a sensor behind a structure [s], which is no variable of the FMU."""
+    return f"{signal}Delay"
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """One recording, linearised about a point.
+
+    Attributes
+    ----------
+    errors : (b, c) whitened prediction errors of the blocks, by channel.
+    rest : whitened error of the input at rest.
+    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units.
+    jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
+    """
+
+    errors: Matrix
+    rest: float
+    sizes: Matrix
+    jacobian: Matrix
+
+    @property
+    def residual(self) -> Vector:
+        """(b*c + 1,) errors and rest in one vector."""
+        return np.append(self.errors.ravel(), self.rest)
+
+
+class Simulated(NamedTuple):
+    """What a simulator is made from: an FMU and the recordings."""
+
+    path: Path
+    system: System
+    recordings: tuple[Samples, ...]
+    parts: int = 1  # steps of a sample time
+
+
+class Simulator:
+    """An FMU along recordings, in one process."""
+
+    def __init__(self, given: Simulated) -> None:
+        self._fmu = FMU(given.path)
+        self._recordings = given.recordings
+        signals = given.recordings[0].signals
+        self._predictor = Predictor(self._fmu, given.system, signals, given.parts)
+        self._delays = {
+            j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
+        }
+        rest = given.system.comparison.rest
+        self._rest = self._fmu.variables([rest.output]) if rest else None
+
+    @property
+    def parameters(self) -> set[str]:
+        """Names of the FMU's variables that have a default."""
+        return set(self._fmu.defaults)
+
+    def errors(self, number: int, values: Mapping[str, float]) -> Matrix:
+        """Prediction errors of the samples of one recording that count, (m, c)."""
+        one = self._recordings[number]
+        found: Matrix = self._simulated(number, values)[0][one.told]
+        return found
+
+    def begin(self, number: int) -> dict[str, float]:
+        """Start values of states that a recording's outputs show."""
+        return self._predictor.begin(self._recordings[number])
+
+    def close(self) -> None:
+        """Free the FMU."""
+        self._fmu.close()
+
+    def at(self, number: int, values: Mapping[str, float]) -> Evidence:
+        """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
+
+        Parameters
+        ----------
+        values : of the FMU's variables and of delays, SI.
+        """
+        simulated, rest = self._simulated(number, values)
+        read_ = self._read(number, simulated, values)
+        errors = self._whitened(number, read_)
+        columns = []
+        for name, spread in self._delays.values():
+            step = _DELAY_STEP * spread
+            delayed = {**values, name: values[name] + step}
+            late = self._whitened(number, self._read(number, simulated, delayed))
+            columns.append(np.append((late - errors).ravel() / step, 0.0))
+        jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
+        return Evidence(errors, rest, self._recordings[number].sizes(read_), jacobian)
+
+    def derivatives(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        columns: Sequence[Variation],
+    ) -> Matrix:
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p)."""
+        one, fmu = self._recordings[number], self._fmu
+        jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
+        for part in _compatible(columns):
+            varied = [columns[j] for j in part]
+            _, found = self._predictor.derivatives(one, self._known(values), varied)
+            by = self._whitened(number, self._late(number, found.errors, values))
+            jacobian[:-1, part] = by.reshape(-1, len(part))
+            if self._rest is not None:
+                place = self._rest.references
+                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ found.states)[0]
+                for q, column in enumerate(varied):
+                    acting = [name for name in column.variables if name not in fmu.states]
+                    slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
+                jacobian[-1, part] = -slopes / one.rest_noise
+        return jacobian
+
+    def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
+        """A recording whose errors are weighed by how sharply they depend on each restart.
+
+        Where a motion runs away, the noise of what a restart reads grows until the next one, and a
+        law that is simplified shows by more. Both are linear within a block.
+
+        Parameters
+        ----------
+        values : of the FMU's variables, SI, at which this is judged.
+        """
+        one = self._recordings[number]
+        if one.restarts is None:
+            return one
+        values = {**dict.fromkeys((name for name, _ in self._delays.values()), 0.0), **values}
+        nominal, moved = self._means(number, one.y, values), []
+        for name, noise in one.restarts.noise.items():
+            y, read = one.y.copy(), np.flatnonzero(one.restarts.at) - 1
+            y[read, one.signals.index(name)] += noise[read]
+            moved.append(self._means(number, y, values) - nominal)
+        for name, share in one.restarts.uncertain.items():
+            value = (1.0 + share) * values.get(name, self._fmu.defaults[name])
+            moved.append(self._means(number, one.y, {**values, name: value}) - nominal)
+        return one.loosened(moved)
+
+    def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""
+        one = self._recordings[number]
+        errors = self._predictor.errors(replace(one, y=y), self._known(values)) - (y - one.y)
+        return one.channels(self._read(number, errors, values))
+
+    def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
+        """Prediction errors of all samples, and the whitened error of the input at rest."""
+        one = self._recordings[number]
+        errors = self._predictor.errors(one, self._known(values))
+        if self._rest is None:
+            return errors, 0.0
+        return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
+
+    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the FMU's variables."""
+        delays = {name for name, _ in self._delays.values()}
+        return {name: value for name, value in values.items() if name not in delays}
+
+    def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
+        measured = self._recordings[number].y
+        return measured - self._late(number, measured - errors, values)
+
+    def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
+        """What sensors read of signals (n, c, ...), behind structures and late."""
+        one = self._recordings[number]
+        if self._delays:
+            signals = signals.copy()
+        for j, (name, _) in self._delays.items():
+            behind = one.behind_structure(j, signals[:, j])
+            signals[:, j] = behind - values[name] * np.gradient(behind, one.time, axis=0)
+        return signals
+
+    def _whitened(self, number: int, errors: Matrix) -> Matrix:
+        """Whitened errors of the blocks, (b, c, ...)."""
+        one = self._recordings[number]
+        whitened: Matrix = np.einsum("bij,bj...->bi...", one.whitening, one.channels(errors))
+        return whitened
+
+
+def _compatible(columns: Sequence[Variation]) -> list[list[int]]:
+    """Numbers of columns that may be varied in one run: none sets what another sets otherwise."""
+    parts: list[tuple[list[int], dict[str, float]]] = []
+    for j, column in enumerate(columns):
+        wanted = column.setting.items()
+        able = (
+            one for one in parts if all(one[1].get(name, value) == value for name, value in wanted)
+        )
+        if (part := next(able, None)) is None:
+            parts.append(part := ([], {}))
+        part[0].append(j)
+        part[1].update(wanted)
+    return [part for part, _ in parts]
+
+
+@contextmanager
+def simulating(given: Simulated) -> Iterator[Simulator]:
+    """Open a simulator."""
+    simulator = Simulator(given)
+    try:
+        yield simulator
+    finally:
+        simulator.close()
+
+
+def settled_parts(given: Simulated, values: Mapping[str, float]) -> int:
+    """Steps of a sample time from which on finer ones hardly move prediction errors.
+
+    A step that is long for what oscillates damps it and turns its phase, and a wrong law would be
+    named for that. Of the squares of errors, half a step may move what forms of laws differ by.
+
+    Parameters
+    ----------
+    values : of the FMU's variables, SI.
+    """
+
+    def errors(parts: int) -> list[Matrix]:
+        with simulating(given._replace(parts=parts)) as simulator:
+            return [simulator.errors(k, values) for k in range(len(given.recordings))]
+
+    parts, coarse = 1, errors(1)
+    while parts < _FINEST:
+        fine = errors(2 * parts)
+        moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
+        wrong = [np.square(a).sum(axis=0) for a in fine]
+        if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
+            break
+        parts, coarse = 2 * parts, fine
+    return parts
