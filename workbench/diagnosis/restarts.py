@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.diagnosis.cleaning import Mask
+from workbench.diagnosis.cleaning import Mask, runs
 from workbench.diagnosis.counting import Counted
 from workbench.diagnosis.whitening import parts_of_noise
 from workbench.recording import Vector
@@ -36,11 +36,13 @@ class Restarts:
 def restarts_of(system: System, counted: Counted) -> Restarts | None:
     """Restarts before each block that would not count otherwise, or None if all would.
 
-    Where such a span has no blocks, states follow what is measured.
+    Where such a span goes on without blocks, states follow what is measured.
     """
     if not counted.spans.any():
         return None
     at = counted.spans.copy()
+    for first, end in runs(~counted.usable):
+        at[first:end] |= counted.spans[first:end].any()
     for first, end in counted.blocks:
         at[first], at[first + 1 : end] = counted.spans[first:end].any(), False
     declared = [one for one in system.comparison.exclusions if one.restarted]
