@@ -177,6 +177,7 @@ def test_nothing_is_found_in_slides_where_nothing_is_missing(
     assert not any(one["slide"] for one in aside)
 
 
+@pytest.mark.long
 def test_a_patch_that_no_law_explains_is_left_out(everything: Path, tmp_path: Path) -> None:
     """Low adhesion from the sixth to the eighth second, on a rail that is said to be dry."""
     patched = replace(SCENARIOS["04_dry_160_4.2"], patch=Patch(6.0, 8.0, 0.12))

@@ -110,6 +110,11 @@ class Fit:
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
 
+    @property
+    def restarted(self) -> bool:
+        """Whether samples count where states are restarted, and a law is simplified."""
+        return any(one.restarted.any() for one in self._simulations.recordings)
+
     def astray(self, lin: Linearised) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""
         found = []

@@ -199,6 +199,8 @@ def pruned(
 ) -> tuple[Fitted, Trial, dict[Effect, Fitted]]:
     """Drop effects that, beside the others, do not matter or are not significant.
 
+    What forms of laws fake must be exceeded beside others, and where states are restarted.
+
     Parameters
     ----------
     known : fits by their effects, with all derivatives.
@@ -216,7 +218,7 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
             ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
-        if len(less) > 1:
+        if len(less) > 1 or fit.restarted:
             for effect, one in less.items():
                 ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
         weakest = min(ratios, key=lambda effect: ratios[effect])

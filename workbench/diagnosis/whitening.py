@@ -36,10 +36,12 @@ def whitening(
         channel = sum(slope * clean[name] for name, slope in zip(signals, row, strict=True))
         growing = [name for name in own if system.signals[name].relative_noise > 0.0]
         shared = np.delete(np.abs(slopes), c, axis=0).sum(axis=0) > 0.0
-        if len(own) == 1 and system.signals[own[0]].mode is not None:
+        mode = system.signals[own[0]].mode if len(own) == 1 else None
+        if mode is not None:
             means = np.array([clean[own[0]][first:end].mean() for first, end in blocks])
             covariance[:, c, c] = size * deviation_of(means) ** 2
-            ringing = np.maximum(covariance[:, c, c], size * _ringing(means))
+            late = 1.0 / (2.0 * np.pi * mode.frequency * system.comparison.block)
+            ringing = np.maximum(covariance[:, c, c], size * _ringing(means, late))
             covariance[spans, c, c] = ringing[spans]
         elif growing:
             least = 1.01 * float(row[shared] ** 2 @ fixed[shared])
@@ -52,14 +54,20 @@ def whitening(
     return np.linalg.inv(np.linalg.cholesky(covariance / size + slopes * steps @ slopes.T))
 
 
-def _ringing(means: Vector) -> Vector:
-    """Variance of block means by those beside them, (b,): what a structure adds as loads jump.
+def _ringing(means: Vector, late: float) -> Vector:
+    """Variance of block means by those beside them, (b,): what a structure adds as loads move.
 
-    As of `deviation_of`, by second differences, but of the few that are near.
+    Of loads that jump, as of `deviation_of`, by second differences, but of the few that are near.
+    Of loads that rise or fall, by how late the structure passes them on, which is known to its
+    time constant at best.
+
+    Parameters
+    ----------
+    late : that time constant, in blocks.
     """
     squares = np.zeros(means.size)
     squares[1:-1] = np.diff(means, 2) ** 2 / 6.0
-    found: Vector = uniform_filter1d(squares, _NEAR)
+    found: Vector = uniform_filter1d(squares, _NEAR) + (late * np.gradient(means)) ** 2
     return found
 
 
