@@ -158,7 +158,7 @@ def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     found = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
     assert found.verdict == "nothing"
     # Of adhesion that recovers they could show more.
-    assert set(found.not_visible) == {"CaliperHysteresis", "WheelInertia"}
+    assert set(found.not_visible) == {"CaliperHysteresis", "FallingFriction", "WheelInertia"}
 
 
 def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
@@ -169,7 +169,7 @@ def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
     assert [cause.effect.name for cause in found.causes] == ["CaliperHysteresis"]
     share = found.causes[0].parameters["share"]
     assert share.low <= 0.05 <= share.high
-    assert set(found.not_visible) == {"WheelInertia"}
+    assert set(found.not_visible) == {"FallingFriction", "WheelInertia"}
 
 
 def test_nothing_is_found_where_nothing_is_missing(

@@ -82,6 +82,7 @@ class Effect:
     text : what it is, for people.
     separation : the experiment that tells it from its likely twins.
     where, unless, falling : which stops can show it; None if all can.
+    restarted : why stops in which no state is restarted cannot show it; empty if they can.
     place, places : which of how many elements of `size`, from 1; 0 where it is no array.
     """
 
@@ -97,6 +98,7 @@ class Effect:
     where: Where | None = None
     unless: Unless | None = None
     falling: Falling | None = None
+    restarted: str = ""
     place: int = 0
     places: int = 0
 
@@ -211,7 +213,7 @@ def _placed(library: Library, effect: Effect) -> list[Effect]:
 def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Effect:
     said.only(
         *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
-        *("where", "unless", "falling"),
+        *("where", "unless", "falling", "restarted"),
     )
     size = said.content.get("size")
     if isinstance(size, tuple) and sorted(size) == sorted(_TURNING):
@@ -232,6 +234,7 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Ef
         where=_where(said),
         unless=_unless(said),
         falling=_falling(said),
+        restarted=_restarted(said),
     )
     _check_parameters(library, one, effect)
     _check_extends(library, one)
@@ -288,6 +291,14 @@ def _falling(said: Said) -> Falling | None:
     part = said.part("falling")
     part.only("signal", "because")
     return Falling(part.text("signal"), part.text("because"))
+
+
+def _restarted(said: Said) -> str:
+    if "restarted" not in said.content:
+        return ""
+    part = said.part("restarted")
+    part.only("because")
+    return part.text("because")
 
 
 def _check_extends(library: Library, one: Class) -> None:

@@ -52,4 +52,6 @@ class Presence:
             return unless.because
         if falling is not None and not any(one.falls(falling.signal) for one in self._recordings):
             return falling.because
+        if effect.restarted and not any(one.restarted.any() for one in self._recordings):
+            return effect.restarted
         return effect.hidden

@@ -8,6 +8,7 @@ equation
   annotation (
     __Workbench(effect(
       size="gain", matters=0.1,
+      restarted(because="no wheel slides in these stops"),
       separation="a slip sweep by the drive at constant speed, up and down")),
     Documentation(info="<html>
 <p><code>mu0 = level*(1 + gain*(1 - exp(-|w|/w0)))</code>, on top of Polach's <code>A + (1 - A)*exp(-B*|w|)</code>:

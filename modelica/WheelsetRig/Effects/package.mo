@@ -16,7 +16,8 @@ tells the effect from its twins;</li>
 <li><code>where(condition, is, share)</code>: it is only in stops whose condition is so, if any is;
 the parameter <code>share</code> becomes the share of entries that are; <code>unless(condition, is,
 because)</code>: it is not looked for if any stop is so; <code>falling(signal, because)</code>: it
-shows only where an input falls;</li>
+shows only where an input falls; <code>restarted(because)</code>: it shows only where states are
+restarted;</li>
 <li><code>slots={...}</code>: which slots it fills, where the class it extends constrains
 several;</li>
 <li><code>after</code>: a more usual effect behind which it stands. Else the order of
