@@ -36,15 +36,16 @@ class Restarts:
 def restarts_of(system: System, counted: Counted) -> Restarts | None:
     """Restarts before each block that would not count otherwise, or None if all would.
 
-    Where such a span goes on without blocks, states follow what is measured.
+    Where such a span goes on without blocks, there are as many.
     """
     if not counted.spans.any():
         return None
-    at = counted.spans.copy()
+    at = np.zeros(counted.spans.size, np.bool_)
+    size = int(counted.blocks[0, 1] - counted.blocks[0, 0])
     for first, end in runs(~counted.usable):
-        at[first:end] |= counted.spans[first:end].any()
+        at[first:end:size] = counted.spans[first:end].any()
     for first, end in counted.blocks:
-        at[first], at[first + 1 : end] = counted.spans[first:end].any(), False
+        at[first] = counted.spans[first:end].any()
     declared = [one for one in system.comparison.exclusions if one.restarted]
     noise = {}
     for name in (name for one in declared for name in one.restarted):
