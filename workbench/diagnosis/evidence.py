@@ -115,15 +115,17 @@ class Simulations:
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
         return Pool(self._workers, simulating, self.simulated)
 
-    def leave_out_restarted(self, numbers: Collection[int]) -> None:
-        """Let those samples of some recordings not count that count where states are restarted.
+    def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
+        """Let samples of some recordings count, or not, where states can be restarted.
 
         Raises
         ------
         InputError
             If a recording has too little else.
         """
-        for k, one in [(k, self._ready(self.cases[k], restarting=False)) for k in numbers]:
+        if not numbers:
+            return
+        for k, one in [(k, self._ready(self.cases[k], restarting=counting)) for k in numbers]:
             self.recordings[k] = one
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
         self._pool.close()

@@ -111,9 +111,10 @@ class Fit:
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
 
     @property
-    def restarted(self) -> bool:
-        """Whether samples count where states are restarted, and a law is simplified."""
-        return any(one.restarted.any() for one in self._simulations.recordings)
+    def restarted(self) -> list[int]:
+        """Recordings of which samples count where states are restarted, and a law is simplified."""
+        found = self._simulations.recordings
+        return [k for k, one in enumerate(found) if one.restarted.any()]
 
     def astray(self, lin: Linearised) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""
@@ -133,9 +134,9 @@ class Fit:
                 found.append(k)
         return found
 
-    def leave_out_restarted(self, numbers: Collection[int]) -> None:
-        """See `Simulations.leave_out_restarted`; what was fitted before has to be fitted anew."""
-        self._simulations.leave_out_restarted(numbers)
+    def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
+        """See `Simulations.count_restarted`; what was fitted before has to be fitted anew."""
+        self._simulations.count_restarted(numbers, counting=counting)
 
     def tried(self, point: Point) -> Linearised | None:
         """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""

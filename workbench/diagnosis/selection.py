@@ -5,7 +5,7 @@ elimination, replacement).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.crossvalidation import CrossValidation
 from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Point
 from workbench.diagnosis.search import (
     Fitted,
     Reporter,
@@ -56,29 +57,63 @@ class Selection:
     validation: CrossValidation
 
 
-def select(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Selection:
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """What a search has come to, before anything is dropped or exchanged.
+
+    Attributes
+    ----------
+    best, steps, trial, interrupted : as of `Selection`.
+    begun : where it went on, when other samples counted.
+    """
+
+    best: Fitted
+    steps: list[Step]
+    trial: Trial
+    interrupted: bool
+    begun: Selection | None
+
+
+def search(
+    fit: Fit, catalogue: Sequence[Effect], report: Reporter, begun: Selection | None = None
+) -> Sought:
+    """Find what is missing, or what is missing beside what was when other samples counted."""
+    if begun is None:
+        report("nominal model, levels calibrated")
+        best, steps = _anew(fit, fit.unknowns.start(), ()), list[Step]()
+    else:
+        best, steps = _anew(fit, begun.best.point, begun.best.active), list(begun.steps)
+    best, trial, interrupted = seek(fit, catalogue, best, steps, (), report)
+    return Sought(best, steps, trial, interrupted, begun)
+
+
+def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Reporter) -> Selection:
     """Find what a set of recordings needs.
 
     An effect that was dropped beside others is not taken up again; one that explains clearly more
     in place of another replaces it. So each round has less to choose from, or fits better.
     """
-    report("nominal model, levels calibrated")
-    best = fitted(fit, fit.at(fit.unknowns.start()), ())
-    validation, dropped = CrossValidation(fit), set[Effect]()
-    steps: list[Step] = []
-    while True:
-        best, trial, interrupted = seek(fit, catalogue, best, steps, dropped, report)
+    best, trial, interrupted = sought.best, sought.trial, sought.interrupted
+    steps, begun = sought.steps, sought.begun
+    if begun is None:
         base = steps[0].before if steps else best
-        known = {frozenset(one.active): one for one in (base, *(step.before for step in steps))}
-        sought = set(best.active)
+    else:
+        base = _anew(fit, begun.base.point, ())
+    earlier = 0 if begun is None else len(begun.steps)
+    validation, dropped = CrossValidation(fit), set[Effect]()
+    while True:
+        met = (base, *(step.before for step in steps[earlier:]))
+        known = {frozenset(one.active): one for one in met}
+        before = set(best.active)
         best, trial, less = pruned(fit, catalogue, best, known, trial, report)
         while (idle := _idle(fit, validation, best, less)) is not None:
             report(f"dropping {idle.name}")
             # Beside fewer others, one that mattered may do so no longer.
             best, trial = examine(fit, less[idle], catalogue, report)
             best, trial, less = pruned(fit, catalogue, best, known, trial, report)
-        if (gone := sought - set(best.active)) and not interrupted:
+        if (gone := before - set(best.active)) and not interrupted:
             dropped |= gone
+            best, trial, interrupted = seek(fit, catalogue, best, steps, dropped, report)
             continue
         names, cosines = _confusability(trial, catalogue)
         alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
@@ -87,7 +122,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Selection
         if interrupted or beyond(best, better) < fit.decides.needed:
             break
         report(f"{better.active[-1].name} explains more than what it replaces")
-        best = better
+        best, trial, interrupted = seek(fit, catalogue, better, steps, dropped, report)
     twins = {
         one: {name: other for name, other in fits.items() if _close(fit, less[one], other, best)}
         for one, fits in alike.items()
@@ -95,6 +130,13 @@ def select(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Selection
     return Selection(
         *(base, best, less, tuple(steps), trial, twins, names, cosines, interrupted, validation)
     )
+
+
+def _anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
+    """A fit that begins at a point, with all derivatives."""
+    # A point of its own, by which it is told from a fit to other samples.
+    one = fitted(fit, fit.at(replace(point)), active)
+    return replace(one, linearised=fit.linearise(one.linearised, active))
 
 
 def _idle(
@@ -140,7 +182,7 @@ def _alike(
         close = {name for name, one in rivals.items() if _close(fit, step.before, one, winner)}
         named = winner.active[-1] is effect
         alike |= close if named else set(rivals)
-        if named and set(winner.active) == set(best.active):
+        if named and winner.point is best.point:
             found |= {name: rivals[name] for name in close}
             alike -= set(rivals)
     active = {one.name for one in best.active}

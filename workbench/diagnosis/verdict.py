@@ -11,7 +11,7 @@ from scipy.stats import bootstrap
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.search import BEGUN, Fitted, Reporter, Step, extended, misfits
-from workbench.diagnosis.selection import Selection, select
+from workbench.diagnosis.selection import Selection, search, select
 from workbench.diagnosis.trial import Prospect
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
@@ -150,19 +150,27 @@ def _selected(
 ) -> tuple[Selection, Sequence[int]]:
     """What recordings need, and those of which parts that cannot be left out follow no law.
 
-    Where states are restarted, samples count if the law that holds there can be judged: if errors
-    last whatever is found, they are left out.
+    Where states are restarted, errors depend sharply on everything: what shows elsewhere is found
+    first. Then they count too, but where errors last whatever is found: another law holds there.
     """
-    while True:
-        chosen = select(fit, catalogue, report)
-        astray = [] if chosen.interrupted else fit.astray(chosen.best.linearised)
+    restarted = fit.restarted
+    try:
+        fit.count_restarted(restarted, counting=False)
+    except InputError:  # nearly all of a recording is such
+        chosen = select(fit, catalogue, search(fit, catalogue, report), report)
+        return chosen, fit.astray(chosen.best.linearised)
+    chosen = select(fit, catalogue, search(fit, catalogue, report), report)
+    while restarted and not chosen.interrupted:
+        report(f"what is restarted too, in {len(restarted)} recordings")
+        fit.count_restarted(restarted, counting=True)
+        more = search(fit, catalogue, report, chosen)
+        astray = [] if more.interrupted else fit.astray(more.best.linearised)
         if not astray:
-            return chosen, ()
-        report(f"once more without what follows no law in {len(astray)} recordings")
-        try:
-            fit.leave_out_restarted(astray)
-        except InputError:
-            return chosen, astray  # nearly all of them is such
+            return select(fit, catalogue, more, report), ()
+        report(f"without what follows no law, in {len(astray)} recordings")
+        fit.count_restarted(astray, counting=False)
+        restarted = [k for k in restarted if k not in astray]
+    return chosen, ()
 
 
 def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -> Sequence[Effect]:
@@ -171,8 +179,9 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     if len(causes) < 2:
         return causes
     first = chosen.steps[0]
-    alone = {one.active[-1]: one for one in first.rivals}
-    best = {one.effect: one for one in reversed(first.scores)}  # of its shapes
+    alone = {one.active[-1]: one for one in first.rivals if first.before is chosen.base}
+    scores = [one for step in chosen.steps for one in step.scores]
+    best = {one.effect: one for one in reversed(scores)}  # of its shapes
     begun = [best[effect] for effect in causes if effect in best and effect not in alone]
     fits = fit.together(partial(extended, fit, chosen.base, rounds=BEGUN), begun)
     alone |= {one.active[-1]: one for one in fits if one is not None}
