@@ -7,6 +7,7 @@ from scipy.special import chdtri, ndtri
 
 from workbench.fmu import FMU, Vector
 from workbench.kernel import compiled, inlined, linearise, read
+from workbench.observers.adaptive import Learning, learn, note, reset, trust
 from workbench.observers.gains import Gains
 from workbench.observers.kalman import (
     ExtendedKalmanFilter,
@@ -15,6 +16,7 @@ from workbench.observers.kalman import (
     finish,
     predict,
     put,
+    room,
     transition,
     variance,
 )
@@ -46,6 +48,7 @@ class HorizonSettings(NamedTuple):
 
     Attributes
     ----------
+    learning : see Learning; a window notices what surprises by `largest_nis`.
     iterations : for each sample.
     limit : deviation of a sample from which it is an outlier [standard deviations].
     largest_nis : normalised innovation squared from which a quantity has jumped.
@@ -57,6 +60,7 @@ class HorizonSettings(NamedTuple):
     floor: Vector
     walk: Vector
     spread: Vector
+    learning: Learning
     iterations: int
     limit: float
     largest_nis: float
@@ -74,7 +78,7 @@ class HorizonMemory(NamedTuple):
 @inlined
 def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     """Add a node where the estimate stands, and the sample that its step leads to."""
-    window, held = memory.window, memory.held
+    window, held, levels = memory.window, memory.held, memory.filter.levels
     if window.filled[0] == window.steps.size:
         shift(window)
     k = window.filled[0]
@@ -87,11 +91,13 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     assign(window.inputs[k], u)
     assign(window.samples[k], y)
     for j in range(y.size):
-        window.levels[k, j] = variance(settings, fade, held, j)
+        levels.noise[j] = variance(settings, fade, held, j)
+        window.levels[k, j] = levels.sample[j] * levels.noise[j]
         window.weight[k, j] = 1.0
     for i in range(memory.filter.z.size):
         window.nodes[k, i] = memory.filter.z[i]
-        window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
+        share = levels.walk[i] * room(settings, memory.filter.P, i)
+        window.noise[k, i] = h * share * (fade * settings.walk[i]) ** 2
         window.active[k, i] = 0
         before = window.wider[k - 1, i] if k > 0 else window.older[i]
         window.wider[k, i] = max(1.0, settings.fading * before)
@@ -123,9 +129,30 @@ def _expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
     return status
 
 
+@inlined
+def _learn(settings, memory):  # type: ignore[no-untyped-def]
+    """Let noise levels follow the last sample, as those of a filter without a window."""
+    window, levels = memory.window, memory.filter.levels
+    last = window.filled[0] - 1
+    for j in range(levels.sample.size):
+        levels.scatter[j] = levels.sample[j]  # as thought, of a sample that is missing
+        if window.total[last, j] > 0.0:
+            explained = window.total[last, j] - window.levels[last, j]
+            note(levels, j, window.surprise[last, j], explained, levels.noise[j])
+    assign_rows(levels.before, window.before)
+    assign_rows(memory.filter.P, window.P)
+    assign(memory.filter.change, window.moved)
+    learn(settings, memory.filter, fading(settings.layout, memory.held), window.steps[last])
+
+
 @compiled
-def _solve(settings, memory, row):  # type: ignore[no-untyped-def]
-    """Best change of the nodes, to first order; the estimate is what the last step leads to."""
+def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
+    """Best change of the nodes, to first order; the estimate is what the last step leads to.
+
+    Parameters
+    ----------
+    new : whether it is the first time that the last sample is met.
+    """
     window, seen = memory.window, settings.layout.seen
     last = window.filled[0] - 1
     solve_free(window, seen)
@@ -136,6 +163,9 @@ def _solve(settings, memory, row):  # type: ignore[no-untyped-def]
     row[row.size - 1] = nis
     if nis > settings.largest_nis:
         window.alert[0] = 1
+        trust(memory.filter.levels)
+    elif new and settings.learning.within < np.inf and window.alert[0] == 0:
+        _learn(settings, memory)
     for _ in range(_ROUNDS):
         if not reweigh(window, settings.limit, settings.fading):
             break
@@ -179,6 +209,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     window = memory.window
     if h == 0.0:
         status = begin(model, settings, memory.filter, u, y)
+        reset(memory.filter.levels)
         window.filled[0] = 0
         window.alert[0] = 0
         for i in range(memory.filter.z.size):
@@ -189,8 +220,8 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         return status or finish(model, settings, memory.filter, row)
     _append(settings, memory, h, u, y)
     status = _expand(model, settings, memory, window.filled[0] - 1)
-    for _ in range(settings.iterations):
-        _solve(settings, memory, row)
+    for iteration in range(settings.iterations):
+        _solve(settings, memory, iteration == 0, row)
         status = status or _relinearise(model, settings, memory)
     return status or finish(model, settings, memory.filter, row)
 
@@ -241,7 +272,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         )
         of = self._settings
         self._settings = HorizonSettings(
-            *(of.layout, of.relative, of.floor, of.walk, of.spread),
+            *(of.layout, of.relative, of.floor, of.walk, of.spread, of.learning),
             iterations=round(iterations),
             limit=float(ndtri(1.0 - 0.5 * rare)),
             largest_nis=float(chdtri(outputs, rare)),

@@ -50,6 +50,7 @@ class Window(NamedTuple):
     gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see `_absorb`.
     change : (N, s) best node less node.
     next_mean, next_covariance : as mean and covariance, of the second node.
+    before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
     costates : (N, s) of the nodes: what noise does to the cost.
     costate, error, work : (s,); P : (s, s).
     """
@@ -85,6 +86,8 @@ class Window(NamedTuple):
     change: Matrix
     next_mean: Vector
     next_covariance: Matrix
+    before: Matrix
+    moved: Vector
     costates: Matrix
     costate: Vector
     error: Vector
@@ -128,6 +131,8 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
         change=np.zeros((N, s)),
         next_mean=np.zeros(s),
         next_covariance=np.zeros((s, s)),
+        before=np.zeros((s, s)),
+        moved=np.zeros(s),
         costates=np.zeros((N, s)),
         costate=np.zeros(s),
         error=np.zeros(s),
@@ -227,6 +232,9 @@ def _filter(window, seen, bounded):  # type: ignore[no-untyped-def]
                 error[i] += F[i, j] * d[j]
         for i in range(n, s):
             error[i] = d[i]
+        if k == window.filled[0] - 1:
+            assign_rows(window.before, P)
+            assign(window.moved, error)
         for j in range(outputs):
             window.total[k, j] = 0.0
             if not np.isnan(window.errors[k, j]):
@@ -235,6 +243,9 @@ def _filter(window, seen, bounded):  # type: ignore[no-untyped-def]
                     *(P, error, window.gain[k, j], window.slopes[k, j]),
                     *(seen[j], window.errors[k, j], variance),
                 )
+        if k == window.filled[0] - 1:
+            for i in range(s):
+                window.moved[i] = error[i] - window.moved[i]
         if k == 0:
             assign_rows(window.next_covariance, P)
             for i in range(s):
