@@ -96,11 +96,11 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
         window.weight[k, j] = 1.0
     for i in range(memory.filter.z.size):
         window.nodes[k, i] = memory.filter.z[i]
-        share = levels.walk[i] * room(settings, memory.filter.P, i)
-        window.noise[k, i] = h * share * (fade * settings.walk[i]) ** 2
+        window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
         window.active[k, i] = 0
         before = window.wider[k - 1, i] if k > 0 else window.older[i]
-        window.wider[k, i] = max(1.0, settings.fading * before)
+        share = levels.walk[i] * room(settings, memory.filter.P, i)
+        window.wider[k, i] = max(share, settings.fading * before)
 
 
 @inlined
@@ -161,10 +161,11 @@ def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
         if window.total[last, j] > 0.0:
             nis += window.surprise[last, j] ** 2 / window.total[last, j]
     row[row.size - 1] = nis
-    if nis > settings.largest_nis:
+    learns, age = settings.learning.within < np.inf, memory.filter.levels.age[0]
+    if nis > settings.largest_nis and not (learns and age < settings.learning.within):
         window.alert[0] = 1
         trust(memory.filter.levels)
-    elif new and settings.learning.within < np.inf and window.alert[0] == 0:
+    if new and learns and window.alert[0] == 0:
         _learn(settings, memory)
     for _ in range(_ROUNDS):
         if not reweigh(window, settings.limit, settings.fading):

@@ -42,8 +42,8 @@ class Window(NamedTuple):
     arrived : (N, s) where a step from the node leads; F : (N, n, s) its derivatives.
     slopes : (N, l, s) derivatives of outputs there; errors : (N, l) samples less outputs.
     weight : (N, l) share of a sample's information that counts; wider : (N, s) variance of the
-        model's noise over what is declared; older : (s,) of the node before; alert : (1,) whether
-        it may be wider.
+        model's noise over what is declared, less where levels are learnt; older : (s,) of the node
+        before; alert : (1,) whether it may be wider.
     active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
     scale : (N, s) variances without bounds.
     offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
