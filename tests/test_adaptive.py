@@ -109,18 +109,21 @@ def test_a_single_wrong_sample_is_left_out(fmu: FMU, kind: type[ExtendedKalmanFi
     assert (moved < 0.5 * np.maximum(clean.sigma, 1e-9)[1999:]).all()
 
 
-@pytest.mark.parametrize(("kind", "within"), [*zip(KINDS, (0.3, 0.3, 0.8), strict=True)])
+@pytest.mark.parametrize(
+    ("kind", "within", "limit"),
+    [(KINDS[0], 0.3, 0.02), (KINDS[1], 0.3, 0.02), (KINDS[2], 0.7, 0.03)],
+)
 def test_a_jump_of_a_friction_is_followed_at_once(
-    fmu: FMU, kind: type[ExtendedKalmanFilter], within: float
+    fmu: FMU, kind: type[ExtendedKalmanFilter], within: float, limit: float
 ) -> None:
     """Pads lose half their friction between two samples; held levels take a second to follow.
 
-    The window first takes some of its samples for outliers.
+    The window first takes some of its samples for outliers, and is ready for more jumps after one.
     """
     jumping = np.concatenate([np.full(3000, 0.40), np.full(400, 0.20)])
     found = estimate(fmu, kind, WHEELSET, *stop(fmu, jumping, 0.3))
     error = np.abs(found.values[:, MUDC] - jumping)
-    assert error[3000 + round(within / STEP) :].max() < 0.02
+    assert error[3000 + round(within / STEP) :].max() < limit
 
 
 @pytest.fixture(scope="module")
