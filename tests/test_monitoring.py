@@ -4,7 +4,7 @@ import json
 import shutil
 import sqlite3
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
 from types import SimpleNamespace
@@ -24,9 +24,12 @@ from workbench.monitoring import STATE, Monitored
 from workbench.monitoring.cause import known_from_before, recordings_after
 from workbench.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
 from workbench.monitoring.watch import Track, watch
+from workbench.provenance import run_of
+from workbench.report.monitoring import write_monitored
 from workbench.system import System
 from workbench.systems import load_system
 
+from .page_rules import check_page
 from .schemas import check
 from .train_stops import write_stop
 
@@ -316,6 +319,47 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(
     assert "found rail: unknown" in found.refused["02"]
 
 
+READ = """
+then = () => {
+  const place = document.querySelector(".reading");
+  place.dispatchEvent(new KeyboardEvent("keydown", { key: ".", bubbles: true }));
+  told.read = document.querySelector(".readout b").textContent;
+};
+"""
+
+
+def test_the_page_shows_what_has_changed_and_where(
+    usual: Monitored, tmp_path: Path, probe: Callable[[Path, str], dict[str, Any]]
+) -> None:
+    provenance = {"run": run_of("monitor", usual.system, {})}
+    page = write_monitored(usual, provenance, tmp_path)
+    told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
+    # Of eight axles, the third is marked, with its loss.
+    (mark,) = told.xpath("//ol[@class='strip']/li[contains(@class, 'wrong')]")
+    assert mark.xpath("string(span)") == "3"
+    (alarm,) = {
+        (row.xpath("string(th)"), row.xpath("string(td[1])"))
+        for row in told.get_element_by_id("alarm-table").xpath("tbody/tr")
+    }
+    (_, change), *_ = usual.changes
+    assert alarm == (usual.names[change.raised], "muDC[3] against the others")
+    size = usual.changes[-1][0].level[0] - change.before[0]
+    nominal = usual.system.values["muDC[3]"]
+    assert mark.text_content().endswith(f"{100.0 * size / nominal:+.1f} %")
+    # The recording in the middle of sixteen, by keyboard.
+    found = probe(page, READ)
+    assert not found["errors"]
+    assert found["read"] == "recording 9"
+
+
+def test_a_machine_that_has_not_changed_says_so(usual: Monitored, tmp_path: Path) -> None:
+    sound = replace(usual, tracks=tuple(replace(one, changes=()) for one in usual.tracks))
+    page = write_monitored(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
+    told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
+    assert "nothing has changed" in told.xpath("string(//h2[@id='shown'])")
+    assert not told.xpath("//ol[@class='strip']")
+
+
 def test_the_command_writes_what_it_says(
     history: Path, usual: Monitored, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -329,7 +373,7 @@ def test_the_command_writes_what_it_says(
     estimates = pd.read_csv(tmp_path / "out" / "estimates.csv")
     assert len(estimates) == 16 * 19
     check("monitor", json.loads((tmp_path / "out" / "summary.json").read_text()))
-    for name in ("history.png", "history.svg", "work.csv", STATE):
+    for name in ("history.png", "history.svg", "index.html", "work.csv", STATE):
         assert (tmp_path / "out" / name).stat().st_size > 500
 
 

@@ -34,6 +34,7 @@ from workbench.system_distance import Stopping
 from workbench.system_file import read_system
 from workbench.systems import load_system
 
+from .page_rules import check_page
 from .schemas import check
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
@@ -347,9 +348,25 @@ def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> 
     (level,) = said["safety"]
     assert level["low"] < level["ratio"] < level["high"] < 1.0
     assert {one.name for one in result.iterdir()} == {
-        *("distance.json", "distance.png", "distance.svg"),
+        *("distance.json", "distance.png", "distance.svg", "index.html"),
         *("stops.csv", "quantiles.csv", "safety.csv"),
     }
+
+
+def test_the_page_shows_the_distance_and_each_stop_beside_what_the_others_say(result: Path) -> None:
+    said = json.loads((result / "distance.json").read_text())
+    page = check_page(result / "index.html", said)
+    assert page.xpath("//svg[@data-axis='distance' and @data-unit='m']")
+    (dots,) = page.xpath("//section[@aria-labelledby='shown']//svg[@class='dots']")
+    of, held = said["held"]["of"], said["held"]["stops"]
+    assert f"{held} of {of} past stops" in dots.get("aria-label")
+    assert len(dots.xpath(".//circle")) == len(said["stops"])
+    # What the model does not claim is set apart.
+    assert len(dots.xpath(".//circle[@class='style-7']")) == len(said["stops"]) - of
+    for table, rows in (("stop-table", "stops"), ("quantile-table", "distance")):
+        assert len(page.get_element_by_id(table).xpath("tbody/tr")) == len(said[rows])
+    (ratio,) = page.get_element_by_id("safety-table").xpath("tbody/tr/td[1]/@data-value")
+    assert float(ratio) == said["safety"][0]["ratio"]
 
 
 @pytest.mark.long

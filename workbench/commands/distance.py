@@ -33,12 +33,12 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "models": models(system, [OBSERVER]),
             "seed": options.seed,
         }
-        figure = write_distance(found, provenance, options.out)
+        page = write_distance(found, provenance, options.out)
     output.stage("done")
     output.result(found.summary())
-    output.result(f"to see: {figure}, data beside it")
+    output.result(f"to read: {page}, data and figure beside it")
     result = read_result(options.out / "distance.json")
-    return Done(result, _UNITS, 130 if found.interrupted else 0)
+    return Done(result, _UNITS, 130 if found.interrupted else 0, page)
 
 
 def _said(text: str) -> tuple[str, str | float]:

@@ -42,15 +42,15 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "system": system.name,
             "fmu": models(system, [OBSERVER])[OBSERVER],
         }
-        figure = write_monitored(found, provenance, options.out)
+        page = write_monitored(found, provenance, options.out)
         output.result(found.summary())
-        output.result(f"to see: {figure}, data beside it")
+        output.result(f"to read: {page}, data and figure beside it")
         if found.interrupted:
             output.progress("interrupted: what was estimated is kept; run it again to go on")
         result = read_result(options.out / "summary.json")
         if options.diagnose and found.changes and not found.interrupted:
             result["cause"] = _cause(options, output, found, provenance)
-    return Done(result, {"work": "J"}, 130 * found.interrupted)
+    return Done(result, {"work": "J"}, 130 * found.interrupted, page)
 
 
 def _cause(

@@ -1,4 +1,4 @@
-"""Files of a predicted distance: distance.json, three tables, a figure."""
+"""Files of a predicted distance: distance.json, three tables, a figure, the page."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from workbench.files import write_json, write_whole
 from workbench.report.answers import stopping, with_answer
+from workbench.report.distance_page import write_distance_page
 from workbench.report.figures import LIGHT, STYLE, save_figure
 from workbench.stopping import Distance
 from workbench.stopping.outcome import QUANTILES, PastStop, Safety
@@ -21,14 +22,15 @@ _MOST = 60  # past stops that have names below the figure
 
 
 def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write distance.json, tables as CSV and the figure; returns the figure.
+    """Write distance.json, tables as CSV, the figure and the page; returns this.
 
     Parameters
     ----------
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    write_json(out / "distance.json", with_answer(stopping(summary), summary))
+    told = with_answer(stopping(summary), summary)
+    write_json(out / "distance.json", told)
     tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
     if found.safety is not None:
         tables["safety"] = pd.DataFrame(map(asdict, found.safety.levels))
@@ -36,7 +38,7 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
         write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
     figure = out / "distance.png"
     save_figure(distance_figure(found), [figure, figure.with_suffix(".svg")])
-    return figure
+    return write_distance_page(found, told, out)
 
 
 def distance_figure(found: Distance) -> Figure:

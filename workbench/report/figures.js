@@ -21,6 +21,12 @@ function zoomable(figure) {
   const [left, width, bottom, begin, duration] = ["left", "width", "bottom", "begin", "duration"].map(
     (name) => Number(plot.dataset[name]),
   );
+  const { axis, unit: axisUnit } = plot.dataset;
+  /** A place on the axis at the bottom, in thousandths after its begin, for people. */
+  const placed = (after, digits) => {
+    const value = begin + after / 1e3;
+    return axisUnit ? `${value.toFixed(digits)} ${axisUnit}` : `${axis} ${value.toFixed(0)}`;
+  };
   const words = new Map(
     [...figure.querySelectorAll(".legend li")].map((one) => [
       one.dataset.style,
@@ -138,8 +144,7 @@ function zoomable(figure) {
     times.innerHTML = vertical
       .map(([t, text]) => `<text x="${at(t)}" y="${bottom + 16}" text-anchor="middle">${text}</text>`)
       .join("");
-    const seconds = (ms) => (begin + ms / 1e3).toFixed(2);
-    range.value = `${seconds(from)} to ${seconds(to)} s`;
+    range.value = `${placed(from, 2)} to ${placed(to, 2)}`;
     if (read !== null) point(read);
   }
 
@@ -182,7 +187,7 @@ function zoomable(figure) {
   function point(sample) {
     read = sample;
     const x = left + (width * (all[sample] - from)) / (to - from);
-    const time = `${(begin + all[sample] / 1e3).toFixed(3)} s`;
+    const time = placed(all[sample], 3);
     cursor.setAttribute("d", `M${x.toFixed(1)} ${panels[0].top}V${bottom}`);
     cursor.style.display = x < left || x > left + width ? "none" : "";
     box.replaceChildren();
@@ -209,7 +214,7 @@ function zoomable(figure) {
   }
 
   function speak() {
-    const time = `${(begin + all[read] / 1e3).toFixed(3)} s`;
+    const time = placed(all[read], 3);
     const told = values(read).filter(({ entries }) => entries.length);
     spoken.value = [
       time,
@@ -246,12 +251,13 @@ function zoomable(figure) {
   const move = (share) => show(from + share * (to - from), to - from);
   const whole = () => show(0, duration);
 
+  const everything = axisUnit === "s" ? "Whole recording" : "All";
   const actions = [
     ["+", "Zoom in", () => zoom(0.5), ["+", "="]],
     ["−", "Zoom out", () => zoom(2), ["-"]],
     ["←", "Earlier", () => move(-0.25), ["ArrowLeft"]],
     ["→", "Later", () => move(0.25), ["ArrowRight"]],
-    ["Whole recording", "Whole recording", whole, ["0", "Home"]],
+    [everything, everything, whole, ["0", "Home"]],
   ];
   const tools = document.createElement("div");
   tools.className = "tools";

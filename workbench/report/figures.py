@@ -111,10 +111,11 @@ class CaseFigure:
     ----------
     name, title : of the case.
     finding : what the figure says, for those who do not see it.
-    time : (n,) [s].
+    time : (n,) [s], or of what `axis` names, rising.
     window : begin and end [s] of the time in which estimators are judged; None without.
     legend : (style, text) of each entry; from the ninth estimator on, styles repeat.
     panels : from top to bottom.
+    axis : what is at the bottom, and its unit; empty where it is a count.
     """
 
     name: str
@@ -124,6 +125,7 @@ class CaseFigure:
     window: tuple[float, float] | None
     legend: tuple[tuple[str, str], ...]
     panels: tuple[Panel, ...]
+    axis: tuple[str, str] = ("time", "s")
 
 
 def case_figure(result: CaseResult) -> CaseFigure:

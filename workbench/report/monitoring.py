@@ -1,4 +1,4 @@
-"""Files of condition monitoring: summary.json, tables, and a figure of the history."""
+"""Files of condition monitoring: summary.json, tables, a figure of the history, the page."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +14,7 @@ from workbench.fmu import Vector
 from workbench.monitoring import Monitored, Track
 from workbench.report.answers import watched, with_answer
 from workbench.report.figures import LIGHT, STYLE, save_figure
+from workbench.report.monitoring_page import write_monitoring_page
 
 _BAND = 1.96  # standard deviations, of 95 %
 _COLUMNS = 4  # of panels
@@ -21,14 +22,15 @@ _POINT, _LEVEL, _ALARM = LIGHT["2"], LIGHT["measured"], LIGHT["7"]
 
 
 def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write all files; returns the figure.
+    """Write all files; returns the page.
 
     Parameters
     ----------
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    write_json(out / "summary.json", with_answer(watched(summary), summary))
+    told = with_answer(watched(summary), summary)
+    write_json(out / "summary.json", told)
     for name, frame in (
         ("estimates", found.to_frame()),
         ("alarms", found.alarms()),
@@ -37,7 +39,7 @@ def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) 
         write_whole(out / f"{name}.csv", frame.to_csv(index=False, float_format="%.8g"))
     figure = out / "history.png"
     save_figure(history_figure(found), [figure, figure.with_suffix(".svg")])
-    return figure
+    return write_monitoring_page(found, told, out)
 
 
 def history_figure(found: Monitored) -> Figure:

@@ -62,20 +62,21 @@ class Dot:
 
 @dataclass(frozen=True)
 class Dots:
-    """Rows of dots on one axis, from zero or logarithmic.
+    """Rows of dots on one axis, from zero, from `low`, or logarithmic.
 
     Attributes
     ----------
     finding : what it shows, for those who do not see it.
     axis : what the numbers are, with unit.
     mark : value and name of a line across all rows; None without.
-    high : end of the axis; None: that of the data.
+    low, high : ends of the axis; None: zero, and that of the data.
     """
 
     finding: str
     axis: str
     rows: tuple[tuple[str, tuple[Dot, ...]], ...]
     mark: tuple[float, str] | None = None
+    low: float | None = None
     high: float | None = None
     logarithmic: bool = False
 
@@ -83,13 +84,13 @@ class Dots:
         """Geometry for the template, in pixels."""
         ends = [one.value if one.high is None else one.high for _, row in self.rows for one in row]
         high = 1.05 * max(ends, default=1.0) if self.high is None else self.high
-        low = min(ends, default=0.1) / 1.15 if self.logarithmic else 0.0
+        low = min(ends, default=0.1) / 1.15 if self.logarithmic else self.low or 0.0
 
         def at(value: float) -> float:
-            share = min(value, high) / (high or 1.0)
+            inside = max(min(value, high), low)
             if self.logarithmic:
-                share = 1.0 - math.log(share) / math.log(low / high)
-            return _LEFT + _WIDTH * share
+                return _LEFT + _WIDTH * (1.0 - math.log(inside / high) / math.log(low / high))
+            return _LEFT + _WIDTH * (inside - low) / ((high - low) or 1.0)
 
         ticks = ticks_within(low, high, 8)
         if self.logarithmic:
@@ -127,6 +128,20 @@ class Dots:
 
 
 @dataclass(frozen=True)
+class Strip:
+    """Things that are alike and stand in a row, as wheels of a vehicle do: which one is not well.
+
+    Attributes
+    ----------
+    finding : what it shows, for those who do not see it.
+    entries : name of each, and what is wrong with it; empty where nothing is.
+    """
+
+    finding: str
+    entries: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class Part:
     """A part of a page; the first is open, the others are folded.
 
@@ -141,6 +156,7 @@ class Part:
     id: str
     title: str
     text: tuple[str, ...] = ()
+    strips: tuple[Strip, ...] = ()
     dots: tuple[Dots, ...] = ()
     recordings: tuple[Mapping[str, Any], ...] = ()
     tables: tuple[Table, ...] = ()

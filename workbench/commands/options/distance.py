@@ -6,6 +6,7 @@ from pathlib import Path
 from workbench.commands.arguments import (
     Commands,
     add_isolated,
+    add_pdf,
     add_recordings,
     add_seed,
     add_system,
@@ -25,8 +26,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "its model left, drawn together. Every past stop is predicted from the others and stands "
         "beside what was measured, also corrected to nominal conditions. The safety level is the "
         "deceleration, over the nominal one, that is reached but for one stop in 10, 100, ..., by "
-        "subset simulation. Writes distance.json, stops.csv, quantiles.csv, safety.csv and a "
-        "figure. Ctrl-C keeps the runs of the safety level that are done.",
+        "subset simulation. Writes distance.json, stops.csv, quantiles.csv, safety.csv, a "
+        "figure and the page (index.html). Ctrl-C keeps the runs of the safety level that are "
+        "done.",
         epilog="examples:\n"
         "  python -m workbench distance --system my_machine my_stops\n"
         "  python -m workbench distance --system my_machine my_stops --ask speed='160 km/h'\n"
@@ -66,5 +68,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     add_seed(parser, "all that is drawn")
     add_workers(parser)
+    add_pdf(parser)
     add_isolated(parser)
     return parser

@@ -7,6 +7,7 @@ from workbench.commands.arguments import (
     Commands,
     add_isolated,
     add_out,
+    add_pdf,
     add_system,
     add_workers,
     share,
@@ -22,7 +23,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "machine, in the order of their dates, and say which has changed, since when, and by how "
         "much. What the folder of results knows is not estimated again: run it after each new "
         "recording, or after many. Writes estimates.csv, alarms.csv, work.csv, summary.json, a "
-        "figure (PNG, SVG), and its state (state.sqlite). Exit status 0 with or without alarms.",
+        "figure (PNG, SVG), the page (index.html), and its state (state.sqlite). Exit status 0 "
+        "with or without alarms.",
         epilog="examples:\n"
         "  python -m workbench monitor my_recordings --system my_machine --out results/mine\n"
         "  python -m workbench monitor stops --system train --false-alarms 0.001",
@@ -53,5 +55,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     add_out(parser, "results/monitor")
     add_workers(parser)
+    add_pdf(parser)
     add_isolated(parser)
     return parser

@@ -1,0 +1,244 @@
+"""The page of `monitor`: what has changed on a machine, since when, and by how much."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.fmu import Vector
+from workbench.monitoring import Monitored, Track
+from workbench.report.figures import CaseFigure, Curve, Panel
+from workbench.report.parts import Cell, Column, Part, Strip, Table, number, write_parts
+from workbench.report.recordings import placed
+from workbench.report.views import capital
+
+_POINT, _LEVEL, _CHANGED = "2", "measured", "7"
+_SURE = 1.96  # standard errors, of 95 %
+_ENTRY = re.compile(r"(.+)\[(\d+)\]")
+
+
+def write_monitoring_page(found: Monitored, summary: Mapping[str, Any], out: Path) -> Path:
+    """Write the page into the folder; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to summary.json.
+    """
+    tracks = [one for one in found.tracks if np.isfinite(one.values).any()]
+    tracks.sort(key=_first_told)
+    figures = [_figure(one, found) for one in tracks] if len(found.names) > 1 else []
+    changed = sum(bool(one.changes) for one in tracks)
+    drawn = placed(figures, summary, out)
+    shown = drawn[: max(changed, 1)]
+    title = "What has changed" if changed else "The quantity that moved most; nothing has changed"
+    parts = [
+        Part(
+            "shown",
+            title,
+            (_EXPLAINED,),
+            strips=tuple(_strips(tracks, found)),
+            recordings=tuple(shown),
+        ),
+        Part("quantities", "Quantities now", tables=(_quantities(summary),), printed=True),
+        Part("definitions", "Definitions", terms=_TERMS),
+    ]
+    if drawn[len(shown) :]:
+        rest = Part("others", "Quantities as they were", recordings=tuple(drawn[len(shown) :]))
+        parts.insert(2, rest)
+    if summary["alarms"]:
+        alarms = (_alarms(summary["alarms"]),)
+        parts.insert(1, Part("alarms", "Alarms", tables=alarms, printed=True))
+    if summary["work"]:
+        parts.insert(-1, Part("work", "Work of friction", tables=(_work(summary["work"]),)))
+    path = out / "index.html"
+    write_parts(
+        f"One machine over its recordings, {found.names[0]} to {found.names[-1]}",
+        summary,
+        parts,
+        path,
+        file="summary.json",
+        warnings=_warnings(found),
+    )
+    return path
+
+
+_EXPLAINED = (
+    "One point for each recording, with a band of one standard deviation; the level that it is "
+    "compared with, red after a change that was told. The shaded recordings are where the last "
+    "change was, with 95 %. Each quantity is compared with its own past; one of several that are "
+    "alike against the others."
+)
+
+
+def _first_told(track: Track) -> tuple[float, float]:
+    """Order of tracks: changed ones as they were told, then those that were most off their past."""
+    told = track.changes[0].raised if track.changes else np.inf
+    surprises = np.abs(track.surprises[np.isfinite(track.surprises)])
+    return float(told), -float(surprises.max(initial=0.0))
+
+
+def _warnings(found: Monitored) -> list[str]:
+    said = []
+    if found.interrupted:
+        said.append("Interrupted: the same command goes on from here.")
+    said += [f"Not used: {name}: {why}" for name, why in found.refused.items()]
+    said += [f"There twice: {name} is {other}." for name, other in found.again.items()]
+    return said
+
+
+def _strips(tracks: Sequence[Track], found: Monitored) -> list[Strip]:
+    """Quantities that are entries of one array, in its order: which of them have changed."""
+    arrays: dict[str, dict[int, Track]] = {}
+    for track in tracks:
+        if track.against and (entry := _ENTRY.fullmatch(track.name)):
+            arrays.setdefault(entry[1], {})[int(entry[2])] = track
+    strips = []
+    for members in arrays.values():
+        if changed := [one.label for one in members.values() if one.changes]:
+            entries = tuple((str(k), _moved(one, found)) for k, one in sorted(members.items()))
+            finding = capital(f"{', '.join(changed)}: changed; the others are as they were.")
+            strips.append(Strip(finding, entries))
+    return strips
+
+
+def _moved(track: Track, found: Monitored) -> str:
+    """By how much a quantity is off its first level; empty where it is not."""
+    if not track.changes:
+        return ""
+    size = track.level[0] - track.changes[0].before[0]
+    if nominal := abs(found.system.values.get(track.name, 0.0)):
+        return f"{100.0 * size / nominal:+.1f} %"
+    return f"{size:+.3g} {track.unit}".removesuffix(" 1")
+
+
+def _figure(track: Track, found: Monitored) -> CaseFigure:
+    """Estimates of a quantity and its levels, over the recordings."""
+    count = len(found.names)
+    scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
+    sound, changed = _levels(track, count)
+    sigma = scale * track.deviations
+    curves = (Curve(_POINT, track.values, sigma), Curve(_LEVEL, sound), Curve(_CHANGED, changed))
+    low = float(np.nanmin(track.values - 2.0 * sigma))
+    high = float(np.nanmax(track.values + 2.0 * sigma))
+    room = 0.05 * (high - low) or 1.0
+    label = capital(f"{track.label} {track.name}".replace("  ", " "))
+    title = f"{label} [{track.unit}]".removesuffix(" [1]")
+    last = track.changes[-1] if track.changes else None
+    return CaseFigure(
+        name=label + " against the others" * track.against,
+        title=f"{np.isfinite(track.values).sum()} of {count} recordings tell it",
+        finding=_said(track, found),
+        time=np.arange(1.0, count + 1.0),
+        window=None if last is None else (last.earliest + 1.0, min(last.latest + 2.0, count)),
+        legend=((_POINT, "estimate"), (_LEVEL, "level"), (_CHANGED, "level after a change")),
+        panels=(Panel(title, track.unit, low - room, high + room, 1.4, curves),),
+        axis=("recording", ""),
+    )
+
+
+def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
+    """Level of each recording: before any change, and after one."""
+    sound, changed = np.full(count, np.nan), np.full(count, np.nan)
+    begin, kept = 0, sound
+    for change in track.changes:
+        kept[begin : change.last + 1] = change.before[0]
+        begin, kept = change.last + 1, sound if change.returns else changed
+    kept[begin:] = track.level[0]
+    return sound, changed
+
+
+def _said(track: Track, found: Monitored) -> str:
+    if not track.changes:
+        return "It has not changed."
+    first = track.changes[0]
+    return (
+        f"Changed by {_moved(track, found)} after {found.names[first.last]}, told at "
+        f"{found.names[first.raised]}."
+    )
+
+
+def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
+    columns = (
+        Column("told at", number=False),
+        Column("quantity", number=False),
+        Column("changed after", number=False),
+        Column("with 95 %, after", number=False),
+        Column("change"),
+        Column("95 % from"),
+        Column("to"),
+        Column("of nominal [%]"),
+        Column("unit", number=False),
+    )
+    rows = []
+    for one in alarms:
+        size, sure, share = one["change"], one["standard_error"], one["share_of_nominal"]
+        between = dict.fromkeys((one["earliest"], one["latest"]))
+        cells = (
+            Cell(one["quantity"]),
+            Cell(one["changed_after"]),
+            Cell(" to ".join(between)),
+            number(size, "{:+.3g}".format),
+            number(size - _SURE * sure, "{:+.3g}".format),
+            number(size + _SURE * sure, "{:+.3g}".format),
+            number(None if share is None else 100.0 * share, "{:+.1f}".format),
+            Cell(one["unit"]),
+        )
+        rows.append((str(one["told_at"]), cells))
+    caption = "All alarms in their order: the recording at which each was told."
+    return Table("alarm-table", caption, columns, tuple(rows))
+
+
+def _quantities(summary: Mapping[str, Any]) -> Table:
+    columns = (
+        Column("quantity", number=False),
+        Column("what it is", number=False),
+        Column("level"),
+        Column("standard error"),
+        Column("trend", meaning="by recording, since the last change"),
+        Column("unit", number=False),
+        Column("told in", meaning="recordings that tell it"),
+    )
+    rows = []
+    for name, one in summary["quantities"].items():
+        cells = (
+            Cell(one["label"]),
+            *(number(one[key], "{:.4g}".format) for key in ("level", "standard_error")),
+            number(one["trend_by_recording"], "{:+.2g}".format),
+            Cell(one["unit"]),
+            number(one["told_in"], "{:.0f}".format),
+        )
+        rows.append((name, cells))
+    caption = "Mean level of each quantity since its last change."
+    return Table("quantity-table", caption, columns, tuple(rows))
+
+
+def _work(work: Mapping[str, Any]) -> Table:
+    columns = (
+        Column("where", number=False),
+        Column("what it is", number=False),
+        Column("work [MJ]"),
+        Column("over the mean", meaning="wear relative to the others, of one material"),
+    )
+    rows = tuple(
+        (
+            name,
+            (
+                Cell(one["label"]),
+                number(1e-6 * one["work"], "{:.4g}".format),
+                number(one["of_the_mean"], "{:.3f}".format),
+            ),
+        )
+        for name, one in work.items()
+    )
+    return Table("work-table", "Friction work in all recordings together.", columns, rows)
+
+
+_TERMS = {
+    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a sound "
+    "machine passes at the stated rate of false alarms (Page 1954).",
+    "Changed after": "The recording after which the change was most likely (Hinkley 1970).",
+    "Against the others": "Less the mean of those that are alike: what moves all of them cancels.",
+    "Standard error": "By the noise of the sensors and by the scatter that the past shows.",
+}
