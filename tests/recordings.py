@@ -30,21 +30,21 @@ _SOURCES = [
 _RIG = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()
 
 
-def record(scenario: Scenario, seed: int, effects: Effects, folder: Path) -> None:
-    """Write the recording of a stop, with little of its truth, to a new folder."""
-    asked = repr((_RIG, np.__version__, scenario, seed, effects))
-    every = Path(platformdirs.user_cache_dir("wheelset-workbench")) / "recordings"
-    kept = every / hashlib.sha256(asked.encode()).hexdigest()
+def record(scenario: Scenario, seed: int, effects: Effects, folder: Path, every: int = 100) -> None:
+    """Write the recording of a stop, with the truth of every so many samples, to a new folder."""
+    asked = repr((_RIG, np.__version__, scenario, seed, effects, every))
+    shelf = Path(platformdirs.user_cache_dir("wheelset-workbench")) / "recordings"
+    kept = shelf / hashlib.sha256(asked.encode()).hexdigest()
     with contextlib.suppress(OSError):
         shutil.copytree(kept, folder)
         os.utime(kept)  # of use, which decides what is dropped
         return
-    write_recording(simulate(scenario, seed, effects, REFERENCE), effects, RATE, folder, every=100)
+    write_recording(simulate(scenario, seed, effects, REFERENCE), effects, RATE, folder, every)
     # Another worker may keep the same at the same time: it appears whole or not.
     with contextlib.suppress(OSError):
-        every.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(dir=every))
+        shelf.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(dir=shelf))
         shutil.copytree(folder, part, dirs_exist_ok=True)
         part.replace(kept)
-        for old in sorted(every.iterdir(), key=lambda one: -one.stat().st_mtime)[_MOST:]:
+        for old in sorted(shelf.iterdir(), key=lambda one: -one.stat().st_mtime)[_MOST:]:
             shutil.rmtree(old, ignore_errors=True)

@@ -3,6 +3,7 @@ made by an independent simulator."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,10 @@ from workbench.wheelset.accuracy import (
     slide_error,
 )
 from workbench.wheelset.claims import PeakForce
-from workbench.wheelset.rig import Effects, Stop, select, simulate, write_recording
+from workbench.wheelset.rig import Effects, select
 from workbench.wheelset.truth import read_truth
+
+from .recordings import record
 
 ROOT = Path(__file__).parent.parent
 RECORDINGS = ROOT.parent / "shared" / "recordings"
@@ -145,23 +148,19 @@ def test_the_slide_is_followed_to_its_minimum(stops: dict[str, KnownStop], obser
 
 
 @pytest.fixture(scope="module")
-def slippery(
-    tmp_path_factory: pytest.TempPathFactory, reference_path: Path
-) -> list[tuple[Case, Stop]]:
+def slippery(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
     """Stops near the limit of adhesion of a contact that has the law of a dry one."""
-    folder, made = tmp_path_factory.mktemp("slippery"), {}
+    folder = tmp_path_factory.mktemp("slippery")
     for name in ("03_dry_120_3.6", "04_dry_160_4.2", "06_dry_160_3.6_rev"):
         for muWR in (0.19, 0.22, 0.25):
             (scenario,) = select([name])
-            stop = simulate(replace(scenario, muWR=muWR), 1, Effects(), reference_path)
-            write_recording(stop, Effects(), 200, folder / f"{name}_{muWR}")
-            made[f"{name}_{muWR}"] = stop
-    return [(case, made[case.name]) for case in read_cases([folder], SYSTEM)]
+            record(replace(scenario, muWR=muWR), 1, Effects(), folder / f"{name}_{muWR}", every=1)
+    return read_cases([folder], SYSTEM)
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
-    estimators: dict[str, Estimator], slippery: list[tuple[Case, Stop]], observer: str
+    estimators: dict[str, Estimator], slippery: list[Case], observer: str
 ) -> None:
     """Within a tenth from 70 % of the adhesion on, where the law of the contact is right.
 
@@ -169,10 +168,10 @@ def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
     the observers' models hold the wheel load, and take that for 6 to 7 % of muWR.
     """
     estimator, near = estimators[observer], []
-    for case, stop in slippery:
+    for case in slippery:
         run = replay(case, estimator)
         used = PeakForce(estimator.fmu, SYSTEM).utilisation(run.estimate)
-        error = run.signal("muWR") / stop.at(case.time, "muWR") - 1.0
+        error = run.signal("muWR") / read_truth(case, SYSTEM).muWR - 1.0
         near.append(error[run.claimed["muWR"] & (used > 0.7)])
     errors = np.abs(np.concatenate(near))
     assert errors.size > 10_000
@@ -198,10 +197,16 @@ def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
 # --- on recordings of an independent simulator, whose truth is not known here ---
 
 
+@cache
+def recorded(folder: Path) -> list[Case]:
+    """The cases of a folder, read once for all estimators."""
+    return read_cases([folder], SYSTEM)
+
+
 def worst(estimator: Estimator, folder: Path, pattern: str = "") -> float:
     """Largest error of Fx, rms over mean, over the cases whose name holds the pattern."""
     errors = []
-    for case in read_cases([folder], SYSTEM):
+    for case in recorded(folder):
         if pattern in case.name:
             error = score(case, replay(case, estimator), SYSTEM).nrmse
             assert error is not None, case.name

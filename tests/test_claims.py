@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler, shelf
+from .built import build_here
 
 LIBRARIES = sorted(
     path.parents[1]
@@ -24,7 +24,7 @@ CLAIMS = [
 ]
 
 
-def simulate(package: Path, claim: str) -> list[str]:
+def simulate(package: Path, claim: str, scratch: Path) -> list[str]:
     """Run a claim to its StopTime; returns what the FMU complained of.
 
     Co-Simulation by the FMU's own integrator, then Model Exchange by CVODE: what holds at the
@@ -32,10 +32,8 @@ def simulate(package: Path, claim: str) -> list[str]:
     library and compiler.
     """
     model = f"{package.parent.name}.Tests.{claim}"
-    path = shelf.keep(
-        shelf.key(package, model),
-        lambda path: compiler.build(package, model, path, platforms=[compiler.native()]),
-    )
+    path = scratch / f"{claim}.fmu"
+    build_here(package, model, path)
     experiment = fmpy.read_model_description(str(path)).defaultExperiment
     messages: list[str] = []
 
@@ -67,8 +65,8 @@ def test_every_claim_is_listed(library: Path) -> None:
 @pytest.mark.parametrize(
     ("library", "claim"), CLAIMS, ids=lambda value: getattr(value, "name", value)
 )
-def test_claim(library: Path, claim: str) -> None:
-    assert simulate(library / "package.mo", claim) == []
+def test_claim(library: Path, claim: str, tmp_path: Path) -> None:
+    assert simulate(library / "package.mo", claim, tmp_path) == []
 
 
 @pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
@@ -86,5 +84,5 @@ def test_a_wrong_claim_fails_with_its_text(tmp_path: Path) -> None:
     shutil.copytree(RIG, copy)
     claim = copy / "Tests" / "PolachSlopeIsKalkerStiffness.mo"
     claim.write_text(claim.read_text().replace("kS=1.0", "kS=0.9"))
-    messages = simulate(copy / "package.mo", claim.stem)
+    messages = simulate(copy / "package.mo", claim.stem, tmp_path)
     assert any("Polach's slope at zero slip differs from K" in message for message in messages)

@@ -30,7 +30,7 @@ from workbench.systems import load_system, open_model
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler
+from .built import build_here
 
 LIBRARY = """
 package Water
@@ -123,9 +123,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All that a user writes: library, system file and recordings; and the compiled model."""
     folder = tmp_path_factory.mktemp("tanks")
     (folder / "package.mo").write_text(LIBRARY)
-    compiler.build(
-        folder / "package.mo", "Water.Tanks", folder / "Tanks.fmu", platforms=[compiler.native()]
-    )
+    build_here(folder / "package.mo", "Water.Tanks", folder / "Tanks.fmu")
     (folder / "system.toml").write_text(SYSTEM)
     for seed, name in enumerate(("01_first", "02_second")):
         (folder / "cases" / name).mkdir(parents=True)

@@ -24,7 +24,7 @@ from workbench.systems import load_system, open_model
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler
+from .built import build_here
 
 LIBRARY = """
 package Water
@@ -88,8 +88,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tanks")
     (folder / "package.mo").write_text(LIBRARY)
     for model in ("Linear", "Bent"):
-        path = folder / f"{model}.fmu"
-        compiler.build(folder / "package.mo", f"Water.{model}", path, platforms=[compiler.native()])
+        build_here(folder / "package.mo", f"Water.{model}", folder / f"{model}.fmu")
     return folder
 
 

@@ -42,7 +42,7 @@ def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """MinimalObserver with every variable that estimators use under another name."""
     pytest.importorskip("rumoca")
     pytest.importorskip("casadi")
-    from workbench import compiler  # needs the extra
+    from .built import build_here  # needs the extra
 
     folder = tmp_path_factory.mktemp("renamed")
     library = folder / "WheelsetRig"
@@ -54,9 +54,7 @@ def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         text = re.sub(rf"\b{ours}\b(?!=)", theirs, text)
     source.write_text(text)
     path = folder / "Renamed.fmu"
-    compiler.build(
-        library / "package.mo", "WheelsetRig.MinimalObserver", path, platforms=("linux-x86_64",)
-    )
+    build_here(library / "package.mo", "WheelsetRig.MinimalObserver", path)
     return path
 
 

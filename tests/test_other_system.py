@@ -29,7 +29,7 @@ from workbench.systems import load_system, open_model
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler  # needs the extra
+from .built import build_here
 
 MODEL = """
 within ;
@@ -103,7 +103,7 @@ def boiler(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("boiler")
     package = folder / "package.mo"
     package.write_text(MODEL)
-    compiler.build(package, "Boiler.Vessel", folder / "Vessel.fmu", platforms=(compiler.native(),))
+    build_here(package, "Boiler.Vessel", folder / "Vessel.fmu")
     (folder / "system.toml").write_text(SYSTEM)
     return load_system(folder)
 

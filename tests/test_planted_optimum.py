@@ -39,7 +39,7 @@ from workbench.tuning import (
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler
+from .built import build_here
 
 MODEL = """
 package Lib
@@ -289,7 +289,7 @@ def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., J
     package, path = folder / "Lib" / "package.mo", folder / "RollingWheelset.fmu"
     package.parent.mkdir()
     package.write_text(MODEL)
-    compiler.build(package, "Lib.RollingWheelset", path, platforms=[compiler.native()])
+    build_here(package, "Lib.RollingWheelset", path)
     (folder / "system.toml").write_text(SYSTEM)
     rolling = load_system(folder)
     assert corner(rolling.objective) == pytest.approx(CORNER)

@@ -26,7 +26,9 @@ _COMPILER = Path(__file__).parent / "compiler"
 _CODE = (".py", ".c", ".h")
 _TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
 _MOST_KNOWN = 4096  # empty files; a diagnosis builds some, a user has some
-_MOST = 128  # files, of 0.1 to 0.5 MB: the claims of all libraries, and some months' recordings
+# Files, of 0.1 MB: more than a run of all tests asks for, which is some hundreds. As the least used
+# are dropped, of a round that is longer than the shelf nothing would ever be found again.
+_MOST = 1024
 
 
 def cache_folder() -> Path:
