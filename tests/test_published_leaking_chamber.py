@@ -95,11 +95,8 @@ def diagnosed(cases: Path, name: str, out: Path) -> Outcome:
     return diagnose(system, above, out=out, workers=1, report=lambda line: None)
 
 
-def test_aluminium_is_tight(cases: Path, tmp_path: Path) -> None:
-    assert diagnosed(cases, "Aluminium", tmp_path).diagnosis.verdict == "nothing"
-
-
-@pytest.mark.parametrize("name", ["Prusa", "Ultimaker_015", "Ultimaker_020"])
+# `Ultimaker_020`, and `Aluminium`, which is tight, are diagnosed by a tutorial.
+@pytest.mark.parametrize("name", ["Prusa", "Ultimaker_015"])
 def test_a_chamber_that_leaks_does_so_laminarly(cases: Path, tmp_path: Path, name: str) -> None:
     diagnosis = diagnosed(cases, name, tmp_path).diagnosis
     assert diagnosis.verdict == "found"

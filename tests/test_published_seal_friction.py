@@ -1,6 +1,5 @@
-"""Published friction of two seals: read from each layout, and its pressure dependence is named."""
+"""Published friction of two seals: read from each layout. What it says is in its tutorial."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench import published
-from workbench.api import diagnose
-from workbench.case import read_cases
 from workbench.published import seal_friction
-from workbench.systems import load_system
-
-FITTED = (1, 3, 7)  # bar
 
 
 def test_rate_of_a_steady_stroke_is_exact_between_uneven_samples() -> None:
@@ -55,32 +49,3 @@ def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
         assert one.rows == other.rows == (15, 59)
         for column, values in one.columns.items():
             assert_allclose(values, other.columns[column], err_msg=column)
-
-
-# --- on the recordings, where they are at hand ---
-
-
-@pytest.fixture(scope="module")
-def cases(published_cases: Callable[[str, str], Path]) -> Path:
-    return published_cases("seal_friction", "pneumatic_cylinder")
-
-
-@pytest.mark.parametrize(("seal", "before", "after"), [("O-ring", 5.95, 1.0), ("NAPN", 7.9, 1.2)])
-def test_friction_that_grows_with_pressure_is_named(
-    cases: Path, tmp_path: Path, seal: str, before: float, after: float
-) -> None:
-    """What three parameters, fitted by hand, leave of the force: 5.9 and 1.0, 7.9 and 1.2 N."""
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-    system = load_system("seal_friction")
-    fitted = read_cases([cases / f"{seal}_{pressure}bar" for pressure in FITTED], system)
-    outcome = diagnose(system, fitted, out=tmp_path, workers=1, report=lambda line: None)
-    assert outcome.diagnosis.verdict == "found"
-    named = {one.effect.name for one in outcome.diagnosis.causes}
-    assert "PressureFriction" in named
-    assert named & {"DryFriction", "PreslidingFriction"}
-    force = np.array([one.rms for one in outcome.errors])
-    count = np.array([one.samples for one in outcome.errors])
-    rms = np.sqrt(count @ force**2 / count.sum())
-    assert rms[0] == pytest.approx(before, rel=0.02)
-    assert rms[1] < after
