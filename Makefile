@@ -14,7 +14,7 @@ LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/c
 LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
 	| xargs -0 sha256sum | sha256sum | cut -c 1-64
 
-.PHONY: help simulate tune diagnose power cases fmus bench docs fuzz chaos test test-long test-changed clean
+.PHONY: help simulate tune diagnose power cases fmus bench docs figures figures-long fuzz chaos test test-long test-changed clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -26,6 +26,8 @@ help:
 	@echo "make fmus       build the FMUs from modelica/ (Modelica compiler, C cross-compiler);"
 	@echo "                COMPILER=omc: with OpenModelica where it is installed, into build/omc"
 	@echo "make bench      time calls into the FMUs against plain C, results in results/bench"
+	@echo "make figures    write the tables of docs/accuracy.md from the commands that make them;"
+	@echo "                minutes. make figures-long: that of power, too, an hour"
 	@echo "make docs       the documentation as a site for any static host, in build/site; no network"
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
@@ -63,6 +65,13 @@ cases: $(VENV)/run.stamp
 fmus: $(VENV)/dev.stamp
 	$(RUN) -m workbench fmu build --all --compiler $(COMPILER)
 
+# The tables of docs/accuracy.md, from the commands that make them; an hour with those of power.
+figures: $(VENV)/dev.stamp
+	$(RUN) docs/figures.py
+
+figures-long: $(VENV)/dev.stamp
+	$(RUN) docs/figures.py --long
+
 docs: $(VENV)/dev.stamp
 	$(RUN) -m mkdocs build --strict
 
@@ -74,7 +83,6 @@ test: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
-	$(RUN) -m workbench fmu build --all --check
 	$(PYTEST) -m "not long"
 
 # Which state of all that they test has passed them is recorded, to be committed with it.

@@ -14,6 +14,8 @@ from workbench.objective import low_pass
 from workbench.observers.gains import matrix_names
 from workbench.system import System
 
+from .test_figures import figures
+
 OBSERVERS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
 
 
@@ -104,6 +106,19 @@ def test_summary_keeps_its_contract(results: Path) -> None:
             assert {"Fx_rms_N", "Fx_nrmse", "z"} <= set(values)
             assert values["Fx_rms_N"] > 0.0
             assert values["z"] > 0.0
+
+
+def test_the_table_of_the_documentation_is_that_of_the_command(results: Path) -> None:
+    summary = json.loads((results / "summary.json").read_text())
+    (text,) = figures.block("simulate").findall(figures.PAGE.read_text())
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+    header, *made = figures.errors(summary)
+    assert rows[0] == list(header)
+    for row, found in zip(rows[2:], made, strict=True):
+        assert row[0] == found[0]
+        ours, theirs = ([float(one.split()[0]) for one in line[1:]] for line in (row, found))
+        # The last digit: another processor may round otherwise.
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=0.0101)
 
 
 def test_estimates_and_figures_are_written_for_every_case(

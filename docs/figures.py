@@ -1,0 +1,207 @@
+"""Tables of `accuracy.md`, written from what the commands found: `make figures`.
+
+    python docs/figures.py [--long] [--kept] [NAME ...]
+
+A table stands between `<!-- figures: NAME -->` and `<!-- figures end -->`, the command that made
+it below it. All other numbers of the page are typed, from the command that stands beside them.
+"""
+
+import argparse
+import json
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.lab import with_interval
+from workbench.report.views import label
+from workbench.systems import load_system
+from workbench.wheelset.accuracy import COVERED, ROWS, Worst
+from workbench.wheelset.accuracy_report import cell
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "accuracy.md"
+RESULTS = Path("results", "figures")
+SYSTEM = load_system("wheelset")
+# What is asked of each row of the accuracy, and of the shares of power.
+GOALS = ("2 %", "4 %", "4 %", "15 %", "reached", "0.5 s", "none", "0.01", "0.02")
+ASKED = {
+    "false alarms on clean sets": "at most 2 %",
+    "right cause first, above noise": "95 %",
+    "both of a pair": "80 %",
+    "unknown cause is unexplained": "80 %",
+    "intervals that hold the truth": "90 %",
+}
+# What the rig plants in the stops of `cases` (`ORDINARY_PADS`), as a laboratory says it.
+PLANTED = {
+    "WaterFilm": "film 100 %; energy 0.45 MJ",
+    "SpeedDependentPadFriction": "slope 20 %",
+    "BrakeFade": "fade 4.0 % per 100 K",
+    "PressureDependentPadFriction": "exponent 4.0 %",
+}
+
+Table = list[Sequence[str]]  # the first row is the header
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A table and the commands that make it.
+
+    Attributes
+    ----------
+    commands : of the workbench; the last one writes the summary.
+    summary : file, below the folder of results.
+    table : of the summary.
+    long : whether they take hours.
+    """
+
+    commands: tuple[str, ...]
+    summary: Path
+    table: Callable[[Mapping[str, Any]], Table]
+    long: bool = False
+
+
+# --- tables ---
+
+
+def titled(name: str) -> str:
+    """An estimator as the page calls it: EKF, disturbance observer."""
+    return name.upper() if len(name) == 3 else label(name, SYSTEM)
+
+
+def errors(summary: Mapping[str, Any]) -> Table:
+    """Error of the judged signal by case and estimator."""
+    key = f"{SYSTEM.objective.judged}_nrmse"
+    cases = summary["cases"]
+    names = list(next(iter(cases.values()))["estimators"])
+    rows: Table = [["case", *(titled(name) for name in names)]]
+    for case, found in cases.items():
+        shares = [found["estimators"][name][key] for name in names]
+        rows.append([case, *("n/a" if one is None else f"{100.0 * one:.2f} %" for one in shares)])
+    return rows
+
+
+def worst(summary: Mapping[str, Any]) -> Table:
+    """The worst stop of each row, beside what is asked of it."""
+    found = summary["worst"]
+    rows: Table = [["", "goal", *(titled(name) for name in found)]]
+    for row, goal in zip(ROWS, GOALS, strict=True):
+        cells = []
+        for name in found:
+            one = found[name].get(row.text)
+            value = None if one is None else one["value"]
+            endless = np.inf if value is None else value
+            cells.append(cell(row, None if one is None else Worst(one["stop"], endless)))
+        rows.append([row.text, goal, *cells])
+    return rows
+
+
+def covered(summary: Mapping[str, Any]) -> Table:
+    """Share of samples whose truth a 95 % band holds, mean of the stops."""
+    shares: dict[str, dict[str, list[float]]] = {}
+    for stop in summary["stops"].values():
+        for name, one in stop["estimators"].items():
+            for quantity, share in one.get("covers", {}).items():
+                shares.setdefault(name, {}).setdefault(quantity, []).append(share)
+    rows: Table = [["", *(titled(name) for name in shares)]]
+    for quantity in COVERED:
+        known = [one.get(quantity) for one in shares.values()]
+        texts = ["" if one is None else f"{100.0 * np.mean(one):.1f} %" for one in known]
+        rows.append([quantity, *texts])
+    return rows
+
+
+def causes(summary: Mapping[str, Any]) -> Table:
+    """Causes in the order in which they were named, with their sizes."""
+    rows: Table = [["cause", "planted", "estimate"]]
+    for cause in summary["causes"]:
+        sizes = [
+            f"{name} {with_interval(one['value'], one['low'], one['high'], one['unit'])}"
+            for name, one in cause["parameters"].items()
+        ]
+        planted = PLANTED.get(cause["effect"], "nothing")
+        rows.append([cause["effect"], planted, "; ".join(sizes)])
+    return rows
+
+
+def shares(summary: Mapping[str, Any]) -> Table:
+    """What the command found, with its intervals."""
+    rows: Table = [["", "goal", "measured", "95 % interval (Clopper-Pearson)"]]
+    for name, one in summary["answer"]["headline"].items():
+        known = one["value"] is not None
+        value = f"{one['value']:.0f} {one['unit']}" if known else "n/a"
+        ends = f"{one['low']:.1f} to {one['high']:.1f} %" if known else ""
+        rows.append([name, ASKED.get(name, ""), value, ends])
+    return rows
+
+
+# --- the page ---
+
+_RIG = ("rig --seed 1 --out {out}/rig", "accuracy {out}/rig --out {out}/accuracy")
+FIGURES = {
+    "simulate": Figure(("simulate --out {out}/simulate",), Path("simulate/summary.json"), errors),
+    "accuracy": Figure(_RIG, Path("accuracy/accuracy.json"), worst),
+    "coverage": Figure(_RIG, Path("accuracy/accuracy.json"), covered),
+    "diagnose": Figure(("diagnose --out {out}/diagnose",), Path("diagnose/summary.json"), causes),
+    "power": Figure(
+        ("power --clean 50 --sizes 2 4 8 --repeats 1 --pairs 20 --resume --out {out}/power",),
+        Path("power/power.json"),
+        shares,
+        long=True,
+    ),
+}
+
+
+def written(name: str, summary: Mapping[str, Any]) -> str:
+    """A table with the command that made it, as it stands on the page."""
+    header, *rows = FIGURES[name].table(summary)
+    lines = [header, ["---"] * len(header), *rows]
+    text = "\n".join("| " + " | ".join(line).strip() + " |" for line in lines)
+    made = ", then ".join(f"`workbench {one}`" for one in FIGURES[name].commands)
+    made = made.format(out=RESULTS.as_posix())
+    return f"{text}\n\n*Written by `make figures` from {made}.*"
+
+
+def block(name: str) -> re.Pattern[str]:
+    """What stands between the marks of a table."""
+    return re.compile(
+        rf"(?<=<!-- figures: {name} -->\n\n).*?(?=\n\n<!-- figures end -->)", re.DOTALL
+    )
+
+
+def placed(page: str, name: str, summary: Mapping[str, Any]) -> str:
+    """The page with a table written anew."""
+    found, count = block(name).subn(lambda _: written(name, summary), page)
+    if count != 1:
+        raise SystemExit(f"{PAGE}: found {count} places for {name}, expected one")
+    return found
+
+
+def main() -> None:
+    """Run the commands, and write their tables."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
+    parser.add_argument("--long", action="store_true", help="also what takes hours")
+    parser.add_argument("--kept", action="store_true", help="from results that are there")
+    options = parser.parse_args()
+    if unknown := [name for name in options.names if name not in FIGURES]:
+        parser.error(f"{', '.join(unknown)}: expected some of {', '.join(FIGURES)}")
+    names = options.names or [n for n, one in FIGURES.items() if options.long or not one.long]
+    if not options.kept:
+        for command in dict.fromkeys(one for name in names for one in FIGURES[name].commands):
+            words = shlex.split(command.format(out=RESULTS.as_posix()))
+            subprocess.run([sys.executable, "-m", "workbench", *words], cwd=ROOT, check=True)
+    for name in names:
+        summary = json.loads((ROOT / RESULTS / FIGURES[name].summary).read_text())
+        PAGE.write_text(placed(PAGE.read_text(), name, summary))
+        print(f"{PAGE.relative_to(ROOT)}: {name}")
+
+
+if __name__ == "__main__":
+    main()
