@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.lab import with_interval
+from workbench.lab import said
 from workbench.report.views import label
 from workbench.systems import load_system
 from workbench.wheelset.accuracy import COVERED, ROWS, Worst
@@ -40,7 +40,7 @@ ASKED = {
 }
 # What the rig plants in the stops of `cases` (`ORDINARY_PADS`), as a laboratory says it.
 PLANTED = {
-    "WaterFilm": "film 100 %; energy 0.45 MJ",
+    "WaterFilm": "film 100 %; E0 450 kJ",
     "SpeedDependentPadFriction": "slope 20 %",
     "BrakeFade": "fade 4.0 % per 100 K",
     "PressureDependentPadFriction": "exponent 4.0 %",
@@ -119,12 +119,14 @@ def covered(summary: Mapping[str, Any]) -> Table:
 
 def causes(summary: Mapping[str, Any]) -> Table:
     """Causes in the order in which they were named, with their sizes."""
-    rows: Table = [["cause", "planted", "estimate"]]
+    rows: Table = [["cause", "planted", "estimate, 95 % interval"]]
     for cause in summary["causes"]:
-        sizes = [
-            f"{name} {with_interval(one['value'], one['low'], one['high'], one['unit'])}"
-            for name, one in cause["parameters"].items()
-        ]
+        sizes = []
+        for name, one in cause["parameters"].items():
+            ends = [one[key] for key in ("value", "low", "high")]
+            # Four digits: three may hide that an interval misses.
+            (value, low, high), unit = said(ends, one["unit"])
+            sizes.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
         planted = PLANTED.get(cause["effect"], "nothing")
         rows.append([cause["effect"], planted, "; ".join(sizes)])
     return rows

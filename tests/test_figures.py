@@ -53,7 +53,7 @@ def test_tables_say_what_was_found() -> None:
     (_, *names), (_, *force), *_ = figures.covered(COVERED)
     assert (len(names), force) == (1, ["94.0 %"])
     found = figures.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
-    estimate = "fade 4.28 % per 100 K (95 %: 4.07 to 4.5)"
+    estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
     assert found[1:] == [["BrakeFade", "fade 4.0 % per 100 K", estimate]]
     headline = {"both of a pair": SHARE, "right cause and no other": {**SHARE, "value": None}}
     assert figures.shares({"answer": {"headline": headline}})[1:] == [
