@@ -136,7 +136,7 @@ def case_figure(result: CaseResult) -> CaseFigure:
     system, case = result.system, result.case
     styles = dict(zip(result.runs, cycle(ESTIMATORS), strict=False))
     window = judged_window(case, system)
-    panels = []
+    judged, panels = case.time[window], []
     for view in views(system):
         panels.append(_seen(result, styles, view))
         if system.objective.judged in view.signals:
@@ -147,9 +147,7 @@ def case_figure(result: CaseResult) -> CaseFigure:
         title=case.title,
         finding=_finding(result),
         time=case.time,
-        window=(float(case.time[window.start]), float(case.time[window.stop - 1]))
-        if window.stop > window.start
-        else None,
+        window=(float(judged[0]), float(judged[-1])) if judged.size else None,
         legend=tuple(_legend(result, styles)),
         panels=tuple(panel for panel in panels if panel.curves),
     )
