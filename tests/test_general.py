@@ -1,4 +1,4 @@
-"""The engine is of no machine: words of the wheelset stand in its own folder alone."""
+"""The engine is of no machine: words of wheelset and train stand in their own folders alone."""
 
 import re
 from pathlib import Path
@@ -37,10 +37,11 @@ def names(system: System) -> set[str]:
 
 def sources() -> list[Path]:
     package = ROOT / "workbench"
+    own = (package / "wheelset", package / "published" / "train")
     return sorted(
         path
         for path in package.rglob("*")
-        if path.suffix in KINDS and not path.is_relative_to(package / "wheelset")
+        if path.suffix in KINDS and not any(map(path.is_relative_to, own))
     )
 
 

@@ -21,6 +21,7 @@ from workbench.power import (
     diagnose_sets,
     open_virtual_rig,
     plan,
+    read_recorded_sets,
     summarise,
 )
 from workbench.power.diagnosing import library_effects
@@ -45,13 +46,21 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     system = load_system(options.system)
     if options.library:
         system = replace(system, library=options.library)
-    reference = options.reference or model_path(system, REFERENCE)
-    rig = open_virtual_rig(system, options.case, reference)
     effects = library_effects(system)
+    if options.recorded:
+        sets = read_recorded_sets(system, options.recorded)
+        with claimed(options.out):
+            output.progress(f"{len(sets.recordings)} recorded sets")
+            return _usual(options, output, system, sets, effects, sets.groups)
+    known = model_path(system, REFERENCE) if REFERENCE in system.models else None
+    rig = open_virtual_rig(system, options.case, options.reference or known)
     with claimed(options.out):
         output.progress(f"sets of {len(rig.recordings)} recordings")
-        checks = {"thresholds": _thresholds, "sheet_error": _sheet_error}
-        return checks.get(options.check, _usual)(options, output, system, rig, effects)
+        if options.check is None:
+            planned = _planned(options, rig, effects)
+            return _usual(options, output, system, rig, effects, planned)
+        check = {"thresholds": _thresholds, "sheet_error": _sheet_error}[options.check]
+        return check(options, output, system, rig, effects)
 
 
 def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -102,8 +111,8 @@ def _usual(
     system: System,
     rig: VirtualRig,
     effects: tuple[Effect, ...],
+    groups: Sequence[Group],
 ) -> Done:
-    groups = _planned(options, rig, effects)
     results, interrupted = _diagnosed(options, output, groups, system, rig, effects, options.out)
     summary = summarise(results, Repertoire(rig.plantables, effects))
     write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)

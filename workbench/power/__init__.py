@@ -7,7 +7,12 @@ from workbench.power.journal import Diagnosed, Journal, Named
 from workbench.power.planting import Findable, Plantable, Planting, Repertoire, plan
 from workbench.power.run import diagnose_sets
 from workbench.power.statistics import CLEAR, VISIBLE, share, summarise
-from workbench.power.virtual_rig import VirtualRig, open_virtual_rig
+from workbench.power.virtual_rig import (
+    RecordedSets,
+    VirtualRig,
+    open_virtual_rig,
+    read_recorded_sets,
+)
 
 __all__ = [
     "CLEAR",
@@ -18,11 +23,13 @@ __all__ = [
     "Named",
     "Plantable",
     "Planting",
+    "RecordedSets",
     "Repertoire",
     "VirtualRig",
     "diagnose_sets",
     "open_virtual_rig",
     "plan",
+    "read_recorded_sets",
     "share",
     "summarise",
 ]

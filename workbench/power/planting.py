@@ -44,7 +44,7 @@ class Plantable:
     signed : whether it is planted in both directions.
     sensed : whether it changes readings only, so that one simulation serves all sizes.
     shapes : what the rig's law has for other parameters of the library's, SI.
-    outside : unit of sizes of an effect that the library does not have [unit].
+    unit_size : unit of sizes [unit]; nan: what matters to the library, which has the effect.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Plantable:
     signed: bool = True
     sensed: bool = False
     shapes: Mapping[str, float] = field(default_factory=dict)
-    outside: float = math.nan
+    unit_size: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,10 @@ class Repertoire:
         return next(one for one in self.plantables if one.name == name)
 
     def size(self, one: Plantable) -> float:
-        """Unit of all sizes, in the unit of the effect: the least that is worth a finding."""
-        return next((e.matters for e in self.effects if e.name == one.effect), one.outside)
+        """Unit of all sizes, in the unit of the effect: the rig's, or the least worth a finding."""
+        if not math.isnan(one.unit_size):
+            return one.unit_size
+        return next((e.matters for e in self.effects if e.name == one.effect), math.nan)
 
     def label(self, effect: str) -> str:
         """Name of the size of an effect of the library in results."""

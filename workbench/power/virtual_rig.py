@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from workbench.companion import companion_part
 from workbench.errors import InputError
-from workbench.power.planting import Plantable, SheetError
+from workbench.power.planting import Group, Plantable, SheetError
 from workbench.system import System
 
 
@@ -15,7 +15,8 @@ class VirtualRig(Protocol):
 
     A companion has one in its module `planting`, which it opens by
     `virtual_rig(names, model) -> VirtualRig`: the recordings that a set is made of, the usual ones
-    if none is named, and the FMU that makes them. Wrong names or files it refuses there.
+    if none is named, and the FMU that makes them, None where there is none. Wrong names or files it
+    refuses there.
     """
 
     @property
@@ -41,13 +42,13 @@ class VirtualRig(Protocol):
         """Write what sensors make of it, as case folders."""
 
 
-def open_virtual_rig(system: System, names: Sequence[str], model: Path) -> VirtualRig:
+def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -> VirtualRig:
     """The virtual rig of a system.
 
     Parameters
     ----------
     names : of the recordings of a set; the usual ones if none is named.
-    model : FMU that makes them.
+    model : FMU that makes them; None where the rig has equations of its own.
 
     Raises
     ------
@@ -63,4 +64,36 @@ def open_virtual_rig(system: System, names: Sequence[str], model: Path) -> Virtu
             remedy='name it as companion = "...", or choose a system that has one',
         )
     found: VirtualRig = planting.virtual_rig(names, model)
+    return found
+
+
+class RecordedSets(VirtualRig, Protocol):
+    """Sets that were recorded, of which somebody says what is wrong in them.
+
+    A companion has them in its module `recorded`, which it reads by
+    `recorded_sets(folders) -> RecordedSets`.
+    """
+
+    @property
+    def groups(self) -> list[Group]:
+        """What each set hides."""
+
+
+def read_recorded_sets(system: System, folders: Sequence[Path]) -> RecordedSets:
+    """Recorded sets of a system, with what is wrong in them.
+
+    Raises
+    ------
+    InputError
+        If the system's companion reads none, or a folder is not understood.
+    """
+    recorded = companion_part(system.companion, "recorded")
+    if recorded is None:
+        raise InputError(
+            where=f"{system.source}, --recorded",
+            found="no companion that reads what is wrong in recorded sets",
+            expected="a Python package with a module 'recorded'",
+            remedy="leave --recorded out: sets are made on the virtual rig",
+        )
+    found: RecordedSets = recorded.recorded_sets(folders)
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from workbench.errors import InputError
 from workbench.fmu import CoSimulation
 from workbench.power.planting import Plantable, SheetError
 from workbench.wheelset import rig
@@ -66,10 +67,10 @@ PLANTABLE = (
     _one("pole_ring", "PoleRingEccentricity", signed=False, sensed=True),
     _one("time_skew", "LoggerTimeSkew", sensed=True),
     # Sizes that disturb the balances about as much as those above.
-    _one("friction_step", outside=0.01),
-    _one("friction_ripple", outside=0.01),
-    _one("drive_beat", sensed=True, outside=0.005),
-    _one("force_drift", sensed=True, outside=2.0),
+    _one("friction_step", unit_size=0.01),
+    _one("friction_ripple", unit_size=0.01),
+    _one("drive_beat", sensed=True, unit_size=0.005),
+    _one("force_drift", sensed=True, unit_size=2.0),
 )
 
 # More than a careful sheet has wrong: a mode is measured to 10 %, an inertia computed to 1 %.
@@ -131,7 +132,7 @@ class PlantedStops:
             write_recording(stop, _effects(gains), _RATE, folder / stop.scenario.name)
 
 
-def virtual_rig(names: Sequence[str], model: Path) -> PlantedStops:
+def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedStops:
     """Stops by name, the six dry standard ones if none is named.
 
     Raises
@@ -139,6 +140,13 @@ def virtual_rig(names: Sequence[str], model: Path) -> PlantedStops:
     InputError
         If there is no stop of a name, or the model is no FMU for Co-Simulation.
     """
+    if model is None:
+        raise InputError(
+            where="system file, [models]",
+            found="no reference model",
+            expected="the multibody model, which makes the stops",
+            remedy="name it, or give --reference",
+        )
     scenarios = tuple(select(names or _USUAL))
     with CoSimulation(model):
         pass  # a file that is no FMU is refused here, once

@@ -1,6 +1,7 @@
 """What `workbench power` may be told."""
 
 import argparse
+from pathlib import Path
 
 from workbench.commands.arguments import (
     Commands,
@@ -33,7 +34,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
         "  python -m workbench power --clean 200 --resume\n"
         "  python -m workbench power --thresholds --sets 8\n"
-        "  python -m workbench power --sheet-error --repeats 2",
+        "  python -m workbench power --sheet-error --repeats 2\n"
+        "  python -m workbench power --system train --recorded labelled healthy",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_sets(parser)
@@ -73,6 +75,15 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         help="multiples of the least size that is worth a finding (default: 0.5 1 2 4)",
     )
     add_seed(parser, "all sets")
+    parser.add_argument(
+        "--recorded",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="FOLDER",
+        help="sets that were recorded, each with a truth.json of what is wrong in them, in place "
+        "of sets that the virtual rig makes",
+    )
     parser.add_argument(
         "--case",
         action="append",

@@ -1,0 +1,123 @@
+"""The virtual train: stops as the model of the train has them, faults that act in their place."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench.case import Case, read_cases
+from workbench.errors import InputError
+from workbench.power import Planting, Repertoire, read_recorded_sets
+from workbench.power.diagnosing import library_effects
+from workbench.published.train.planting import PLANTABLE, PlantedTrain, virtual_rig
+from workbench.systems import load_system, open_model
+
+SYSTEM = load_system("train")
+TRUE_TO_SHEET = {"tolerances": -1.0, "noise": -1.0}
+SHARED = Path(__file__).parent.parent.parent / "shared" / "recordings"
+RIG = virtual_rig(["01_120_service_dry"], None)
+
+
+def stop(folder: Path, gains: dict[str, float], rig: PlantedTrain = RIG) -> Case:
+    rig.write(rig.simulate(1, gains), gains, folder)
+    (case,) = read_cases([folder], SYSTEM)
+    return case
+
+
+def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) -> None:
+    case = stop(tmp_path, TRUE_TO_SHEET)
+    outputs = [one.name for one in SYSTEM.outputs]
+    with open_model(SYSTEM) as model:
+        start = dict(zip(outputs, case.y[0], strict=True))
+        model.start({**start, "vTrain": 0.46 * start["omega1"]}, {})
+        inputs = model.variables([one.name for one in SYSTEM.inputs])
+        found = []
+        for k, u in enumerate(case.u[:-1]):
+            model.set(inputs, u)
+            found.append(model.step(case.time[k + 1] - case.time[k])[model.states.index("omega1")])
+    # Loads that shift by forces, and three discs for one, move a speed of 72 rad/s by a tenth.
+    moving = case["omega1"][1:] > 5.0
+    assert_allclose(np.array(found)[moving], case["omega1"][1:][moving], atol=0.35)
+
+
+@pytest.mark.parametrize("name", [one.name for one in PLANTABLE if one.name.endswith("[3]")])
+def test_a_fault_acts_in_its_place(name: str, tmp_path: Path) -> None:
+    sound = stop(tmp_path / "sound", TRUE_TO_SHEET)
+    size = next(4.0 * one.unit_size for one in PLANTABLE if one.name == name)
+    faulty = stop(tmp_path / "faulty", {**TRUE_TO_SHEET, name: size})
+    n = min(sound.time.size, faulty.time.size) - 60
+    signals = [f"pB{j}" for j in range(1, 5)] + [f"omega{i}" for i in range(1, 9)]
+    if name.startswith("reading"):
+        moved = [np.abs(faulty[s][:n] - sound[s][:n]).max() for s in signals[:4]]
+        assert np.argmax(moved) == 2
+        return
+    # Each axle against the mean of all: what moves the whole train cancels.
+    ratio = [
+        np.array([one[s][:n] for s in signals[4:]]) / np.mean([one[s][:n] for s in signals[4:]], 0)
+        for one in (sound, faulty)
+    ]
+    moved = np.abs(ratio[1] - ratio[0]).max(axis=1)
+    axles = {2} if not name.startswith("lag") else {4, 5}
+    assert set(np.argsort(-moved)[: len(axles)]) == axles
+
+
+def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds() -> None:
+    repertoire = Repertoire(PLANTABLE, library_effects(SYSTEM))
+    known = {one.name for one in repertoire.effects}
+    assert {one.effect for one in PLANTABLE} <= known
+    assert repertoire.size(repertoire.plantable("units[2]")) == 0.25  # four of it are a unit
+
+
+@pytest.mark.parametrize(
+    ("names", "model", "message"),
+    [(["07_night"], None, "no stop of this name"), ([], Path("x.fmu"), "equations of its own")],
+)
+def test_the_rig_refuses_what_it_cannot_do(
+    names: list[str], model: Path | None, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        virtual_rig(names, model)
+
+
+# --- sets that were recorded ---
+
+
+def told(folder: Path, effects: object) -> Path:
+    (folder / "set").mkdir()
+    (folder / "set" / "truth.json").write_text(json.dumps({"effects": effects}))
+    return folder
+
+
+def test_what_a_truth_says_is_what_is_asked_for(tmp_path: Path) -> None:
+    sets = read_recorded_sets(SYSTEM, [told(tmp_path, {"radius_axle": {"at": 2, "size": -2.5}})])
+    assert sets.groups == [
+        (Planting("single", 0, 4.0, {"radius[2]": -2.5e-3}, ("WheelRadius[2]",)),)
+    ]
+
+
+@pytest.mark.parametrize(
+    "effects", [{"rust": {"size": 1}}, {"radius_axle": {"at": 12, "size": 1}}, [1], {"glazing": {}}]
+)
+def test_a_truth_that_is_not_understood_is_refused(effects: object, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a truth that is not understood"):
+        read_recorded_sets(SYSTEM, [told(tmp_path, effects)])
+
+
+def test_folders_without_a_truth_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no set with a truth"):
+        read_recorded_sets(SYSTEM, [tmp_path])
+
+
+def test_a_system_that_reads_no_recorded_sets_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no companion that reads what is wrong"):
+        read_recorded_sets(load_system("wheelset"), [tmp_path])
+
+
+def test_sets_of_the_independent_simulator_are_understood() -> None:
+    folder = SHARED / "train" / "labelled"
+    if not folder.exists():
+        pytest.skip("the recordings are not at hand")
+    found = {next(iter(group[0].effects)) for group in read_recorded_sets(SYSTEM, [folder]).groups}
+    assert {"WeakPads[3]", "IsolatedUnit[6]", "DraggingBrake[5]", "Glazing"} <= found
