@@ -20,6 +20,7 @@ from workbench.rare_events import Tail
 from workbench.stopping import Distance, Effort
 from workbench.stopping.forecast import Forecaster, Question, dimension, forecasting
 from workbench.stopping.past import Known
+from workbench.stopping.plain import quantile
 from workbench.stopping.recorded import Stop, asked_stop, recorded
 from workbench.stopping.standard import (
     Conditions,
@@ -219,6 +220,19 @@ def test_the_safety_level_agrees_with_plain_samples(
     assert found.low < high
 
 
+def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say() -> None:
+    random = np.random.default_rng(5)
+    held = [
+        low <= 0.01 <= high
+        for _ in range(1000)
+        if (found := quantile(np.sort(random.uniform(size=2000)), 0.01)) is not None
+        for _, low, high in [found]
+    ]
+    # 95 %, within three deviations of a thousand trials; ranks are whole, so a little more.
+    assert 0.93 < np.mean(held) < 0.98
+    assert quantile(np.arange(100.0), 0.01) is None  # the first of a hundred has no lower bound
+
+
 @pytest.mark.long
 def test_the_safety_level_agrees_with_many_plain_samples(
     train: System, stopping: Stopping, forecaster: Forecaster
@@ -316,6 +330,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def result(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("result")
     told = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
+    told += ["--plain", "2100"]
     assert main(["distance", "--system", "train", str(folder), *told, "--workers", "1"]) == 0
     return out
 
@@ -347,9 +362,14 @@ def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> 
     assert "5 stops show what happens once in 6" in said["warnings"][0]
     (level,) = said["safety"]
     assert level["low"] < level["ratio"] < level["high"] < 1.0
+    # Of 2100 the 210th; both intervals are of 95 %.
+    (plain,) = said["plain"]["levels"]
+    assert said["plain"]["samples"] == 2100
+    assert plain["low"] < level["high"]
+    assert level["low"] < plain["high"]
     assert {one.name for one in result.iterdir()} == {
         *("distance.json", "distance.png", "distance.svg", "index.html"),
-        *("stops.csv", "quantiles.csv", "safety.csv"),
+        *("stops.csv", "quantiles.csv", "safety.csv", "plain.csv"),
     }
 
 

@@ -23,7 +23,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         system = with_model(system, OBSERVER, options.fmu)
     said = dict(_said(one) for one in options.ask)
     cases = given_cases(options, system)
-    effort = Effort(options.samples, options.safety, seed=options.seed)
+    effort = Effort(options.samples, options.safety, options.seed, options.plain)
     with claimed(options.out):
         found = distance_of_stop(system, cases, said, effort, options.workers, output.stage)
         provenance = {

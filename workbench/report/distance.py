@@ -34,6 +34,8 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
     tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
     if found.safety is not None:
         tables["safety"] = pd.DataFrame(map(asdict, found.safety.levels))
+    if found.plain is not None:
+        tables["plain"] = pd.DataFrame(map(asdict, found.plain.levels))
     for name, table in tables.items():
         write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
     figure = out / "distance.png"

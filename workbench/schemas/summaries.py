@@ -32,6 +32,7 @@ from workbench.schemas.words import (
     summary,
 )
 from workbench.stopping.outcome import SafetyLevel
+from workbench.stopping.plain import PlainLevel
 from workbench.tuning.validation import Fold
 
 
@@ -296,6 +297,7 @@ def _distance() -> Schema:
         "outside": ANY,
         "width": NUMBER,
         "safety": or_null(listed(declared(SafetyLevel))),
+        "plain": or_null(closed({"samples": WHOLE, "levels": listed(declared(PlainLevel))})),
         "stops": listed({"type": "object", "required": ["stop", "held"]}),
         "held": closed({"of": WHOLE, "stops": WHOLE}),
         "warnings": listed(TEXT),

@@ -15,7 +15,7 @@ from workbench.case import Case
 from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
-from workbench.fmu import Matrix
+from workbench.fmu import Matrix, Vector
 from workbench.pool import Pool
 from workbench.rare_events import Descent, Tail
 from workbench.stopping.forecast import (
@@ -27,12 +27,14 @@ from workbench.stopping.forecast import (
 )
 from workbench.stopping.outcome import Distance, Forecast, PastStop, Safety
 from workbench.stopping.past import Past, fitted, places
+from workbench.stopping.plain import Plain
 from workbench.stopping.recorded import Recorded, Stop, asked_stop, recorded
 from workbench.system import System
 from workbench.system_distance import SPEED, Stopping
 
 __all__ = ["Distance", "Effort", "distance_of_stop"]
 
+_PART, _PLAIN = 2000, 7  # plain samples of a task, and their stream of random numbers
 _RUNS = 8  # of subset simulation: the scatter of fewer says little, and processors share them
 
 
@@ -45,11 +47,13 @@ class Effort:
     samples : of the distribution that is asked for.
     decades : down to which the safety level goes; 0: none is asked for.
     seed : the same of which gives the same numbers.
+    plain : samples beside the safety level, each drawn by itself; 0: none.
     """
 
     samples: int = 4000
     decades: int = 9
     seed: int = 1
+    plain: int = 0
 
     @property
     def checked(self) -> int:
@@ -141,6 +145,7 @@ class _Forecasts:
         *each, ahead = [_forecast(one.result()) for one in drawn]
         nominal = self._pool.submit(Forecaster.halt, stop, {}).result().distance
         safety, interrupted = self._safety(asked, nominal)
+        plain, short = self._plain(asked, nominal)
         return Distance(
             system=self._system,
             stop=stop,
@@ -151,7 +156,8 @@ class _Forecasts:
                 for one, model, forecast in zip(self._made, self._model, each, strict=True)
             ),
             safety=safety,
-            interrupted=interrupted,
+            plain=plain,
+            interrupted=interrupted or short,
         )
 
     def _question(self, stop: Stop, without: int | None) -> Question:
@@ -193,6 +199,30 @@ class _Forecasts:
         spent = sum(one for _, one in done) / tail.evaluations
         speed, response = question.stop.asked[SPEED], self._stopping.response
         return Safety.of(tail, effort.decades, speed, response, nominal, spent), interrupted
+
+    def _plain(self, question: Question, nominal: float) -> tuple[Plain | None, bool]:
+        """Plain samples; and whether Ctrl-C left some out."""
+        effort = self._effort
+        sizes = [_PART] * (effort.plain // _PART) + [effort.plain % _PART]
+        parts = [(size, (effort.seed, _PLAIN, k)) for k, size in enumerate(sizes) if size]
+        if not parts:
+            return None, False
+        interrupted = False
+        counted = Pace(self._report, "parts of the plain samples").part(len(parts))
+        under_way: list[Future[Vector]] = []
+        try:
+            for size, seed in parts:
+                under_way.append(self._pool.submit(Forecaster.plainly, question, size, seed))
+                under_way[-1].add_done_callback(counted)
+            wait(under_way)
+        except KeyboardInterrupt:
+            interrupted = True
+            for one in under_way:
+                one.cancel()
+        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+        shortness = np.concatenate([np.empty(0), *done])
+        speed, response = question.stop.asked[SPEED], self._stopping.response
+        return Plain.of(shortness, effort.decades, speed, response, nominal), interrupted
 
 
 def _forecast(drawn: tuple[Matrix, float]) -> Forecast:

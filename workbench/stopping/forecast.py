@@ -5,7 +5,7 @@ model left of the distances of past stops are drawn together.
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -92,6 +92,12 @@ class Forecaster:
     def distances(self, question: Question, points: Matrix) -> Vector:
         """Distances for points (n, d), (n,) [m]."""
         return np.array([one.distance * left for one, left in self._halts(question, points)])
+
+    def plainly(self, question: Question, samples: int, seed: Sequence[int]) -> Vector:
+        """Minus the logarithm of so many distances [m], (n,), each drawn by itself."""
+        count = dimension(question, self._system, self._stopping)
+        points = np.random.default_rng(seed).standard_normal((samples, count))
+        return -np.log(self.distances(question, points))
 
     def descent(
         self, question: Question, decades: int, samples: int, seed: int

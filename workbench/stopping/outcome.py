@@ -11,6 +11,7 @@ import pandas as pd
 from workbench.fmu import Vector
 from workbench.rare_events import Tail, plain_runs
 from workbench.stopping.forecast import stopping_of
+from workbench.stopping.plain import Plain
 from workbench.stopping.recorded import Recorded, Stop
 from workbench.stopping.standard import (
     Conditions,
@@ -178,6 +179,7 @@ class Distance:
     nominal : distance of the model as its sheet says it [m].
     past : stops that were made.
     safety : None where it was not asked for, or interrupted early.
+    plain : the same by plain samples; None where they were not asked for.
     interrupted : whether runs are missing.
     """
 
@@ -187,6 +189,7 @@ class Distance:
     nominal: float
     past: tuple[PastStop, ...]
     safety: Safety | None
+    plain: Plain | None
     interrupted: bool
 
     @property
@@ -288,6 +291,8 @@ class Distance:
             lines.append(f"{away} are beyond what the model claims: {', '.join(reasons)}")
         if self.safety is not None:
             lines += ["", *_told(self.safety)]
+        if self.plain is not None:
+            lines += self.plain.told()
         lines += [f"warning: {one}" for one in self.warnings]
         return "\n".join(lines)
 
@@ -348,6 +353,7 @@ class Distance:
             "outside": self.ahead.outside,
             "width": self.ahead.width,
             "safety": None if self.safety is None else [asdict(one) for one in self.safety.levels],
+            "plain": None if self.plain is None else asdict(self.plain),
             "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
             "held": {"of": len(self.claimed), "stops": sum(one.held for one in self.claimed)},
             "warnings": self.warnings,

@@ -32,7 +32,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         epilog="examples:\n"
         "  python -m workbench distance --system my_machine my_stops\n"
         "  python -m workbench distance --system my_machine my_stops --ask speed='160 km/h'\n"
-        "  python -m workbench distance --system my_machine my_stops --safety 0",
+        "  python -m workbench distance --system my_machine my_stops --safety 0\n"
+        "  python -m workbench distance --system my_machine my_stops --plain 100000",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/distance")
@@ -58,6 +59,14 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         default=4000,
         metavar="N",
         help="stops of the distribution (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--plain",
+        type=count,
+        default=0,
+        metavar="N",
+        help="check the safety level by so many stops, each drawn by itself; 1e5 take minutes, 1e7 "
+        "hours, and Ctrl-C keeps those that are drawn (default: %(default)s)",
     )
     parser.add_argument(
         "--fmu",
