@@ -12,7 +12,7 @@ from workbench.resources import installing
 PURPOSES = {
     "compiler": "Modelica to FMU: diagnose, power, export, bench, systems without a built FMU",
     "files": "import of Excel, MDF, TDMS, MAT 7.3, Parquet",
-    "cluster": "tune on a Dask cluster",
+    "cluster": "tune, monitor --fleet on a Dask cluster; recordings at URLs",
     "completion": "workbench completion",
     "docs": "make docs",
     "dev": "make test",

@@ -3,17 +3,19 @@
 import argparse
 import time
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from workbench.commands.extras import require_compiler
+from workbench.commands.monitor_fleet import provenance_of, run_fleet
 from workbench.commands.output import Done, Output, read_result
 from workbench.diagnosis import diagnose, read_effects
+from workbench.errors import InputError
 from workbench.files import claimed
 from workbench.modelica import read_library
 from workbench.monitoring import Monitored, monitor
 from workbench.monitoring.cause import known_from_before, recordings_after
 from workbench.prepare import read_recorded
-from workbench.provenance import models, run_of, software
 from workbench.report.diagnosis import write_diagnosis
 from workbench.report.monitoring import write_monitored
 from workbench.system import OBSERVER
@@ -22,26 +24,30 @@ from workbench.systems import load_system
 
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Estimate what is new, and watch all."""
-    system = load_system(options.system)
+    if options.fleet:
+        return run_fleet(options, output)
+    if options.cluster is not None:
+        raise InputError(
+            where="command line, --cluster",
+            found="one machine, whose recordings processes of this one estimate",
+            expected="a fleet",
+            remedy="add --fleet, or leave --cluster out",
+        )
+    system, history = load_system(options.system), Path(options.history)
     if options.diagnose:
         require_compiler()
     with claimed(options.out):
         begin = time.perf_counter()
         found = monitor(
             system,
-            options.history,
+            history,
             options.out,
             rate=options.false_alarms,
             workers=options.workers,
             read=read_recorded,
             step=partial(output.step, begin=begin),
         )
-        provenance = {
-            "run": run_of("monitor", system, {"history": options.history}),
-            **software(("fmpy", "numpy", "scipy", "numba")),
-            "system": system.name,
-            "fmu": models(system, [OBSERVER])[OBSERVER],
-        }
+        provenance = provenance_of(system, history)
         page = write_monitored(found, provenance, options.out)
         output.result(found.summary())
         output.result(f"to read: {page}, data and figure beside it")
@@ -62,7 +68,7 @@ def _cause(
     effects = read_effects(library, system.models[OBSERVER].name)
     names = recordings_after(found)
     output.stage(f"cause of the change, from {', '.join(names)}")
-    cases = [read_recorded(options.history / name, system) for name in names]
+    cases = [read_recorded(Path(options.history) / name, system) for name in names]
     outcome = diagnose(system, cases, library, effects, out, options.workers, output.stage)
     page = write_diagnosis(outcome, provenance, out, options.workers)
     output.result(outcome.summary())

@@ -49,6 +49,7 @@ def summaries() -> dict[str, Schema]:
         "next": _next(),
         "distance": _distance(),
         "monitor": _monitor(),
+        "fleet": _fleet(),
     }
     for name in companions():
         if part := companion_part(name, "schemas"):
@@ -328,3 +329,15 @@ def _monitor() -> Schema:
     }
     provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
     return summary("monitor", closed(provenance), entries)
+
+
+def _fleet() -> Schema:
+    machine = {"machine": NAMED, "recordings": WHOLE, "alarms": WHOLE, "refusal": TEXT}
+    entries = {
+        "recordings": WHOLE,
+        "seconds": NUMBER,
+        "machines": listed(closed(machine)),
+        "interrupted": FLAG,
+    }
+    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
+    return summary("monitor --fleet", closed(provenance), entries)

@@ -1,7 +1,6 @@
 """What `workbench monitor` may be told."""
 
 import argparse
-from pathlib import Path
 
 from workbench.commands.arguments import (
     Commands,
@@ -27,15 +26,16 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "with or without alarms.",
         epilog="examples:\n"
         "  python -m workbench monitor my_recordings --system my_machine --out results/mine\n"
-        "  python -m workbench monitor stops --system train --false-alarms 0.001",
+        "  python -m workbench monitor stops --system train --false-alarms 0.001\n"
+        "  python -m workbench monitor trains --system train --fleet",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "history",
-        type=Path,
         metavar="HISTORY",
         help="folder that holds a folder for each recording of one machine: cases, or as the "
-        "machine wrote them, where 'workbench prepare' reads that",
+        "machine wrote them, where 'workbench prepare' reads that; with --fleet, a folder or a URL "
+        "with such a folder for each machine",
     )
     add_system(parser)
     parser.add_argument(
@@ -52,6 +52,18 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="name the cause of what has changed, too: a diagnosis of the last recordings, of a "
         "machine that those before the change have told; into OUT/cause, takes minutes, needs the "
         "extra [compiler]",
+    )
+    parser.add_argument(
+        "--fleet",
+        action="store_true",
+        help="watch many machines, one task for each; HISTORY may be a URL of an object storage, "
+        "such as s3://bucket/fleet, which fsspec reads (extra [cluster])",
+    )
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="with --fleet: scheduler of a Dask cluster to work on instead; needs the extra "
+        "[cluster]",
     )
     add_out(parser, "results/monitor")
     add_workers(parser)
