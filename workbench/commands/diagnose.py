@@ -1,21 +1,24 @@
 """`workbench diagnose`: what a simulation gets wrong, the cause, and a better model."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from importlib.metadata import version
+from typing import Any
 
 from workbench.case import Case
 from workbench.commands.extras import require_compiler
 from workbench.commands.inputs import given_cases
 from workbench.commands.output import Done, Output, read_result
-from workbench.diagnosis import Effect, choose, diagnose, read_effects
+from workbench.diagnosis import Effect, Outcome, choose, diagnose, read_effects
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import Library, read_library
+from workbench.proposing import propose
 from workbench.provenance import run_of, sources
 from workbench.report.diagnosis import write_diagnosis
+from workbench.report.proposal import write_proposal
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system, open_model
@@ -56,6 +59,29 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         return _run(options, output, system, library, effects, cases, held_out)
 
 
+def _propose(
+    options: argparse.Namespace,
+    output: Output,
+    outcome: Outcome,
+    library: Library,
+    effects: tuple[Effect, ...],
+    held_out: Sequence[Case],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Propose a law, if no effect explains what is missing."""
+    if outcome.diagnosis.verdict != "unexplained":
+        output.result("\nNo law is proposed: the verdict does not ask for one.")
+        return
+    folder = options.out / "proposed"
+    found = propose(
+        *(outcome.system, outcome.cases, library, effects, folder, options.workers, output.stage),
+        held_out=held_out,
+    )
+    page = write_proposal(found, provenance, folder, options.workers)
+    output.result(f"\n{found.summary()}")
+    output.result(f"to read: {page or folder / 'proposal.json'}, data and figures beside it")
+
+
 def _run(
     options: argparse.Namespace,
     output: Output,
@@ -81,6 +107,8 @@ def _run(
         }
     output.result(outcome.summary())
     page = write_diagnosis(outcome, provenance, options.out, options.workers)
+    if options.propose:
+        _propose(options, output, outcome, library, effects, held_out, provenance)
     output.stage("done")
     output.result(f"to read: {page}, data and figures beside it")
     status = 130 if outcome.diagnosis.interrupted else 0

@@ -52,6 +52,7 @@ __all__ = [
     "Residuals",
     "choose",
     "diagnose",
+    "given_values",
     "read_effects",
 ]
 
@@ -98,7 +99,7 @@ def diagnose(
         everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, effects, everything)
-        given = _given(everything, system)
+        given = given_values(everything, system)
         with Simulations(
             *(everything, system, given, cases, workers), report=report
         ) as simulations:
@@ -182,7 +183,7 @@ def build_everything(
     build(library, EVERYTHING, text, path, every_platform=False)
 
 
-def _given(everything: Path, system: System) -> dict[str, float]:
+def given_values(everything: Path, system: System) -> dict[str, float]:
     """Parameters of the diagnosed model that differ from the library's defaults.
 
     Raises

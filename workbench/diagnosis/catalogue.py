@@ -10,10 +10,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from workbench.diagnosis.annotation import Said
 from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError, closest
 from workbench.modelica import Class, Library
+from workbench.recording import Matrix
 
 _TURNING = ("cosine", "sine")
 _ARRAY = re.compile(r"zeros\((\w+)\)")
@@ -111,6 +114,11 @@ class Effect:
     def order_locked(self) -> bool:
         """Whether the effect turns with a shaft, with a phase of its own in each stop."""
         return self.size == _TURNING[0]
+
+    @property
+    def precision(self) -> Matrix:
+        """Inverse covariance of its sizes as known beforehand; empty where nothing is."""
+        return np.zeros((0, 0))
 
     @property
     def sizes(self) -> tuple[str, ...]:

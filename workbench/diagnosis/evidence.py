@@ -152,6 +152,23 @@ class Simulations:
         )
         return [found[k] for k in range(len(self.recordings))]
 
+    def responses(
+        self,
+        points: Sequence[Mapping[str, float]],
+        columns: Sequence[Variation],
+        courses: Sequence[Matrix],
+    ) -> list[Matrix]:
+        """As `derivatives`, of columns that act by factors `courses` of each recording, (n, p)."""
+        found = self._gathered(
+            {k: (Simulator.derivatives, k, points[k], columns, courses[k]) for k in self._order}
+        )
+        return [found[k] for k in range(len(self.recordings))]
+
+    def along(self, points: Sequence[Mapping[str, float]], watched: Sequence[str]) -> list[Matrix]:
+        """Variables of the FMU at the samples of every recording, each (n, w); see `at`."""
+        found = self._gathered({k: (Simulator.along, k, points[k], watched) for k in self._order})
+        return [found[k] for k in range(len(self.recordings))]
+
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""
         if self._alone or len(items) < 2:

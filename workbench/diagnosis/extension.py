@@ -15,7 +15,7 @@ from workbench.diagnosis.slots import Slot, read_slots
 from workbench.errors import InputError
 from workbench.modelica import PACKAGE, Library, files, packages
 
-_USED = "Used"  # before the name of another library
+USED = "Used"  # before the name of another library
 
 
 def component(name: str) -> str:
@@ -77,7 +77,7 @@ def source(
             label += "Slot"  # it would hide the library
         used |= {one.partition(".")[0] for one in (slot.partial, slot.nominal)} - {library.name}
         slot = replace(
-            slot, partial=_written(slot.partial, library), nominal=_written(slot.nominal, library)
+            slot, partial=written(slot.partial, library), nominal=written(slot.nominal, library)
         )
         if slot.chained or len(inside) == 1:
             nested.append(_chain(label, slot, inside))
@@ -87,7 +87,7 @@ def source(
     modifiers = ",\n".join(redeclared)
     return (
         f'model {name} "{about}"\n'
-        + "".join(f"  import {_USED}{one} = {one};\n" for one in sorted(used))
+        + "".join(f"  import {USED}{one} = {one};\n" for one in sorted(used))
         + f"  extends {library.find(base).name}(\n{modifiers});\n\n"
         + "\n".join(nested)
         + f"end {name};\n"
@@ -110,9 +110,9 @@ def _modifiers(parameters: Mapping[str, float]) -> list[str]:
     return [f"{name}={value}" for name, value in written.items()]
 
 
-def _written(name: str, library: Library) -> str:
+def written(name: str, library: Library) -> str:
     """A class as the extended model names it, in which the library may hide another one."""
-    return name if name.partition(".")[0] == library.name else _USED + name
+    return name if name.partition(".")[0] == library.name else USED + name
 
 
 def _chain(label: str, slot: Slot, given: Mapping[str, Mapping[str, str]]) -> str:
@@ -227,14 +227,20 @@ def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: 
 
         platforms = list(compiler.PLATFORMS) if every_platform else [compiler.native()]
         with tempfile.TemporaryDirectory() as scratch:
-            package = Path(scratch) / library.name / PACKAGE
-            _copy(library.file, package)
-            for used in packages(library.file)[1:]:
-                _copy(used, Path(scratch) / used.parent.name / PACKAGE)
+            package = copied(library, Path(scratch))
             package.with_name(f"{name}.mo").write_text(f"within {library.name};\n{text}")
             compiler.build(package, f"{library.name}.{name}", path, platforms=platforms)
 
     shelf.fetch(shelf.key(library.file, name, text, f"{every_platform}"), fmu, make)
+
+
+def copied(library: Library, folder: Path) -> Path:
+    """Copy a library and those that it uses into a folder; returns its `package.mo` there."""
+    package = folder / library.name / PACKAGE
+    _copy(library.file, package)
+    for used in packages(library.file)[1:]:
+        _copy(used, folder / used.parent.name / PACKAGE)
+    return package
 
 
 def _copy(library: Path, package: Path) -> None:

@@ -106,7 +106,8 @@ class Fit:
     def at(self, point: Point) -> Linearised:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
         evidence = self._shown(self._simulations.at(self.unknowns.values(point)))
-        away = float(np.square(point.deviations).sum()) + self._prior(point, list(point.levels)).c
+        known = self._prior(point, [*point.sizes, *point.levels])
+        away = float(np.square(point.deviations).sum()) + known.c
         slow, excess = slowness(evidence, self.lasting), self.decides.excess
         return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
 
@@ -243,6 +244,14 @@ class Fit:
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
         N, g, c = np.zeros((len(shared),) * 2), np.zeros(len(shared)), 0.0
+        for effect in {name: self.unknowns.effects.get(name) for name, _ in point.sizes}.values():
+            if effect is None or not len(effect.precision):
+                continue
+            at = [shared.index((effect.name, parameter)) for parameter in effect.sizes]
+            z = np.array([point.sizes[effect.name, parameter] for parameter in effect.sizes])
+            N[np.ix_(at, at)] = effect.precision
+            g[at] = effect.precision @ z
+            c += float(z @ effect.precision @ z)
         for j, key in enumerate(shared):
             if key not in point.levels:
                 continue

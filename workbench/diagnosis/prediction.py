@@ -9,7 +9,7 @@ methods).
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from workbench.diagnosis.samples import Samples
 from workbench.diagnosis.steps import Steps, step, steps
-from workbench.diagnosis.tangent import Tangent, advance, renew, tangent, tell
+from workbench.diagnosis.tangent import Tangent, advance, renew, share, tangent, tell
 from workbench.fmu import FMU, Matrix
 from workbench.kernel import checked, compiled, instance, place, read, set_inputs, set_states
 from workbench.system import System
@@ -115,6 +115,7 @@ def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work
                     work.to[j] = u[k - 1, j] + moved
                 status = step(model, work, interval / count)
                 if varied and not status:
+                    share(tangent, k, i / count)
                     status = advance(model, tangent, work.stiff, interval / count)
                 if status:
                     return status
@@ -156,12 +157,20 @@ class Predictor:
     fmu : model with the states, inputs and readings of the system; it must outlive the predictor.
     signals : that are predicted.
     parts : of a sample time, one step each.
+    watched : variables that `along` tells.
     """
 
-    def __init__(self, fmu: FMU, system: System, signals: Sequence[str], parts: int = 1) -> None:
+    def __init__(
+        self,
+        fmu: FMU,
+        system: System,
+        signals: Sequence[str],
+        parts: int = 1,
+        watched: Sequence[str] = (),
+    ) -> None:
         self._fmu, self._system = fmu, system
         inputs = [one.name for one in system.inputs]
-        readings = [system.signals[name].reading for name in signals]
+        readings = [*(system.signals[name].reading for name in signals), *watched]
         self._model = instance(fmu, inputs, system.corrections, readings)
         self._longest = _LONGEST * system.sample_time / parts
         leading = system.comparison.leading
@@ -195,12 +204,27 @@ class Predictor:
         """
         return self.derivatives(samples, values, ())[0]
 
+    def along(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
+        """What is watched, at each sample of a recording, (n, w); see `errors`."""
+        count = len(self._model.y) - samples.y.shape[1]
+        y = np.hstack([samples.y, np.zeros((samples.time.size, count))])
+        found: Matrix = -self.errors(replace(samples, y=y), values)[:, samples.y.shape[1] :]
+        return found
+
     def derivatives(
-        self, samples: Samples, values: Mapping[str, float], columns: Sequence[Variation]
+        self,
+        samples: Samples,
+        values: Mapping[str, float],
+        columns: Sequence[Variation],
+        courses: Matrix | None = None,
     ) -> tuple[Matrix, Tangent]:
         """Prediction errors along one recording, and their derivatives by p columns.
 
         The FMU is left at the last sample. See `errors`.
+
+        Parameters
+        ----------
+        courses : (n, p) factors by which the columns act at each sample, if they change in time.
         """
         fmu, values = self._fmu, {**self.begin(samples), **values}
         for column in columns:
@@ -212,7 +236,7 @@ class Predictor:
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         work = self._steps()
         varied = [column.variables for column in columns]
-        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff.size)
+        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff.size, courses)
         status = _predict(
             self._model,
             samples.time[:end],

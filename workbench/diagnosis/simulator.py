@@ -61,6 +61,7 @@ class Simulator:
     def __init__(self, given: Simulated) -> None:
         self._fmu = FMU(given.path)
         self._recordings = given.recordings
+        self._system, self._parts = given.system, given.parts
         signals = given.recordings[0].signals
         self._predictor = Predictor(self._fmu, given.system, signals, given.parts)
         self._delays = {
@@ -79,6 +80,12 @@ class Simulator:
         one = self._recordings[number]
         found: Matrix = self._simulated(number, values)[0][one.told]
         return found
+
+    def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
+        """Variables of the FMU at each sample of one recording, (n, w)."""
+        one = self._recordings[number]
+        predictor = Predictor(self._fmu, self._system, one.signals, self._parts, watched)
+        return predictor.along(one, self._known(values))
 
     def begin(self, number: int) -> dict[str, float]:
         """Start values of states that a recording's outputs show."""
@@ -112,16 +119,24 @@ class Simulator:
         number: int,
         values: Mapping[str, float],
         columns: Sequence[Variation],
+        courses: Matrix | None = None,
     ) -> Matrix:
-        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p)."""
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
+
+        Parameters
+        ----------
+        courses : (n, p) factors by which the columns act at each sample, if they change in time;
+            what is read at rest does not change then.
+        """
         one, fmu = self._recordings[number], self._fmu
         jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
         for part in _compatible(columns):
             varied = [columns[j] for j in part]
-            _, found = self._predictor.derivatives(one, self._known(values), varied)
+            shares = None if courses is None else courses[:, part]
+            _, found = self._predictor.derivatives(one, self._known(values), varied, shares)
             by = self._whitened(number, self._late(number, found.errors, values))
             jacobian[:-1, part] = by.reshape(-1, len(part))
-            if self._rest is not None:
+            if self._rest is not None and courses is None:
                 place = self._rest.references
                 slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ found.states)[0]
                 for q, column in enumerate(varied):

@@ -27,6 +27,9 @@ class Tangent(NamedTuple):
     ----------
     knowns, edges, seeds : (r,) parameters of all columns, (p + 1,) where each column's begin, (r,)
         ones.
+    courses : (k, p) factors by which parameters act at each sample, one row or none: they are 1.
+    shares : (p,) those of the present point.
+    alike : (p,) whether a column is of the same parameters as the one before it.
     states : (n, p) derivatives of the states.
     errors : (k, c, p) derivatives of the prediction errors of each sample.
     turn : (1,) which of two points is the present one; the other is where a step begins.
@@ -38,6 +41,9 @@ class Tangent(NamedTuple):
     knowns: References
     edges: NDArray[np.intp]
     seeds: Vector
+    courses: Matrix
+    shares: Vector
+    alike: NDArray[np.bool_]
     states: Matrix
     errors: NDArray[np.float64]
     turn: NDArray[np.intp]
@@ -51,6 +57,7 @@ class Tangent(NamedTuple):
     moved: Matrix
     rates: Matrix
     system: Matrix
+    along: Vector
 
 
 def tangent(
@@ -59,6 +66,7 @@ def tangent(
     columns: Sequence[Sequence[str]],
     samples: int,
     stiff: int,
+    courses: Matrix | None = None,
 ) -> Tangent:
     """Prepare derivatives for a run.
 
@@ -67,6 +75,7 @@ def tangent(
     columns : variables of the FMU that each column varies together, of a state its start.
     samples : of the run.
     stiff : number of states that are stepped implicitly.
+    courses : (samples, p) of parameters that act by a factor that changes in time, if any does.
     """
     n, p, c = len(fmu.states), len(columns), model.y.size
     acting = [[name for name in column if name not in fmu.states] for column in columns]
@@ -76,6 +85,9 @@ def tangent(
         fmu.variables(names).references,
         np.cumsum([0, *(len(column) for column in acting)]),
         np.ones(len(names)),
+        np.zeros((0, p)) if courses is None else np.ascontiguousarray(courses),
+        np.ones(p) if courses is None else courses[0].copy(),
+        np.array([q > 0 and acting[q] == acting[q - 1] for q in range(p)], np.bool_),
         np.reshape(begin, (n, p)),
         np.zeros((samples if p else 1, c, p)),
         np.zeros(1, np.intp),
@@ -85,6 +97,7 @@ def tangent(
         np.zeros((2, n * (n + c))),
         *(np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p))),
         np.zeros((stiff, stiff + p)),
+        np.zeros(n + c),
     )
 
 
@@ -113,9 +126,24 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
         first = tangent.edges[q]
         knowns, seeds = tangent.knowns[first:], tangent.seeds[first:]
         number = tangent.edges[q + 1] - first
-        if number and direction(model, knowns, number, seeds, tangent.by_columns[now, q], unknowns):
+        if number == 0:
+            continue
+        if not tangent.alike[q] and direction(
+            model, knowns, number, seeds, tangent.along, unknowns
+        ):
             return 1
+        for i in range(unknowns):
+            tangent.by_columns[now, q, i] = tangent.shares[q] * tangent.along[i]
     return 0
+
+
+@compiled
+def share(tangent, k, part):  # type: ignore[no-untyped-def]
+    """Take the factors of parameters at a part of the way from sample k - 1 to sample k."""
+    if tangent.courses.shape[0] > 0:
+        for q in range(tangent.shares.size):
+            before = tangent.courses[k - 1, q]
+            tangent.shares[q] = before + part * (tangent.courses[k, q] - before)
 
 
 @compiled

@@ -31,6 +31,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench diagnose my_recordings --held-out 'cold_*'\n"
         "  python -m workbench diagnose new_recordings --fmu results/mine/model/Extended.fmu\n"
         "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
+        "  python -m workbench diagnose my_recordings --propose\n"
         "  python -m workbench diagnose --list",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -60,6 +61,12 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         choices=("native", "all"),
         default="native",
         help="of the extended FMU: this machine's, or all (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--propose",
+        action="store_true",
+        help="if something is missing that no effect explains, infer a law for it: where it acts, "
+        "on what it depends, its form (into OUT/proposed)",
     )
     add_workers(parser)
     add_pdf(parser)

@@ -1,0 +1,128 @@
+"""A law for what no effect explains: where it acts, what it depends on, and its form.
+
+laws about the nominal model, by evidence -> free functions, fitted -> closed forms of the best
+    -> diagnosis with these beside the catalogue, on recordings that were held out
+"""
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis import Effect, Outcome, diagnose, read_effects
+from workbench.diagnosis.search import Reporter
+from workbench.diagnosis.thresholds import thresholds
+from workbench.files import write_whole
+from workbench.modelica import Library
+from workbench.proposing.forms import Candidate, candidates
+from workbench.proposing.free import Estimate, estimated
+from workbench.proposing.outcome import Proposal
+from workbench.proposing.scan import Prospect, Scan
+from workbench.proposing.writing import PACKAGE, extended_library, package
+from workbench.system import OBSERVER, System
+
+__all__ = ["Proposal", "propose"]
+
+_TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
+_MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
+
+
+def propose(
+    system: System,
+    cases: Sequence[Case],
+    library: Library,
+    effects: Sequence[Effect],
+    out: Path,
+    workers: int,
+    report: Reporter,
+    *,
+    held_out: Sequence[Case] = (),
+) -> Proposal:
+    """Infer a law from recordings that no effect of a catalogue explains.
+
+    Parameters
+    ----------
+    system, cases, library, effects, held_out : as of a diagnosis that ended unexplained.
+    out : folder of the extended model and of the generated classes.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If the library cannot be compiled, or the model is none of this library.
+    """
+    scan = Scan(system, library, cases, workers, report)
+    able = _likeliest(scan.prospects)
+    estimates = estimated(system, library, cases, workers, report, able) if able else []
+    # Odds that chance turns at the rate of false alarms.
+    odds = 0.5 * thresholds(len(scan.prospects)).tied
+    tied = [one for one in estimates if estimates[0].evidence - one.evidence < odds]
+    if not tied or tied[0].evidence < odds:
+        return Proposal(system, tuple(scan.prospects), tuple(estimates), (), {}, None)
+    forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
+    outcome = _diagnosed(
+        system, cases, library, effects, forms, out, workers, report, held_out=held_out
+    )
+    return Proposal(system, tuple(scan.prospects), tuple(estimates), tuple(tied), forms, outcome)
+
+
+def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
+    """The best law of each place and of what it depends on, however it is carried."""
+    best: dict[tuple[str, ...], Prospect] = {}
+    for one in prospects:
+        influence = one.law.influence
+        if one.smoothness.evidence <= 0.0:
+            continue
+        factors = () if influence is None else tuple(part.name for part in influence.factors)
+        kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
+        best.setdefault((one.law.place.name, kind, *factors), one)
+    return list(best.values())[:_TRIED]
+
+
+def _forms(estimate: Estimate) -> list[Candidate]:
+    """Closed forms of a law."""
+    prospect = estimate.prospect
+    matters = _MATTERS
+    if prospect.law.carrier.expression == "1.0":
+        # Of an output that is nominally zero, of what it seems to be.
+        matters *= prospect.largest or float(np.abs(estimate.function()[1]).max())
+    return list(candidates(prospect.law, prospect.knots, matters))
+
+
+def _diagnosed(
+    system: System,
+    cases: Sequence[Case],
+    library: Library,
+    effects: Sequence[Effect],
+    forms: dict[str, Candidate],
+    out: Path,
+    workers: int,
+    report: Reporter,
+    *,
+    held_out: Sequence[Case],
+) -> Outcome:
+    """Diagnose with closed forms beside the catalogue; of equals what it has is named."""
+    report(f"{len(forms)} closed forms beside {len(effects)} effects")
+    with tempfile.TemporaryDirectory() as scratch:
+        written = [one.written for one in forms.values()]
+        extended = extended_library(library, written, Path(scratch))
+        every = read_effects(extended, system.models[OBSERVER].name)
+        # The likelier law first, and the simpler form: of equals the first is named.
+        order = list(forms)
+        own = sorted(
+            (one for one in every if one.name in forms), key=lambda one: order.index(one.name)
+        )
+        outcome = diagnose(
+            *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
+        )
+    named = [one for cause in outcome.diagnosis.causes for one in _named(cause.effect, forms)]
+    if outcome.extension is not None and named:
+        text = package(library, [one.written for one in named])
+        write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
+    return outcome
+
+
+def _named(effect: Effect, forms: dict[str, Candidate]) -> list[Candidate]:
+    return [forms[effect.name]] if effect.name in forms else []

@@ -1,0 +1,203 @@
+"""Free functions in place of what is missing, fitted in full: how a law looks."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis import given_values
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.extension import build, source
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.linearised import Linearised
+from workbench.diagnosis.quadratic import Key
+from workbench.diagnosis.search import Fitted, Reporter, fitted
+from workbench.fmu import Matrix, Vector
+from workbench.modelica import Library
+from workbench.proposing.places import Law
+from workbench.proposing.scan import Prospect, effect_at, eliminated
+from workbench.proposing.splines import COEFFICIENTS, smoothest
+from workbench.proposing.writing import Written, clock, extended_library, number, unit_of
+from workbench.system import OBSERVER, System
+
+_ROUNDS = 2  # of fit and smoothness
+_BEGUN = (1.0, 0.5, 0.25, 0.1)  # shares of a function that a fit begins with
+_POINTS = 101  # of a function that is drawn
+
+
+@dataclass(frozen=True)
+class Free(Effect):
+    """An effect that is a free function.
+
+    Attributes
+    ----------
+    count : of its coefficients.
+    inverse : covariance of its coefficients beforehand, inverted.
+    """
+
+    count: int = COEFFICIENTS
+    inverse: Matrix = field(default_factory=lambda: np.zeros((0, 0)), compare=False)
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Coefficients."""
+        return tuple(f"c{k}" for k in range(self.count))
+
+    @property
+    def precision(self) -> Matrix:
+        """Inverse covariance of the coefficients beforehand."""
+        return self.inverse
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A law, fitted as a free function.
+
+    Attributes
+    ----------
+    prospect : about the nominal model.
+    deviance : of the fit, see `Linearised`.
+    evidence : log of the marginal likelihood over that of the nominal model.
+    coefficients, posterior : of the function, (K,) and their covariance, (K, K).
+    """
+
+    prospect: Prospect
+    deviance: float
+    evidence: float
+    coefficients: Vector
+    posterior: Matrix
+
+    @property
+    def law(self) -> Law:
+        """Where it acts, and what it depends on."""
+        return self.prospect.law
+
+    def function(self) -> tuple[Vector, Vector, Vector]:
+        """What it depends on, its function, and the standard deviation of that; (n,) each."""
+        knots = self.prospect.knots
+        if knots is None:
+            return np.zeros(1), self.coefficients, np.sqrt(np.diag(self.posterior))
+        values = np.linspace(knots.low, knots.high, _POINTS)
+        basis = knots.basis(values)
+        sigma = np.sqrt(np.einsum("ij,jk,ik->i", basis, self.posterior, basis))
+        return values, basis @ self.coefficients, sigma
+
+
+def _written(name: str, prospect: Prospect) -> Written:
+    """The class of a free function."""
+    law, knots = prospect.law, prospect.knots
+    about = f"Free function: {law.text}"
+    if law.influence is None or knots is None:
+        declared_ = f"parameter Real c0({unit_of(law.carrier.unit)}) = 0.0;"
+        change = f"{law.carrier.expression}*c0"
+        return Written(name, about, law.place, (declared_,), (), change)
+    last = COEFFICIENTS - 3
+    declared, equations = clock(law.influence)
+    terms = " + ".join(f"c{k}*({_bump(k - 1)})" for k in range(COEFFICIENTS))
+    inside = f"({law.influence.expression} - ({number(knots.low)}))/{number(knots.step)}"
+    return Written(
+        name=name,
+        about=about,
+        place=law.place,
+        declarations=(
+            *(
+                f"parameter Real c{k}({unit_of(law.carrier.unit)}) = 0.0;"
+                for k in range(COEFFICIENTS)
+            ),
+            *declared,
+            'Real x(unit="1") "Place among the knots";',
+        ),
+        equations=(*equations, f"x = noEvent(max(0.0, min({number(last)}, {inside})));"),
+        change=f"{law.carrier.expression}*({terms})",
+    )
+
+
+def _bump(knot: int) -> str:
+    """Cubic B-spline about a knot, of x."""
+    away = f"abs(x - ({number(knot)}))"
+    return f"(noEvent(max(0.0, 2.0 - {away}))^3 - 4.0*noEvent(max(0.0, 1.0 - {away}))^3)/6.0"
+
+
+def estimated(
+    system: System,
+    library: Library,
+    cases: Sequence[Case],
+    workers: int,
+    report: Reporter,
+    prospects: Sequence[Prospect],
+) -> list[Estimate]:
+    """Fit free functions in full, best first.
+
+    What is large bends what the other quantities do, so that each function is fitted anew about
+    where it led, with the smoothness that is likeliest there.
+    """
+    base = system.models[OBSERVER].name
+    names = [f"Free{k}" for k in range(len(prospects))]
+    with tempfile.TemporaryDirectory() as scratch:
+        written = [_written(name, one) for name, one in zip(names, prospects, strict=True)]
+        extended = extended_library(library, written, Path(scratch))
+        effects = [
+            Free(
+                **vars(effect_at(name, library, one.law.place, "c0")),
+                count=len(one.smoothness.coefficients),
+            )
+            for name, one in zip(names, prospects, strict=True)
+        ]
+        path = Path(scratch) / "Free.fmu"
+        text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
+        report(f"compiling {len(effects)} free functions")
+        build(extended, "FreeFunctions", text, path, every_platform=False)
+        given = given_values(path, system)
+        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+            none = Fit(simulations, effects)
+            nominal = fitted(none, none.at(none.unknowns.start()), ())
+            report("fitting free functions")
+            job = partial(_estimate, simulations, nominal)
+            found = none.together(job, list(zip(effects, prospects, strict=True)))
+    return sorted(found, key=lambda one: -one.evidence)
+
+
+def _estimate(simulations: Simulations, nominal: Fitted, item: tuple[Free, Prospect]) -> Estimate:
+    effect, prospect = item
+    smoothness, best = prospect.smoothness, nominal
+    keys = [(effect.name, name) for name in effect.sizes]
+    for _ in range(_ROUNDS):
+        inverse: Matrix = np.asarray(np.linalg.inv(smoothness.covariance), np.float64)
+        effect = replace(effect, inverse=inverse)
+        fit = Fit(simulations, [effect])
+        start = _started(fit, best, keys, smoothness.coefficients)
+        best = fitted(fit, start, (effect,), spread=start.spread)
+        lin = fit.linearise(best.linearised, (effect,))
+        joint = fit.quadratics(lin)
+        N, g = eliminated(joint, keys)
+        # Of the data alone, about no function: the prior is put in anew.
+        now = np.array([best.point.sizes[key] for key in keys])
+        N = N - effect.precision
+        g = g - effect.precision @ now - N @ now
+        smoothness = smoothest(N, g)
+    gained = nominal.linearised.deviance - best.linearised.deviance
+    spread = np.linalg.slogdet(np.eye(len(keys)) + N @ np.linalg.inv(effect.precision))[1]
+    return Estimate(
+        prospect,
+        best.linearised.deviance,
+        0.5 * (gained - float(spread)),
+        np.array([best.point.sizes[key] for key in keys]),
+        smoothness.posterior,
+    )
+
+
+def _started(fit: Fit, best: Fitted, keys: Sequence[Key], coefficients: Vector) -> Linearised:
+    """Where a fit with a free function begins: as much of it as lowers the deviance."""
+    before = best.linearised.deviance
+    for share in _BEGUN:
+        sizes = dict(zip(keys, map(float, share * coefficients), strict=True))
+        tried = fit.tried(replace(best.point, sizes=sizes))
+        if tried is not None and tried.deviance < before:
+            return tried
+    old = best.point.sizes or dict.fromkeys(keys, 0.0)
+    return fit.at(replace(best.point, sizes=old))

@@ -1,0 +1,259 @@
+"""Where a law may act, and what it may depend on: outputs of slots, and what is present there."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from workbench.diagnosis.slots import Slot
+from workbench.errors import InputError
+from workbench.fmu import Vector
+from workbench.modelica import Library
+from workbench.modelica.classes import Component
+from workbench.units import check_unit, quotient
+
+CLOCK = "clock"  # of a generated class [s]
+_VARIES = 1e-3  # share of its size by which a quantity has to vary, to be an influence
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """An input or output of a slot.
+
+    Attributes
+    ----------
+    unit : empty where the library does not say.
+    """
+
+    name: str
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """An output of a slot.
+
+    Attributes
+    ----------
+    text : what the slot is, for people.
+    inputs : of the slot.
+    """
+
+    slot: Slot
+    text: str
+    output: Quantity
+    inputs: tuple[Quantity, ...]
+
+    @property
+    def name(self) -> str:
+        """Of a class that acts here.
+
+        One name in the whole model: slot and output.
+        """
+        return "".join(part[0].upper() + part[1:] for part in (self.slot.name, self.output.name))
+
+    @property
+    def nominal(self) -> str:
+        """Expression of the output as it is without a law, in a generated class."""
+        if self.slot.chained:
+            return self.slot.inputs[self.slot.outputs.index(self.output.name)]
+        return f"unchanged.{self.output.name}"
+
+    def at(self, watched: Mapping[str, Vector], name: str) -> Vector:
+        """An input or output along a recording."""
+        return watched[f"{self.slot.name}.{name}"]
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What a law may depend on.
+
+    Attributes
+    ----------
+    kind : "value" or "size" of an input, "time", or "work", the integral of the size of a power.
+    factors : inputs, whose product it is.
+    """
+
+    kind: str
+    factors: tuple[Quantity, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Part of a Modelica name."""
+        parts = (self.kind, *(one.name for one in self.factors))
+        return "".join(part[0].upper() + part[1:] for part in parts)
+
+    @property
+    def unit(self) -> str:
+        """Its unit, empty where it is not known."""
+        if self.kind == "time":
+            return "s"
+        return "J" if self.kind == "work" else self.factors[0].unit
+
+    @property
+    def text(self) -> str:
+        """What it is, for people."""
+        if self.kind == "time":
+            return "time since the beginning"
+        what = " x ".join(f"{one.name} ({one.text})" for one in self.factors)
+        return {"value": what, "size": f"the size of {what}", "work": f"heat, the work of {what}"}[
+            self.kind
+        ]
+
+    @property
+    def expression(self) -> str:
+        """In a generated class."""
+        if self.kind == "value":
+            return self.factors[0].name
+        return f"noEvent(abs({self.factors[0].name}))" if self.kind == "size" else CLOCK
+
+    @property
+    def rate(self) -> str:
+        """Of `CLOCK`, as an expression; empty where it is not needed."""
+        if self.kind == "time":
+            return "1.0"
+        if self.kind == "work":
+            return f"noEvent(abs({'*'.join(one.name for one in self.factors)}))"
+        return ""
+
+    def course(self, place: Place, watched: Mapping[str, Vector], time: Vector) -> Vector:
+        """Its values along a recording, (n,)."""
+        if self.kind == "time":
+            since: Vector = time - time[0]
+            return since
+        product: Vector = np.prod([place.at(watched, one.name) for one in self.factors], axis=0)
+        if self.kind == "value":
+            return product
+        if self.kind == "size":
+            return np.abs(product)
+        rate = np.abs(product)
+        done: Vector = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time)))
+        return done
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """What a function is multiplied by before it is added to an output.
+
+    Attributes
+    ----------
+    expression : in a generated class; "1.0" of what is added as it is.
+    unit : of the function.
+    text : for people, as "multiplies flow" or "adds to flow".
+    """
+
+    expression: str
+    unit: str
+    text: str
+
+    def course(self, place: Place, watched: Mapping[str, Vector]) -> Vector:
+        """Its values along a recording, (n,)."""
+        output = place.at(watched, place.output.name)
+        if self.expression == "1.0":
+            return np.ones_like(output)
+        return output if self.expression == place.nominal else place.at(watched, self.expression)
+
+
+@dataclass(frozen=True)
+class Law:
+    """Something that acts at a place and depends on something.
+
+    Attributes
+    ----------
+    influence : None for a constant.
+    """
+
+    place: Place
+    carrier: Carrier
+    influence: Influence | None
+
+    @property
+    def text(self) -> str:
+        """What it is, for people."""
+        what = f"something that {self.carrier.text}, {self.place.text}"
+        if self.influence is None:
+            return f"{what}, whatever else happens"
+        return f"{what}, and depends on {self.influence.text}"
+
+
+def places(library: Library, base: str, slots: Sequence[Slot]) -> Iterator[Place]:
+    """Outputs of the slots of a model, where a law can be written.
+
+    A slot of several elements, or whose nominal class has parameters of its own in the base model,
+    is left out.
+    """
+    model = library.components(library.find(base).name)
+    for slot in slots:
+        if slot.counts or not (slot.chained or slot.settled):
+            continue
+        parts = library.components(slot.partial)
+        inputs = tuple(_quantity(library, parts[name]) for name in slot.inputs)
+        for output in slot.outputs:
+            text = _lower(model[slot.name].description or slot.name)
+            yield Place(slot, text, _quantity(library, parts[output]), inputs)
+
+
+def _lower(text: str) -> str:
+    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
+
+
+def _quantity(library: Library, component: Component) -> Quantity:
+    unit = library.unit(component)
+    try:
+        check_unit(unit, component.where)
+    except InputError:
+        unit = ""
+    return Quantity(component.name, unit, _lower(component.description or component.name))
+
+
+def laws(place: Place, recordings: Sequence[tuple[Vector, Mapping[str, Vector]]]) -> Iterator[Law]:
+    """All laws at a place that the recordings can show.
+
+    Parameters
+    ----------
+    recordings : times and what is watched, of the nominal model.
+    """
+    every = [watched for _, watched in recordings]
+    for carrier in _carriers(place, every):
+        yield Law(place, carrier, None)
+        for influence in _influences(place, every):
+            courses = [influence.course(place, watched, time) for time, watched in recordings]
+            if _varies(np.concatenate(courses)):
+                yield Law(place, carrier, influence)
+
+
+def _varies(values: Vector) -> bool:
+    return bool(np.ptp(values) > _VARIES * np.abs(values).max())
+
+
+def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Carrier]:
+    output = place.output
+    values = np.concatenate([place.at(one, output.name) for one in recordings])
+    what = f"{output.name} ({output.text})"
+    if np.any(values):
+        yield Carrier(place.nominal, "1", f"multiplies {what}")
+    if _varies(values) or not np.any(values):
+        yield Carrier("1.0", output.unit, f"adds to {what}")
+    for one in place.inputs:
+        passes = place.slot.chained and one.name == place.nominal
+        own = np.concatenate([place.at(watched, one.name) for watched in recordings])
+        if output.unit and one.unit == output.unit and not passes and _varies(own):
+            yield Carrier(one.name, "1", f"adds a share of {one.name} ({one.text}) to {what}")
+
+
+def _influences(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Influence]:
+    for one in place.inputs:
+        values = np.concatenate([place.at(watched, one.name) for watched in recordings])
+        both = values.min() < -0.1 * values.max() and values.max() > -0.1 * values.min()
+        yield Influence("value", (one,))
+        if both:
+            yield Influence("size", (one,))
+    yield Influence("time")
+    known = [one for one in place.inputs if one.unit not in ("", "1")]
+    for count in (2, 3):
+        for group in combinations(known, count):
+            product = ".".join(f"({one.unit})" for one in group)
+            if quotient(product, "W") in ("1", "rad"):
+                yield Influence("work", group)

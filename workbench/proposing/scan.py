@@ -1,0 +1,188 @@
+"""Where a law acts and what it depends on: all of them about the nominal model, by evidence."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis import given_values
+from workbench.diagnosis.catalogue import Effect
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.prediction import Variation
+from workbench.diagnosis.quadratic import Joint, Key
+from workbench.diagnosis.search import Reporter, fitted
+from workbench.diagnosis.slots import read_slots
+from workbench.fmu import Matrix, Vector
+from workbench.modelica import Library
+from workbench.proposing.places import Law, Place, laws, places
+from workbench.proposing.splines import COEFFICIENTS, Knots, Smoothness, smoothest
+from workbench.proposing.writing import PACKAGE, Written, extended_library, unit_of
+from workbench.system import OBSERVER, System
+
+_AT_ONCE = 300  # columns of derivatives: some hundred megabytes
+_ROUNDING = 1e-8  # share of what an unknown explains alone
+_SIZE = "d"  # of a probe
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """A law, as a free function about the nominal model.
+
+    Attributes
+    ----------
+    knots : where its function lives; None for a constant.
+    largest : of the output of its place, nominally.
+    """
+
+    law: Law
+    knots: Knots | None
+    smoothness: Smoothness
+    largest: float
+
+
+def effect_at(name: str, library: Library, place: Place, size: str) -> Effect:
+    """A generated class as an effect."""
+    return Effect(
+        name=name,
+        model=f"{library.name}.{PACKAGE}.{name}",
+        slots=(place.slot.name,),
+        size=size,
+        matters=1.0,
+        text="",
+        separation="",
+    )
+
+
+def _probe(place: Place) -> Written:
+    declared = f"parameter Real {_SIZE}({unit_of(place.output.unit)}) = 0.0;"
+    return Written(place.name, "Probe", place, (declared,), (), _SIZE)
+
+
+class Scan:
+    """All laws about the nominal model.
+
+    A law that is small acts as a parameter that is added to the output of its slot, and that
+    changes in time as the law says along the nominal motion; so one FMU serves all of them.
+
+    Attributes
+    ----------
+    base : the nominal model, fitted.
+    prospects : of all laws, the likeliest first.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        library: Library,
+        cases: Sequence[Case],
+        workers: int,
+        report: Reporter,
+    ) -> None:
+        base = system.models[OBSERVER].name
+        where = tuple(places(library, base, read_slots(library, base)))
+        names = list(
+            dict.fromkeys(f"{place.slot.name}.{one}" for place in where for one in _seen(place))
+        )
+        with tempfile.TemporaryDirectory() as scratch:
+            extended = extended_library(library, map(_probe, where), Path(scratch))
+            effects = [effect_at(place.name, library, place, _SIZE) for place in where]
+            path = Path(scratch) / "Probes.fmu"
+            text = source(extended, base, "Probes", effects, {}, {}, "With probes")
+            report(f"compiling probes in {len(where)} places")
+            build(extended, "Probes", _watching(text, names), path, every_platform=False)
+            given = given_values(path, system)
+            with Simulations(path, system, given, cases, workers, report=report) as simulations:
+                self._fit = Fit(simulations, effects)
+                self.base = fitted(self._fit, self._fit.at(self._fit.unknowns.start()), ())
+                values = self._fit.unknowns.values(self.base.point)
+                tables = simulations.along(values, [f"watched{k}" for k in range(len(names))])
+                self._recordings = [
+                    (one.time, dict(zip(names, table.T, strict=True)))
+                    for one, table in zip(simulations.recordings, tables, strict=True)
+                ]
+                every = [law for place in where for law in laws(place, self._recordings)]
+                report(f"{len(every)} laws in {len(where)} places")
+                found = self._judged(simulations, values, every)
+        self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)
+
+    def _judged(
+        self,
+        simulations: Simulations,
+        values: Sequence[Mapping[str, float]],
+        every: Sequence[Law],
+    ) -> list[Prospect]:
+        lin = self._fit.linearise(self.base.linearised, ())
+        found: list[Prospect] = []
+        each = max(1, _AT_ONCE // COEFFICIENTS)
+        for first in range(0, len(every), each):
+            part = every[first : first + each]
+            bases = [self._basis(law) for law in part]
+            columns = [
+                Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+                for law, (_, basis) in zip(part, bases, strict=True)
+                for _ in range(basis[0].shape[1])
+            ]
+            courses = [
+                np.hstack([basis[k] for _, basis in bases]) for k in range(len(self._recordings))
+            ]
+            derivatives = simulations.responses(values, columns, courses)
+            at = 0
+            for law, (knots, basis) in zip(part, bases, strict=True):
+                count = basis[0].shape[1]
+                keys = [(law.place.name, f"c{k}") for k in range(count)]
+                more = [one[:, at : at + count] for one in derivatives]
+                joint = self._fit.quadratics(lin.extended(keys, more), keys)
+                smoothness = smoothest(*eliminated(joint, keys))
+                found.append(Prospect(law, knots, smoothness, self._largest(law.place)))
+                at += count
+        return found
+
+    def _largest(self, place: Place) -> float:
+        """Largest size of an output, nominally."""
+        name = place.output.name
+        return max(float(np.abs(place.at(one, name)).max()) for _, one in self._recordings)
+
+    def _basis(self, law: Law) -> tuple[Knots | None, list[Matrix]]:
+        """Columns of a law in each recording: carrier times basis functions."""
+        carriers = [law.carrier.course(law.place, watched) for _, watched in self._recordings]
+        if law.influence is None:
+            return None, [one[:, None] for one in carriers]
+        courses = [
+            law.influence.course(law.place, watched, time) for time, watched in self._recordings
+        ]
+        knots = Knots(min(map(np.min, courses)), max(map(np.max, courses)))
+        return knots, [
+            one[:, None] * knots.basis(course)
+            for one, course in zip(carriers, courses, strict=True)
+        ]
+
+
+def _watching(text: str, names: Sequence[str]) -> str:
+    """A model with outputs for what is within its slots."""
+    outputs = [f"  output Real watched{k} = {name};\n" for k, name in enumerate(names)]
+    head, end, tail = text.rpartition("end ")
+    return head + "".join(outputs) + end + tail
+
+
+def _seen(place: Place) -> list[str]:
+    return [place.output.name, *(one.name for one in place.inputs)]
+
+
+def eliminated(joint: Joint, keys: Sequence[Key]) -> tuple[Matrix, Vector]:
+    """Normal matrix and gradient of some unknowns, the others at their best."""
+    total = joint.total()
+    own = np.array([key in keys for key in joint.shared])
+    others = total.N[np.ix_(~own, ~own)]
+    both = np.column_stack([total.N[np.ix_(~own, own)], total.g[~own]])
+    solved = np.linalg.lstsq(others, both, rcond=None)[0]
+    before = np.diag(total.N)[own]
+    N = total.N[np.ix_(own, own)] - total.N[np.ix_(own, ~own)] @ solved[:, :-1]
+    g = total.g[own] - total.N[np.ix_(own, ~own)] @ solved[:, -1]
+    # What the others do as well, but for rounding, the data do not show.
+    shown = np.diag(N) > _ROUNDING * before
+    return N * np.outer(shown, shown), g * shown
