@@ -15,7 +15,7 @@ from workbench.diagnosis import Effect, Outcome, choose, diagnose, read_effects
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import Library, read_library
-from workbench.proposing import propose
+from workbench.proposing import needs_law, propose
 from workbench.provenance import run_of, sources
 from workbench.report.diagnosis import write_diagnosis
 from workbench.report.proposal import write_proposal
@@ -69,13 +69,12 @@ def _propose(
     provenance: Mapping[str, Any],
 ) -> None:
     """Propose a law, if no effect explains what is missing."""
-    if outcome.diagnosis.verdict != "unexplained":
-        output.result("\nNo law is proposed: the verdict does not ask for one.")
+    if not needs_law(outcome):
+        output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
     folder = options.out / "proposed"
     found = propose(
-        *(outcome.system, outcome.cases, library, effects, folder, options.workers, output.stage),
-        held_out=held_out,
+        *(outcome, library, effects, folder, options.workers, output.stage), held_out=held_out
     )
     page = write_proposal(found, provenance, folder, options.workers)
     output.result(f"\n{found.summary()}")

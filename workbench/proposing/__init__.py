@@ -23,15 +23,20 @@ from workbench.proposing.scan import Prospect, Scan
 from workbench.proposing.writing import PACKAGE, extended_library, package
 from workbench.system import OBSERVER, System
 
-__all__ = ["Proposal", "propose"]
+__all__ = ["Proposal", "needs_law", "propose"]
 
 _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 _MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
 
 
+def needs_law(before: Outcome) -> bool:
+    """Whether a diagnosis leaves something to propose: unexplained, or explained by several."""
+    found = before.diagnosis
+    return found.verdict == "unexplained" or len(found.causes) > 1
+
+
 def propose(
-    system: System,
-    cases: Sequence[Case],
+    before: Outcome,
     library: Library,
     effects: Sequence[Effect],
     out: Path,
@@ -44,7 +49,9 @@ def propose(
 
     Parameters
     ----------
-    system, cases, library, effects, held_out : as of a diagnosis that ended unexplained.
+    before : the diagnosis that left something unexplained, or that needed several effects: then a
+        law is proposed only if it makes the description shorter.
+    library, effects, held_out : as of that.
     out : folder of the extended model and of the generated classes.
     report : takes a line on what is being done.
 
@@ -53,19 +60,21 @@ def propose(
     InputError
         If the library cannot be compiled, or the model is none of this library.
     """
+    system, cases = before.system, before.cases
     scan = Scan(system, library, cases, workers, report)
     able = _likeliest(scan.prospects)
     estimates = estimated(system, library, cases, workers, report, able) if able else []
-    # Odds that chance turns at the rate of false alarms.
-    odds = 0.5 * thresholds(len(scan.prospects)).tied
-    tied = [one for one in estimates if estimates[0].evidence - one.evidence < odds]
+    # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
+    decides = thresholds(len(scan.prospects), left=system.comparison.left)
+    odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
+    tied = [one for one in estimates if estimates[0].evidence - one.evidence < near]
     if not tied or tied[0].evidence < odds:
-        return Proposal(system, tuple(scan.prospects), tuple(estimates), (), {}, None)
+        return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
     forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
     outcome = _diagnosed(
         system, cases, library, effects, forms, out, workers, report, held_out=held_out
     )
-    return Proposal(system, tuple(scan.prospects), tuple(estimates), tuple(tied), forms, outcome)
+    return Proposal(before, tuple(scan.prospects), tuple(estimates), tuple(tied), forms, outcome)
 
 
 def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:

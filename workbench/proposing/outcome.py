@@ -1,5 +1,6 @@
 """What was proposed, as a value: sentences, tables, a figure."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,6 @@ from workbench.diagnosis import Cause, Outcome
 from workbench.proposing.forms import MARK, Candidate
 from workbench.proposing.free import Estimate
 from workbench.proposing.scan import Prospect
-from workbench.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +25,7 @@ class Proposal:
 
     Attributes
     ----------
+    before : of the diagnosis without them.
     prospects : of all laws as free functions about the nominal model, the likeliest first.
     estimates : those that were fitted in full, the likeliest first.
     tied : of them, those that these recordings do not tell from the first.
@@ -32,7 +33,7 @@ class Proposal:
     outcome : of the diagnosis with them beside the catalogue; None if it was not made.
     """
 
-    system: System
+    before: Outcome
     prospects: tuple[Prospect, ...]
     estimates: tuple[Estimate, ...]
     tied: tuple[Estimate, ...]
@@ -48,44 +49,51 @@ class Proposal:
             cause for cause in self.outcome.diagnosis.causes if cause.effect.name in self.forms
         )
 
-    @staticmethod
-    def _supported(outcome: Outcome) -> bool:
-        """Whether errors fall on what was held out, also on recordings that were not fitted."""
+    def _supported(self, outcome: Outcome) -> bool:
+        """Whether errors fall on what was held out, and, of what was explained, by less."""
         gain = outcome.diagnosis.gain
         held_out = [one for one in outcome.errors if one.held_out]
         before, after = (sum(one.samples * one.rms[i] ** 2 for one in held_out) for i in (0, 1))
-        return gain is not None and gain.high < gain.before and (not held_out or after < before)
+        if gain is None or gain.high >= gain.before or (held_out and after >= before):
+            return False
+        if self.before.diagnosis.verdict == "unexplained":
+            return True
+        return description_length(outcome) < description_length(self.before)
 
     @property
     def sentence(self) -> str:
         """The answer in a few sentences."""
         if not self.tied:
             return f"{_NONE}: no function of one quantity in one place explains what is missing."
-        where = " or ".join(dict.fromkeys(one.law.text for one in self.tied))
-        if not self.laws:
-            return (
-                f"{_NONE}: what is missing may be {where}, but no closed form of it holds on "
-                "recordings that were held out."
-            )
-        assert self.outcome is not None
-        assert self.outcome.diagnosis.gain is not None
-        said = [
-            f"{self.forms[cause.effect.name].text}"
-            + f" (or {', '.join(cause.confusable_with)})" * bool(cause.confusable_with)
-            for cause in self.laws
-        ]
+        first = self.tied[0].law
+        others = list(dict.fromkeys(one.law.short for one in self.tied[1:]))
+        where = first.text + f" (or {', '.join(others)})" * bool(others)
+        if not self.laws or self.outcome is None or (gain := self.outcome.diagnosis.gain) is None:
+            why = "no closed form of it holds on recordings that were held out"
+            if self.before.diagnosis.verdict == "found":
+                why = "with none of its closed forms is the description shorter"
+            return f"{_NONE}: what is missing may be {where}, but {why}."
         known = [
             cause.effect.name
             for cause in self.outcome.diagnosis.causes
             if cause.effect.name not in self.forms
         ]
         beside = f", beside {' and '.join(known)}" * bool(known)
-        gain = self.outcome.diagnosis.gain
         return (
-            f"{MARK.capitalize()}: {'; and '.join(said)}{beside}. On held-out recordings the error "
-            f"falls from {gain.before:.1f} to {gain.after:.1f} times the noise. As a free function "
-            f"it is {where}."
+            f"{MARK.capitalize()}: {'; and '.join(map(self._said, self.laws))}{beside}. On "
+            f"held-out recordings the error falls from {gain.before:.1f} to {gain.after:.1f} times "
+            f"the noise. As a free function it is {where}."
         )
+
+    def _said(self, cause: Cause) -> str:
+        """A law in words, with those that are as good."""
+        others = [
+            f"{self.forms[name].law.short}, {self.forms[name].form.text}"
+            if name in self.forms
+            else name
+            for name in cause.confusable_with
+        ]
+        return self.forms[cause.effect.name].text + f" (or {'; '.join(others)})" * bool(others)
 
     def summary(self) -> str:
         """The answer and what it rests on, for people."""
@@ -175,3 +183,15 @@ class Proposal:
         from workbench.report.proposal import functions_figure
 
         return functions_figure(self)
+
+
+def description_length(found: Outcome) -> float:
+    """What recordings and the sizes of causes take to be told [nat], up to a constant.
+
+    Half the deviance, and half the logarithm of the number of means that last for each parameter.
+    Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
+    """
+    best = found.diagnosis.best
+    lin = best.linearised
+    count = sum(one.errors.size for one in lin.evidence) / lin.lasting
+    return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)

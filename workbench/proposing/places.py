@@ -103,6 +103,14 @@ class Influence:
         ]
 
     @property
+    def short(self) -> str:
+        """What it is, by names."""
+        if self.kind == "time":
+            return "time"
+        product = "*".join(one.name for one in self.factors)
+        return {"value": product, "size": f"|{product}|", "work": f"heat {product}"}[self.kind]
+
+    @property
     def expression(self) -> str:
         """In a generated class."""
         if self.kind == "value":
@@ -168,6 +176,12 @@ class Law:
     place: Place
     carrier: Carrier
     influence: Influence | None
+
+    @property
+    def short(self) -> str:
+        """Where it acts and on what it depends, by their names."""
+        where = f"{self.place.slot.name}.{self.place.output.name}"
+        return f"{where} by {'itself' if self.influence is None else self.influence.short}"
 
     @property
     def text(self) -> str:
