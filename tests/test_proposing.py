@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
@@ -129,10 +130,20 @@ def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal: Path) -
 
 
 def test_the_estimated_function_is_the_law(proposal: Path) -> None:
-    """A free function knows no kink: it is right within a tenth of its range, but for a level."""
-    with open(proposal / "functions.csv") as file:
-        head = file.readline().strip().split(",")
-    assert {"value", "unit", "function", "function_unit", "low", "high"} <= set(head)
+    """A free function has no kink: 15 % of its range is what it may be off, but for a factor.
+
+    The area of the outlet is calibrated beside it, so that flows are known but for that factor.
+    """
+    table = pd.read_csv(proposal / "functions.csv")
+    own = table[(table.depends_on == "h (level)") & table.carrier.str.startswith("multiplies")]
+    assert set(own.unit) == {"m"}
+    h = own.value.to_numpy()
+    seen = (h > np.quantile(h, 0.1)) & (h < np.quantile(h, 0.9))
+    outlet = OUTLET * np.sqrt(2.0 * 9.81 * h)
+    truth = ((outlet + RATE * np.maximum(0.0, h - THRESHOLD)) / outlet)[seen]
+    found = 1.0 + own.function.to_numpy()[seen]
+    found *= truth.mean() / found.mean()
+    assert np.abs(found - truth).max() < 0.15 * np.ptp(truth)
 
 
 def test_nothing_is_proposed_where_nothing_is_missing(

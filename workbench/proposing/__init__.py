@@ -26,7 +26,6 @@ from workbench.system import OBSERVER, System
 __all__ = ["Proposal", "needs_law", "propose"]
 
 _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
-_MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
 
 
 def needs_law(before: Outcome) -> bool:
@@ -93,11 +92,9 @@ def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
 def _forms(estimate: Estimate) -> list[Candidate]:
     """Closed forms of a law."""
     prospect = estimate.prospect
-    matters = _MATTERS
-    if prospect.law.carrier.expression == "1.0":
-        # Of an output that is nominally zero, of what it seems to be.
-        matters *= prospect.largest or float(np.abs(estimate.function()[1]).max())
-    return list(candidates(prospect.law, prospect.knots, matters))
+    # Of an output that is nominally zero, what it seems to be.
+    scale = prospect.largest or float(np.abs(estimate.function()[1]).max())
+    return list(candidates(prospect.law, prospect.knots, scale))
 
 
 def _diagnosed(

@@ -15,6 +15,8 @@ from workbench.proposing.writing import Written, clock, effect, number, unit_of
 
 MARK = "proposed, not known physics"
 _ROUNDED = 0.01  # of the range, over which a kink is rounded: no event, and below what is resolved
+_MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
+_REACH, _KEPT = 10.0, 0.9  # sizes beyond which no law is sought; what of an output one may take
 
 
 @dataclass(frozen=True)
@@ -87,41 +89,45 @@ class Candidate:
         return f"{self.law.text}: {self.form.text}"
 
 
-def candidates(law: Law, knots: Knots | None, matters: float) -> Iterator[Candidate]:
+def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[Candidate]:
     """Closed forms of a law.
 
     Parameters
     ----------
     knots : range of what it depends on; None of a constant.
-    matters : least size worth a finding.
+    scale : of the output, where the law is added to it.
     """
     if knots is None or law.influence is None:
-        yield Candidate(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), matters))
+        yield Candidate(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
     for form in FORMS:
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
-            yield Candidate(law, form, _written(law, form, knots, matters))
+            yield Candidate(law, form, _written(law, form, knots, scale))
 
 
-def _written(law: Law, form: Form, knots: Knots, matters: float) -> Written:
+def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
     largest = max(abs(knots.low), abs(knots.high))
     declared, equations = clock(law.influence)
     quantity = "" if law.influence is None else law.influence.expression
     expression = form.expression.format(
         q=quantity, Q=number(largest), w=number(_ROUNDED * (knots.high - knots.low))
     )
-    lines = [
-        f'parameter Real s({unit_of(law.carrier.unit)}) = 0.0 "Size, at the largest that was seen";'
-    ]
+    relative = law.carrier.expression != "1.0"
+    unit = 1.0 if relative else scale
+    # An inertia or a friction that is multiplied keeps its sign.
+    least = -_KEPT if law.carrier.expression == law.place.nominal else -_REACH * unit
+    bounds = f"min={number(least)}, max={number(_REACH * unit)}"
+    known = ", ".join(filter(None, (unit_of(law.carrier.unit), bounds)))
+    lines = [f'parameter Real s({known}) = 0.0 "Size, at the largest that was seen";']
     shapes = {}
     if form.shape:
-        unit = form.unit.format(unit="" if law.influence is None else law.influence.unit)
+        own = form.unit.format(unit="" if law.influence is None else law.influence.unit)
         powers = form.shape == "n"
         values = form.values if powers else _rounded(knots, form.values)
         low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * knots.high)
         shapes = {form.shape: values}
-        given = ", ".join(filter(None, (unit_of(unit), f"min={number(low)}, max={number(high)}")))
+        given = ", ".join(filter(None, (unit_of(own), f"min={number(low)}, max={number(high)}")))
         lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
     name = law.place.name + ("" if law.influence is None else law.influence.name)
     where = {"1.0": "Added", law.place.nominal: "Times"}.get(law.carrier.expression, "Share")
@@ -132,7 +138,7 @@ def _written(law: Law, form: Form, knots: Knots, matters: float) -> Written:
         declarations=(*lines, *declared),
         equations=equations,
         change=f"{law.carrier.expression}*s*({expression})",
-        annotation=effect("s", matters, law.place.slot.name, shapes),
+        annotation=effect("s", _MATTERS * unit, law.place.slot.name, shapes),
     )
 
 

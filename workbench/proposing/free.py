@@ -17,6 +17,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Key
 from workbench.diagnosis.search import Fitted, Reporter, fitted
+from workbench.errors import FMUError
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
 from workbench.proposing.places import Law
@@ -158,12 +159,24 @@ def estimated(
             nominal = fitted(none, none.at(none.unknowns.start()), ())
             report("fitting free functions")
             job = partial(_estimate, simulations, nominal)
-            found = none.together(job, list(zip(effects, prospects, strict=True)))
+            tried = none.together(job, list(zip(effects, prospects, strict=True)))
+    found = [one for one in tried if one is not None]
     return sorted(found, key=lambda one: -one.evidence)
 
 
-def _estimate(simulations: Simulations, nominal: Fitted, item: tuple[Free, Prospect]) -> Estimate:
-    effect, prospect = item
+def _estimate(
+    simulations: Simulations, nominal: Fitted, item: tuple[Free, Prospect]
+) -> Estimate | None:
+    """Fit one function; None if it leads where the model has no solution."""
+    try:
+        return _fitted(simulations, nominal, *item)
+    except (FMUError, np.linalg.LinAlgError):
+        return None
+
+
+def _fitted(
+    simulations: Simulations, nominal: Fitted, effect: Free, prospect: Prospect
+) -> Estimate:
     smoothness, best = prospect.smoothness, nominal
     keys = [(effect.name, name) for name in effect.sizes]
     for _ in range(_ROUNDS):
