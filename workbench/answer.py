@@ -14,6 +14,7 @@ SUMMARIES = (
     "power.json",
     "thresholds.json",
     "sheet_error.json",
+    "left_out.json",
     "next.json",
     "distance.json",
     "bench.json",

@@ -13,6 +13,7 @@ from workbench.diagnosis import Effect
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError, closest
 from workbench.files import claimed
+from workbench.modelica import read_library
 from workbench.power import (
     Diagnosed,
     Plantable,
@@ -25,14 +26,17 @@ from workbench.power import (
     summarise,
 )
 from workbench.power.diagnosing import library_effects
+from workbench.power.left_out import propose_left_out
 from workbench.power.planting import Group, plan_sheet_errors, some
 from workbench.power.sensitivity import values, vary_sets
 from workbench.power.sheet import summarise_sheet
 from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
 from workbench.report.power_checks import (
+    format_left_out,
     format_sheet,
     format_thresholds,
+    write_left_out,
     write_sheet,
     write_thresholds,
 )
@@ -59,8 +63,12 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         if options.check is None:
             planned = _planned(options, rig, effects)
             return _usual(options, output, system, rig, effects, planned)
-        check = {"thresholds": _thresholds, "sheet_error": _sheet_error}[options.check]
-        return check(options, output, system, rig, effects)
+        checks = {
+            "thresholds": _thresholds,
+            "sheet_error": _sheet_error,
+            "leave_out_effect": _left_out,
+        }
+        return checks[options.check](options, output, system, rig, effects)
 
 
 def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -137,6 +145,26 @@ def _sheet_error(
     output.result(format_sheet(rows))
     output.result(f"data: {out}")
     return _told(out / "sheet_error.json", interrupted)
+
+
+def _left_out(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    rig: VirtualRig,
+    effects: tuple[Effect, ...],
+) -> Done:
+    out = options.out / "left_out"
+    largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
+    rows, interrupted = propose_left_out(
+        *(_planned(largest, rig, effects), system, read_library(system.library), rig, effects),
+        workers=options.workers,
+        report=output.stage,
+    )
+    write_left_out(rows, _provenance(options, system, rig, interrupted), out)
+    output.result(format_left_out(rows))
+    output.result(f"data: {out}")
+    return _told(out / "left_out.json", interrupted)
 
 
 def _thresholds(

@@ -1,4 +1,4 @@
-"""What the diagnosis makes of other thresholds, and of a wrong data sheet: files and tables."""
+"""What the diagnosis makes of other thresholds, of a wrong sheet, of causes it lacks: files, tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -81,3 +81,32 @@ def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
         lines.append(f"{error:<26} {row['verdict']:<12} {causes or row['error']}{mark}")
     wrong = sum(row["wrong_name"] for row in rows)
     return "\n".join([*lines, "", f"{wrong} of {len(rows)} sets have a wrong name"])
+
+
+def write_left_out(
+    rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
+) -> None:
+    """Write left_out.json."""
+    right, seen = _rightly(rows)
+    sentence = f"The slot of the cause that was left out is proposed in {right} of {seen} sets."
+    headline = {"sets with the right slot": Measure(float(right), "1", "higher")}
+    content = {"provenance": provenance, "sets": list(rows)}
+    write_json(out / "left_out.json", with_answer(Answer(sentence, headline), content))
+
+
+def format_left_out(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was proposed, and how often it acts where the cause did."""
+    lines = []
+    for row in rows:
+        what = ", ".join(row["left_out"]) or row["rig"]
+        mark = {True: "right slot", False: "NOT THE SLOT", None: "in no catalogue"}
+        said = "; ".join(row["laws"]) or f"nothing ({row['verdict']} {', '.join(row['named'])})"
+        lines.append(f"{what:<30} {mark[row['slot_right']]:<16} {said}")
+    right, seen = _rightly(rows)
+    return "\n".join([*lines, "", f"right slot in {right} of {seen} sets that show the cause"])
+
+
+def _rightly(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
+    """Sets with the right slot, and those of which the verdict is not "nothing"."""
+    known = [row for row in rows if row["left_out"] and row["verdict"] != "nothing"]
+    return sum(bool(row["slot_right"]) for row in known), len(known)

@@ -46,6 +46,7 @@ def summaries() -> dict[str, Schema]:
         "power": _power(),
         "thresholds": _thresholds(),
         "sheet_error": _sheet_error(),
+        "left_out": _left_out(),
         "next": _next(),
         "distance": _distance(),
         "monitor": _monitor(),
@@ -257,6 +258,13 @@ def _sheet_error() -> Schema:
     one = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
     one |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
     return summary("power --sheet-error", _SETS, {"sets": listed(closed(one))})
+
+
+def _left_out() -> Schema:
+    texts = {name: listed(TEXT) for name in ("left_out", "named", "laws", "slots")}
+    ends = {name: or_null(NUMBER) for name in ("before", "after")}
+    one = {"rig": TEXT, "verdict": TEXT, **texts, "slot_right": or_null(FLAG), **ends}
+    return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
 
 
 def _next() -> Schema:

@@ -1,0 +1,104 @@
+"""What is proposed for a cause that the catalogue lacks: each effect left out in turn."""
+
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from workbench.case import read_cases
+from workbench.diagnosis import Effect, diagnose
+from workbench.modelica import Library
+from workbench.power.planting import Group, Planting
+from workbench.power.virtual_rig import VirtualRig
+from workbench.proposing import Proposal, needs_law, propose
+from workbench.system import System
+
+
+def propose_left_out(
+    groups: Sequence[Group],
+    system: System,
+    library: Library,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    *,
+    workers: int,
+    report: Callable[[str], None],
+) -> tuple[list[dict[str, Any]], bool]:
+    """Make sets with one cause each, and diagnose them with a catalogue that lacks it.
+
+    Parameters
+    ----------
+    groups : as planned; of each the first set is made, if it has one cause or none.
+    effects : of the library.
+    report : takes a line on what is being done.
+
+    Returns
+    -------
+    rows : one for each set, as they are written to left_out.json.
+    interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
+    """
+    sets = [group[0] for group in groups if group[0].kind != "pair"]
+    rows: list[dict[str, Any]] = []
+    begin = time.perf_counter()
+    try:
+        for number, planting in enumerate(sets):
+            rows.append(_row(planting, system, library, rig, effects, workers))
+            left = (time.perf_counter() - begin) / (number + 1) * (len(sets) - number - 1)
+            said = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
+            report(f"[{number + 1}/{len(sets)}] {planting.options}: {said}; {left:.0f} s left")
+    except KeyboardInterrupt:
+        return rows, True
+    return rows, False
+
+
+def _row(
+    planting: Planting,
+    system: System,
+    library: Library,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    workers: int,
+) -> dict[str, Any]:
+    planted = [one for one in effects if one.name in planting.effects]
+    others = [one for one in effects if one not in planted]
+    with tempfile.TemporaryDirectory() as scratch:
+        recordings, out = Path(scratch) / "recordings", Path(scratch) / "out"
+        simulated = rig.simulate(planting.seed, planting.gains)
+        rig.write(simulated, planting.gains, recordings)
+        cases = read_cases([recordings], system)
+        before = diagnose(system, cases, library, others, out, workers, _silent)
+        found = (
+            propose(before, library, others, out, workers, _silent) if needs_law(before) else None
+        )
+        right = {slot for one in planted for slot in one.slots}
+        slots = _slots(found)
+        gain = (
+            None
+            if not slots or found is None or found.outcome is None
+            else found.outcome.diagnosis.gain
+        )
+        return {
+            "rig": planting.options,
+            "left_out": [one.name for one in planted],
+            "verdict": before.diagnosis.verdict,
+            "named": [cause.effect.name for cause in before.diagnosis.causes],
+            "laws": [] if found is None else [found.forms[c.effect.name].text for c in found.laws],
+            "slots": slots,
+            "slot_right": bool(right & set(slots)) if planted else None,
+            "before": None if gain is None else gain.before,
+            "after": None if gain is None else gain.after,
+        }
+
+
+def _silent(line: str) -> None:
+    """Progress of each set would hide that of all."""
+
+
+def _slots(found: Proposal | None) -> list[str]:
+    """Slots of the laws that are proposed, and of those that are as good."""
+    if found is None:
+        return []
+    named = [name for law in found.laws for name in (law.effect.name, *law.confusable_with)]
+    laws = [found.forms[name].law for name in named if name in found.forms]
+    return list(dict.fromkeys(law.place.slot.name for law in laws))
