@@ -25,6 +25,7 @@ from workbench.system import OBSERVER, System
 
 __all__ = ["Proposal", "needs_law", "propose"]
 
+_OF_PLACE = 2  # of one place, since about the nominal model a wrong place may fake anything
 _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 
@@ -86,7 +87,11 @@ def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
         factors = () if influence is None else tuple(part.name for part in influence.factors)
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
         best.setdefault((one.law.place.name, kind, *factors), one)
-    return list(best.values())[:_TRIED]
+    of_place: dict[str, list[Prospect]] = {}
+    for one in best.values():
+        of_place.setdefault(one.law.place.name, []).append(one)
+    kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
+    return sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
 
 
 def _forms(estimate: Estimate) -> list[Candidate]:

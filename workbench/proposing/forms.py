@@ -72,6 +72,7 @@ FORMS = (
         values=(0.2, 0.4, 0.6, 0.8),
     ),
 )
+SIDES = Form("Sides", "by its sign alone, as hysteresis does", "tanh({q}/{w})")
 CONSTANT = Form("Constant", "always alike", "1.0")
 
 
@@ -100,7 +101,8 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[Candidat
     if knots is None or law.influence is None:
         yield Candidate(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
-    for form in FORMS:
+    signed = (SIDES,) if knots.low < 0.0 < knots.high else ()
+    for form in (*FORMS, *signed):
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
             yield Candidate(law, form, _written(law, form, knots, scale))

@@ -17,7 +17,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Key
 from workbench.diagnosis.search import Fitted, Reporter, fitted
-from workbench.errors import FMUError
+from workbench.errors import FMUError, InputError
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
 from workbench.proposing.places import Law
@@ -137,31 +137,56 @@ def estimated(
     What is large bends what the other quantities do, so that each function is fitted anew about
     where it led, with the smoothness that is likeliest there.
     """
-    base = system.models[OBSERVER].name
-    names = [f"Free{k}" for k in range(len(prospects))]
     with tempfile.TemporaryDirectory() as scratch:
-        written = [_written(name, one) for name, one in zip(names, prospects, strict=True)]
-        extended = extended_library(library, written, Path(scratch))
-        effects = [
-            Free(
-                **vars(effect_at(name, library, one.law.place, "c0")),
-                count=len(one.smoothness.coefficients),
-            )
-            for name, one in zip(names, prospects, strict=True)
-        ]
         path = Path(scratch) / "Free.fmu"
-        text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
-        report(f"compiling {len(effects)} free functions")
-        build(extended, "FreeFunctions", text, path, every_platform=False)
+        report(f"compiling {len(prospects)} free functions")
+        able = _compiled(system, library, prospects, path)
+        if not able:
+            return []
+        effects = _effects(library, able)
         given = given_values(path, system)
         with Simulations(path, system, given, cases, workers, report=report) as simulations:
             none = Fit(simulations, effects)
             nominal = fitted(none, none.at(none.unknowns.start()), ())
             report("fitting free functions")
             job = partial(_estimate, simulations, nominal)
-            tried = none.together(job, list(zip(effects, prospects, strict=True)))
+            tried = none.together(job, list(zip(effects, able, strict=True)))
     found = [one for one in tried if one is not None]
     return sorted(found, key=lambda one: -one.evidence)
+
+
+def _effects(library: Library, prospects: Sequence[Prospect]) -> list[Free]:
+    return [
+        Free(
+            **vars(effect_at(f"Free{k}", library, one.law.place, "c0")),
+            count=len(one.smoothness.coefficients),
+        )
+        for k, one in enumerate(prospects)
+    ]
+
+
+def _compiled(
+    system: System, library: Library, prospects: Sequence[Prospect], path: Path
+) -> list[Prospect]:
+    """Build the FMU of free functions; returns those that it has.
+
+    What a law depends on may depend on it: a loop that is not linear, which no FMU of ours solves.
+    """
+    base = system.models[OBSERVER].name
+    with tempfile.TemporaryDirectory() as scratch:
+        written = [_written(f"Free{k}", one) for k, one in enumerate(prospects)]
+        extended = extended_library(library, written, Path(scratch))
+        effects = _effects(library, prospects)
+        text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
+        try:
+            build(extended, "FreeFunctions", text, path, every_platform=False)
+        except InputError:
+            if len(prospects) == 1:
+                return []
+        else:
+            return list(prospects)
+    able = [one for one in prospects if _compiled(system, library, [one], path)]
+    return _compiled(system, library, able, path) if able else []
 
 
 def _estimate(

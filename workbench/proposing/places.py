@@ -72,12 +72,15 @@ class Influence:
 
     Attributes
     ----------
-    kind : "value" or "size" of an input, "time", or "work", the integral of the size of a power.
+    kind : "value", "size" or "rate" of an input, "time", or "work", the integral of the size of a
+        power.
     factors : inputs, whose product it is.
+    span : [s] over which a rate is taken.
     """
 
     kind: str
     factors: tuple[Quantity, ...] = ()
+    span: float = 0.0
 
     @property
     def name(self) -> str:
@@ -90,6 +93,8 @@ class Influence:
         """Its unit, empty where it is not known."""
         if self.kind == "time":
             return "s"
+        if self.kind == "rate" and self.factors[0].unit:
+            return quotient(self.factors[0].unit, "s")
         return "J" if self.kind == "work" else self.factors[0].unit
 
     @property
@@ -98,9 +103,8 @@ class Influence:
         if self.kind == "time":
             return "time since the beginning"
         what = " x ".join(f"{one.name} ({one.text})" for one in self.factors)
-        return {"value": what, "size": f"the size of {what}", "work": f"heat, the work of {what}"}[
-            self.kind
-        ]
+        before = {"size": "the size of ", "rate": "the rate of ", "work": "heat, the work of "}
+        return before.get(self.kind, "") + what
 
     @property
     def short(self) -> str:
@@ -108,20 +112,29 @@ class Influence:
         if self.kind == "time":
             return "time"
         product = "*".join(one.name for one in self.factors)
-        return {"value": product, "size": f"|{product}|", "work": f"heat {product}"}[self.kind]
+        if self.kind == "size":
+            return f"|{product}|"
+        return {"rate": "rate of ", "work": "heat of "}.get(self.kind, "") + product
 
     @property
     def expression(self) -> str:
         """In a generated class."""
-        if self.kind == "value":
-            return self.factors[0].name
-        return f"noEvent(abs({self.factors[0].name}))" if self.kind == "size" else CLOCK
+        match self.kind:
+            case "value":
+                return self.factors[0].name
+            case "size":
+                return f"noEvent(abs({self.factors[0].name}))"
+            case "rate":
+                return self.rate
+        return CLOCK
 
     @property
     def rate(self) -> str:
         """Of `CLOCK`, as an expression; empty where it is not needed."""
         if self.kind == "time":
             return "1.0"
+        if self.kind == "rate":
+            return f"({self.factors[0].name} - {CLOCK})/{self.span!r}"
         if self.kind == "work":
             return f"noEvent(abs({'*'.join(one.name for one in self.factors)}))"
         return ""
@@ -136,6 +149,14 @@ class Influence:
             return product
         if self.kind == "size":
             return np.abs(product)
+        if self.kind == "rate":
+            late = np.zeros_like(product)
+            kept = np.exp(-np.diff(time) / self.span)
+            for k, share in enumerate(kept):
+                middle = 0.5 * (product[k] + product[k + 1])
+                late[k + 1] = middle + share * (late[k] - middle)
+            slope: Vector = (product - late) / self.span
+            return slope
         rate = np.abs(product)
         done: Vector = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time)))
         return done
@@ -222,48 +243,58 @@ def _quantity(library: Library, component: Component) -> Quantity:
     return Quantity(component.name, unit, _lower(component.description or component.name))
 
 
-def laws(place: Place, recordings: Sequence[tuple[Vector, Mapping[str, Vector]]]) -> Iterator[Law]:
+def laws(
+    place: Place, recordings: Sequence[tuple[Vector, Mapping[str, Vector]]], span: float
+) -> Iterator[Law]:
     """All laws at a place that the recordings can show.
 
     Parameters
     ----------
     recordings : times and what is watched, of the nominal model.
+    span : [s] over which rates are taken.
     """
     every = [watched for _, watched in recordings]
     for carrier in _carriers(place, every):
         yield Law(place, carrier, None)
-        for influence in _influences(place, every):
+        for influence in _influences(place, every, span):
             courses = [influence.course(place, watched, time) for time, watched in recordings]
-            if _varies(np.concatenate(courses)):
+            if _varies(courses):
                 yield Law(place, carrier, influence)
 
 
-def _varies(values: Vector) -> bool:
-    return bool(np.ptp(values) > _VARIES * np.abs(values).max())
+def _varies(recordings: Sequence[Vector]) -> bool:
+    """Whether something varies within any recording: between them, tolerances do."""
+    size = max(float(np.abs(one).max()) for one in recordings)
+    return any(np.ptp(one) > _VARIES * size for one in recordings)
 
 
 def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Carrier]:
     output = place.output
-    values = np.concatenate([place.at(one, output.name) for one in recordings])
+    values = [place.at(one, output.name) for one in recordings]
     what = f"{output.name} ({output.text})"
-    if np.any(values):
+    if any(np.any(one) for one in values):
         yield Carrier(place.nominal, "1", f"multiplies {what}")
-    if _varies(values) or not np.any(values):
+    if _varies(values) or not any(np.any(one) for one in values):
         yield Carrier("1.0", output.unit, f"adds to {what}")
     for one in place.inputs:
         passes = place.slot.chained and one.name == place.nominal
-        own = np.concatenate([place.at(watched, one.name) for watched in recordings])
+        own = [place.at(watched, one.name) for watched in recordings]
         if output.unit and one.unit == output.unit and not passes and _varies(own):
             yield Carrier(one.name, "1", f"adds a share of {one.name} ({one.text}) to {what}")
 
 
-def _influences(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Influence]:
+def _influences(
+    place: Place, recordings: Sequence[Mapping[str, Vector]], span: float
+) -> Iterator[Influence]:
     for one in place.inputs:
-        values = np.concatenate([place.at(watched, one.name) for watched in recordings])
+        own = [place.at(watched, one.name) for watched in recordings]
+        values = np.concatenate(own)
         both = values.min() < -0.1 * values.max() and values.max() > -0.1 * values.min()
         yield Influence("value", (one,))
         if both:
             yield Influence("size", (one,))
+        if _varies(own):
+            yield Influence("rate", (one,), span)
     yield Influence("time")
     known = [one for one in place.inputs if one.unit not in ("", "1")]
     for count in (2, 3):

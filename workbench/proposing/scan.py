@@ -26,6 +26,8 @@ from workbench.system import OBSERVER, System
 
 _AT_ONCE = 300  # columns of derivatives: some hundred megabytes
 _ROUNDING = 1e-8  # share of what an unknown explains alone
+_SPAN = 0.25  # of what lasts, over which a rate is taken: it settles within that
+_SEEN = 0.01  # share of the samples that are beyond the ends of a function
 _SIZE = "d"  # of a probe
 
 
@@ -105,7 +107,8 @@ class Scan:
                     (one.time, dict(zip(names, table.T, strict=True)))
                     for one, table in zip(simulations.recordings, tables, strict=True)
                 ]
-                every = [law for place in where for law in laws(place, self._recordings)]
+                span = _SPAN * system.comparison.lasting
+                every = [law for place in where for law in laws(place, self._recordings, span)]
                 report(f"{len(every)} laws in {len(where)} places")
                 found = self._judged(simulations, values, every)
         self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)
@@ -155,7 +158,11 @@ class Scan:
         courses = [
             law.influence.course(law.place, watched, time) for time, watched in self._recordings
         ]
-        knots = Knots(min(map(np.min, courses)), max(map(np.max, courses)))
+        low, high = 0.0, 1.0
+        if law.influence.kind == "rate":  # which begins from anywhere
+            low, high = 0.5 * _SEEN, 1.0 - 0.5 * _SEEN
+        ends = np.quantile(np.concatenate(courses), (low, high))
+        knots = Knots(float(ends[0]), float(ends[1]))
         return knots, [
             one[:, None] * knots.basis(course)
             for one, course in zip(carriers, courses, strict=True)

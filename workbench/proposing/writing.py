@@ -63,8 +63,9 @@ def clock(influence: Influence | None) -> tuple[tuple[str, ...], tuple[str, ...]
     """Declarations and equations that an influence needs."""
     if influence is None or not influence.rate:
         return (), ()
-    unit = influence.unit
-    declared = f'Real {CLOCK}(unit="{unit}", start=0.0, fixed=true) "{influence.text}";'
+    unit = influence.factors[0].unit if influence.kind == "rate" else influence.unit
+    known = ", ".join(filter(None, (unit_of(unit), "start=0.0", "fixed=true")))
+    declared = f'Real {CLOCK}({known}) "Of {influence.text}";'
     return (declared,), (f"der({CLOCK}) = {influence.rate};",)
 
 

@@ -1,4 +1,4 @@
-"""What the diagnosis makes of other thresholds, of a wrong sheet, of causes it lacks: files, tables."""
+"""What the diagnosis makes of other thresholds, a wrong sheet, causes it lacks: files, tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
