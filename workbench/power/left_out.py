@@ -62,43 +62,48 @@ def _row(
 ) -> dict[str, Any]:
     planted = [one for one in effects if one.name in planting.effects]
     others = [one for one in effects if one not in planted]
-    with tempfile.TemporaryDirectory() as scratch:
-        recordings, out = Path(scratch) / "recordings", Path(scratch) / "out"
-        simulated = rig.simulate(planting.seed, planting.gains)
-        rig.write(simulated, planting.gains, recordings)
-        cases = read_cases([recordings], system)
-        before = diagnose(system, cases, library, others, out, workers, _silent)
-        found = (
-            propose(before, library, others, out, workers, _silent) if needs_law(before) else None
-        )
-        right = {slot for one in planted for slot in one.slots}
-        slots = _slots(found)
-        gain = (
-            None
-            if not slots or found is None or found.outcome is None
-            else found.outcome.diagnosis.gain
-        )
-        return {
-            "rig": planting.options,
-            "left_out": [one.name for one in planted],
-            "verdict": before.diagnosis.verdict,
-            "named": [cause.effect.name for cause in before.diagnosis.causes],
-            "laws": [] if found is None else [found.forms[c.effect.name].text for c in found.laws],
-            "slots": slots,
-            "slot_right": bool(right & set(slots)) if planted else None,
-            "before": None if gain is None else gain.before,
-            "after": None if gain is None else gain.after,
-        }
+    row: dict[str, Any] = {
+        "rig": planting.options,
+        "left_out": [one.name for one in planted],
+        "verdict": "failed",
+        "named": [],
+        "laws": [],
+        "slots": [],
+        "slot_right": None,
+        "before": None,
+        "after": None,
+        "error": "",
+    }
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            recordings, out = Path(scratch) / "recordings", Path(scratch) / "out"
+            simulated = rig.simulate(planting.seed, planting.gains)
+            rig.write(simulated, planting.gains, recordings)
+            cases = read_cases([recordings], system)
+            before = diagnose(system, cases, library, others, out, workers, _silent)
+            row["verdict"] = before.diagnosis.verdict
+            row["named"] = [cause.effect.name for cause in before.diagnosis.causes]
+            if needs_law(before):
+                row |= _told(propose(before, library, others, out, workers, _silent))
+    except Exception as error:  # one set must not end a run of hours; it is counted
+        row["error"] = repr(error)
+    if planted:
+        row["slot_right"] = bool({slot for one in planted for slot in one.slots} & {*row["slots"]})
+    return row
+
+
+def _told(found: Proposal) -> dict[str, Any]:
+    """What is proposed; its slots are also those of laws that are as good."""
+    named = [name for law in found.laws for name in (law.effect.name, *law.confusable_with)]
+    laws = [found.forms[name].law for name in named if name in found.forms]
+    gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
+    return {
+        "laws": [found.forms[law.effect.name].text for law in found.laws],
+        "slots": list(dict.fromkeys(law.place.slot.name for law in laws)),
+        "before": None if gain is None else gain.before,
+        "after": None if gain is None else gain.after,
+    }
 
 
 def _silent(line: str) -> None:
     """Progress of each set would hide that of all."""
-
-
-def _slots(found: Proposal | None) -> list[str]:
-    """Slots of the laws that are proposed, and of those that are as good."""
-    if found is None:
-        return []
-    named = [name for law in found.laws for name in (law.effect.name, *law.confusable_with)]
-    laws = [found.forms[name].law for name in named if name in found.forms]
-    return list(dict.fromkeys(law.place.slot.name for law in laws))

@@ -100,10 +100,15 @@ def format_left_out(rows: Sequence[Mapping[str, Any]]) -> str:
     for row in rows:
         what = ", ".join(row["left_out"]) or row["rig"]
         mark = {True: "right slot", False: "NOT THE SLOT", None: "in no catalogue"}
-        said = "; ".join(row["laws"]) or f"nothing ({row['verdict']} {', '.join(row['named'])})"
+        said = "; ".join(row["laws"]) or row["error"] or _nothing(row)
         lines.append(f"{what:<30} {mark[row['slot_right']]:<16} {said}")
     right, seen = _rightly(rows)
     return "\n".join([*lines, "", f"right slot in {right} of {seen} sets that show the cause"])
+
+
+def _nothing(row: Mapping[str, Any]) -> str:
+    named = f", {' and '.join(row['named'])}" * bool(row["named"])
+    return f"nothing proposed ({row['verdict']}{named})"
 
 
 def _rightly(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:

@@ -263,7 +263,14 @@ def _sheet_error() -> Schema:
 def _left_out() -> Schema:
     texts = {name: listed(TEXT) for name in ("left_out", "named", "laws", "slots")}
     ends = {name: or_null(NUMBER) for name in ("before", "after")}
-    one = {"rig": TEXT, "verdict": TEXT, **texts, "slot_right": or_null(FLAG), **ends}
+    one = {
+        "rig": TEXT,
+        "verdict": TEXT,
+        "error": TEXT,
+        **texts,
+        "slot_right": or_null(FLAG),
+        **ends,
+    }
     return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
 
 
