@@ -22,6 +22,7 @@ from workbench.modelica import read_library
 from workbench.proposing.places import places
 from workbench.proposing.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.recording import Vector
+from workbench.report.power_checks import format_left_out
 from workbench.system import OBSERVER
 from workbench.systems import load_system
 from workbench.template import AREA, OUTLET, write_system
@@ -144,6 +145,18 @@ def test_the_estimated_function_is_the_law(proposal: Path) -> None:
     found = 1.0 + own.function.to_numpy()[seen]
     found *= truth.mean() / found.mean()
     assert np.abs(found - truth).max() < 0.15 * np.ptp(truth)
+
+
+def test_slots_that_are_proposed_rightly_are_counted() -> None:
+    shown = {"rig": "--seed 1", "verdict": "unexplained", "error": "", "named": [], "before": None}
+    shown |= {"left_out": ["A"], "laws": ["a law"], "slots": ["a"], "after": None}
+    rows = [
+        shown | {"slot_right": True},
+        shown | {"slot_right": False, "slots": [], "laws": []},
+        shown | {"slot_right": False, "verdict": "nothing"},  # which recordings do not show
+        shown | {"slot_right": None, "left_out": []},  # in no catalogue
+    ]
+    assert format_left_out(rows).endswith("right slot in 1 of 2 sets that show the cause")
 
 
 def test_nothing_is_proposed_where_nothing_is_missing(

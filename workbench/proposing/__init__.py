@@ -128,12 +128,13 @@ def _diagnosed(
         outcome = diagnose(
             *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
         )
-    named = [one for cause in outcome.diagnosis.causes for one in _named(cause.effect, forms)]
-    if outcome.extension is not None and named:
-        text = package(library, [one.written for one in named])
+    named = {
+        name
+        for cause in outcome.diagnosis.causes
+        for name in (cause.effect.name, *cause.confusable_with)
+    }
+    kept = [one.written for name, one in forms.items() if name in named]
+    if outcome.extension is not None and kept:
+        text = package(library, kept)
         write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome
-
-
-def _named(effect: Effect, forms: dict[str, Candidate]) -> list[Candidate]:
-    return [forms[effect.name]] if effect.name in forms else []

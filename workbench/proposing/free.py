@@ -78,15 +78,22 @@ class Estimate:
         """Where it acts, and what it depends on."""
         return self.prospect.law
 
-    def function(self) -> tuple[Vector, Vector, Vector]:
-        """What it depends on, its function, and the standard deviation of that; (n,) each."""
+    def function(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """What it depends on, its function, deviations of that and of its shape; (n,) each.
+
+        The shape is the function less its mean, which calibrated levels may take.
+        """
         knots = self.prospect.knots
         if knots is None:
-            return np.zeros(1), self.coefficients, np.sqrt(np.diag(self.posterior))
+            sigma = np.sqrt(np.diag(self.posterior))
+            return np.zeros(1), self.coefficients, sigma, np.zeros(1)
         values = np.linspace(knots.low, knots.high, _POINTS)
         basis = knots.basis(values)
-        sigma = np.sqrt(np.einsum("ij,jk,ik->i", basis, self.posterior, basis))
-        return values, basis @ self.coefficients, sigma
+        whole, shape = (
+            np.sqrt(np.einsum("ij,jk,ik->i", one, self.posterior, one))
+            for one in (basis, basis - basis.mean(axis=0))
+        )
+        return values, basis @ self.coefficients, whole, shape
 
 
 def _written(name: str, prospect: Prospect) -> Written:

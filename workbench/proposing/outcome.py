@@ -132,12 +132,12 @@ class Proposal:
         return pd.DataFrame(rows)
 
     def functions(self) -> pd.DataFrame:
-        """Estimated functions with their 95 % bands, in SI units."""
+        """Estimated functions with their 95 % bands, and those of their shapes, in SI units."""
         tables = []
         for one in self.estimates:
             if one.law.influence is None:
                 continue
-            values, function, sigma = one.function()
+            values, function, sigma, shape = one.function()
             tables.append(
                 pd.DataFrame(
                     {
@@ -151,6 +151,8 @@ class Proposal:
                         "function": function,
                         "low": function - _QUANTILE * sigma,
                         "high": function + _QUANTILE * sigma,
+                        "shape_low": function - _QUANTILE * shape,
+                        "shape_high": function + _QUANTILE * shape,
                     }
                 )
             )

@@ -36,7 +36,7 @@ def write_proposal(
 
 
 def functions_figure(found: Proposal) -> Figure:
-    """Draw the likeliest functions with their 95 % bands."""
+    """Draw the likeliest functions with the 95 % bands of their shapes."""
     shown = [one for one in found.estimates if one.law.influence is not None][:_SHOWN]
     table = found.functions()
     with mpl.rc_context(STYLE | {"font.size": 8}):
@@ -52,10 +52,12 @@ def functions_figure(found: Proposal) -> Figure:
                 & (table.carrier == law.carrier.text)
                 & (table.depends_on == law.influence.text)
             ]
-            axes.fill_between(own.value, own.low, own.high, color=LIGHT["raw"], alpha=0.3)
+            axes.fill_between(
+                own.value, own.shape_low, own.shape_high, color=LIGHT["raw"], alpha=0.3
+            )
             axes.plot(own.value, own.function, color=LIGHT["measured"])
             axes.axhline(0.0, color=LIGHT["raw"], linewidth=0.6)
-            axes.set_xlabel(f"{law.influence.text} [{law.influence.unit or '?'}]", fontsize=7)
+            axes.set_xlabel(f"{law.influence.short} [{law.influence.unit or '?'}]")
             axes.set_ylabel(f"function [{law.carrier.unit or '?'}]")
             tied = "tied" if one in found.tied else f"{one.evidence:.0f} nat"
             axes.set_title(
