@@ -128,13 +128,8 @@ def _diagnosed(
         outcome = diagnose(
             *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
         )
-    named = {
-        name
-        for cause in outcome.diagnosis.causes
-        for name in (cause.effect.name, *cause.confusable_with)
-    }
-    kept = [one.written for name, one in forms.items() if name in named]
-    if outcome.extension is not None and kept:
-        text = package(library, kept)
-        write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
+    if outcome.extension is not None:
+        write_whole(
+            outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), package(library, written)
+        )
     return outcome
