@@ -94,8 +94,7 @@ def _row(
 
 def _told(found: Proposal) -> dict[str, Any]:
     """What is proposed; its slots are also those of laws that are as good."""
-    named = [name for law in found.laws for name in (law.effect.name, *law.confusable_with)]
-    laws = [found.forms[name].law for name in named if name in found.forms]
+    laws = [one.law for one in found.forms.values()] if found.laws else []
     gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
     return {
         "laws": [found.forms[law.effect.name].text for law in found.laws],

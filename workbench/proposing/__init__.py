@@ -5,20 +5,31 @@ laws about the nominal model, by evidence -> free functions, fitted -> closed fo
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from workbench.case import Case
-from workbench.diagnosis import Effect, Outcome, diagnose, read_effects
-from workbench.diagnosis.search import Reporter
+from workbench.diagnosis import (
+    Effect,
+    Outcome,
+    build_everything,
+    diagnose,
+    given_values,
+    read_effects,
+)
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.search import Reporter, beyond
+from workbench.diagnosis.selection import search
 from workbench.diagnosis.thresholds import thresholds
 from workbench.files import write_whole
 from workbench.modelica import Library
 from workbench.proposing.forms import Candidate, candidates
 from workbench.proposing.free import Estimate, estimated
-from workbench.proposing.outcome import Proposal
+from workbench.proposing.outcome import Proposal, description_length
 from workbench.proposing.scan import Prospect, Scan
 from workbench.proposing.writing import PACKAGE, extended_library, package
 from workbench.system import OBSERVER, System
@@ -26,6 +37,7 @@ from workbench.system import OBSERVER, System
 __all__ = ["Proposal", "needs_law", "propose"]
 
 _OF_PLACE = 2  # of one place, since about the nominal model a wrong place may fake anything
+_OF_FORMS = 2  # closed forms: sizes of some are not sure beside their own shape
 _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 
@@ -71,10 +83,21 @@ def propose(
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
     forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
-    outcome = _diagnosed(
-        system, cases, library, effects, forms, out, workers, report, held_out=held_out
-    )
-    return Proposal(before, tuple(scan.prospects), tuple(estimates), tuple(tied), forms, outcome)
+    forms = _surviving(system, library, cases, forms, workers, report)
+    found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
+    proposal = Proposal(before, *found, forms, None)
+    # Beside what bends to the rest, a law may not be seen; alone it may explain a part.
+    comparison = replace(system.comparison, left=1.0)
+    ways = [(system, effects), (replace(system, comparison=comparison), ())]
+    for judged, beside in ways if before.diagnosis.verdict == "unexplained" else ways[:1]:
+        for name in list(forms)[:_OF_FORMS]:
+            own = {name: forms[name], **forms}
+            rest = (out, workers, report, held_out)
+            outcome = _diagnosed(judged, cases, library, beside, own, *rest)
+            proposal = Proposal(before, *found, own, outcome)
+            if proposal.laws:
+                return proposal
+    return proposal
 
 
 def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
@@ -102,34 +125,69 @@ def _forms(estimate: Estimate) -> list[Candidate]:
     return list(candidates(prospect.law, prospect.knots, scale))
 
 
+def _surviving(
+    system: System,
+    library: Library,
+    cases: Sequence[Case],
+    forms: Mapping[str, Candidate],
+    workers: int,
+    report: Reporter,
+) -> dict[str, Candidate]:
+    """The closed form with the shortest description, first, and those that are as good.
+
+    They are found as causes are, by what they predict of recordings that they were not fitted to.
+    Beside others each would be one of many: forms of one law are alike.
+    """
+    report(f"{len(forms)} closed forms, each alone")
+    base = system.models[OBSERVER].name
+    with tempfile.TemporaryDirectory() as scratch:
+        extended, own = _as_effects(library, base, forms, Path(scratch))
+        path = Path(scratch) / "Forms.fmu"
+        build_everything(system, extended, own, path)
+        given = given_values(path, system)
+        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+            decides = thresholds(len(own), left=system.comparison.left)
+            fit = Fit(simulations, own, replace(decides, most=1))
+            steps = search(fit, own, report).steps
+    if not steps:
+        return {}
+    before, rivals = steps[0].before, steps[0].rivals
+    near = max(decides.form, decides.form_share * beyond(before, rivals[0]))
+    alike = [one for one in rivals if beyond(one, rivals[0]) < near]
+    names = [one.active[-1].name for one in sorted(alike, key=description_length)]
+    return {name: forms[name] for name in names}
+
+
+def _as_effects(
+    library: Library, base: str, forms: Mapping[str, Candidate], folder: Path
+) -> tuple[Library, list[Effect]]:
+    """A library with closed forms, and these: the likelier law and the simpler form first."""
+    extended = extended_library(library, [one.written for one in forms.values()], folder)
+    order = list(forms)
+    own = [one for one in read_effects(extended, base) if one.name in forms]
+    return extended, sorted(own, key=lambda one: order.index(one.name))
+
+
 def _diagnosed(
     system: System,
     cases: Sequence[Case],
     library: Library,
     effects: Sequence[Effect],
-    forms: dict[str, Candidate],
+    forms: Mapping[str, Candidate],
     out: Path,
     workers: int,
     report: Reporter,
-    *,
     held_out: Sequence[Case],
 ) -> Outcome:
-    """Diagnose with closed forms beside the catalogue; of equals what it has is named."""
-    report(f"{len(forms)} closed forms beside {len(effects)} effects")
+    """Diagnose with the first closed form beside the catalogue; of equals, that has its name."""
+    first = dict(list(forms.items())[:1])
+    report(f"{', '.join(first)} beside {len(effects)} effects")
     with tempfile.TemporaryDirectory() as scratch:
-        written = [one.written for one in forms.values()]
-        extended = extended_library(library, written, Path(scratch))
-        every = read_effects(extended, system.models[OBSERVER].name)
-        # The likelier law first, and the simpler form: of equals the first is named.
-        order = list(forms)
-        own = sorted(
-            (one for one in every if one.name in forms), key=lambda one: order.index(one.name)
-        )
+        extended, own = _as_effects(library, system.models[OBSERVER].name, first, Path(scratch))
         outcome = diagnose(
             *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
         )
     if outcome.extension is not None:
-        write_whole(
-            outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), package(library, written)
-        )
+        text = package(library, [one.written for one in forms.values()])
+        write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome

@@ -5,9 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
+from scipy.stats import ttest_rel
 
 from workbench.diagnosis import Cause, Outcome
+from workbench.diagnosis.search import Fitted
 from workbench.proposing.forms import MARK, Candidate
 from workbench.proposing.free import Estimate
 from workbench.proposing.scan import Prospect
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _QUANTILE = 1.96  # of a normal distribution, 95 %
+_CHANCE = 0.05  # that held-out recordings fare better with a law that is none
 _NONE = "No law is proposed"
 
 
@@ -29,7 +33,8 @@ class Proposal:
     prospects : of all laws as free functions about the nominal model, the likeliest first.
     estimates : those that were fitted in full, the likeliest first.
     tied : of them, those that these recordings do not tell from the first.
-    forms : closed forms of these, by name of their class.
+    forms : of the closed forms of these the one that explains most, and those that are as good, by
+        name of their class.
     outcome : of the diagnosis with them beside the catalogue; None if it was not made.
     """
 
@@ -50,15 +55,25 @@ class Proposal:
         )
 
     def _supported(self, outcome: Outcome) -> bool:
-        """Whether errors fall on what was held out, and, of what was explained, by less."""
+        """Whether errors fall on what was held out, and, of what was explained, with less.
+
+        Without recordings that were never fitted, of what is held out in turn, by a paired t-test
+        of its mean squares.
+        """
         gain = outcome.diagnosis.gain
         held_out = [one for one in outcome.errors if one.held_out]
         before, after = (sum(one.samples * one.rms[i] ** 2 for one in held_out) for i in (0, 1))
-        if gain is None or gain.high >= gain.before or (held_out and after >= before):
+        if gain is None or (held_out and after >= before):
+            return False
+        squares = np.square(list(gain.recordings.values()))
+        chance = ttest_rel(squares[:, 0], squares[:, 1], alternative="greater").pvalue
+        if not held_out and not chance < _CHANCE:
             return False
         if self.before.diagnosis.verdict == "unexplained":
             return True
-        return description_length(outcome) < description_length(self.before)
+        return description_length(outcome.diagnosis.best) < description_length(
+            self.before.diagnosis.best
+        )
 
     @property
     def sentence(self) -> str:
@@ -79,20 +94,21 @@ class Proposal:
             if cause.effect.name not in self.forms
         ]
         beside = f", beside {' and '.join(known)}" * bool(known)
+        part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
         return (
-            f"{MARK.capitalize()}: {'; and '.join(map(self._said, self.laws))}{beside}. On "
+            f"{MARK.capitalize()}{part}: {'; and '.join(map(self._said, self.laws))}{beside}. On "
             f"held-out recordings the error falls from {gain.before:.1f} to {gain.after:.1f} times "
             f"the noise. As a free function it is {where}."
         )
 
     def _said(self, cause: Cause) -> str:
         """A law in words, with those that are as good."""
-        others = [
-            f"{self.forms[name].law.short}, {self.forms[name].form.text}"
-            if name in self.forms
-            else name
-            for name in cause.confusable_with
+        alike = [
+            f"{one.law.short}, {one.form.text}"
+            for name, one in self.forms.items()
+            if name != cause.effect.name
         ]
+        others = [*alike, *cause.confusable_with]
         return self.forms[cause.effect.name].text + f" (or {'; '.join(others)})" * bool(others)
 
     def summary(self) -> str:
@@ -164,6 +180,7 @@ class Proposal:
             "sentence": self.sentence,
             "mark": MARK,
             "tied": [one.law.text for one in self.tied],
+            "alike": {name: one.text for name, one in self.forms.items()},
             "laws": [
                 {
                     "class": cause.effect.name,
@@ -187,13 +204,12 @@ class Proposal:
         return functions_figure(self)
 
 
-def description_length(found: Outcome) -> float:
+def description_length(best: Fitted) -> float:
     """What recordings and the sizes of causes take to be told [nat], up to a constant.
 
     Half the deviance, and half the logarithm of the number of means that last for each parameter.
     Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
     """
-    best = found.diagnosis.best
     lin = best.linearised
     count = sum(one.errors.size for one in lin.evidence) / lin.lasting
     return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)
