@@ -26,6 +26,7 @@ from workbench.diagnosis.simulator import (
     simulating,
 )
 from workbench.diagnosis.thresholds import SOUND, Soundness
+from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix
 from workbench.pool import Pool
 from workbench.system import System
@@ -83,7 +84,14 @@ class Simulations:
         coarse = Simulated(path, system, tuple(self.recordings))
         self.simulated = coarse._replace(parts=settled_parts(coarse, self.nominal))
         self._alone = self._workers == 1
-        self._pool = self._opened()
+        self._at = list(range(len(cases)))  # of each recording, among all forms
+        self._with, self._without = list(self._at), list(self._at)
+        self._refused: dict[int, InputError] = {}
+        self._forms = self._weighed([*self.recordings, *self._lesser()])
+        self._pool = Pool(
+            self._workers, simulating, self.simulated._replace(recordings=tuple(self._forms))
+        )
+        self._choose()
         # Long ones first: the last one to finish leaves the other processors idle.
         self._order = sorted(range(len(cases)), key=lambda k: -self.recordings[k].time.size)
         self._interrupted = threading.Event()
@@ -105,15 +113,33 @@ class Simulations:
         given = (case, self.system, signals, self.nominal, self._motion, self._sound)
         return prepare(*given, restarting=restarting)
 
-    def _opened(self) -> Pool[Simulator]:
-        """Weigh what is uncertain in the recordings, and start the worker processes."""
-        with simulating(self.simulated) as own:
-            for k, case in enumerate(self.cases):
-                said = {**self.given, **self.system.set_by(case.conditions)}
-                self.recordings[k] = own.weighed(k, said)
-            self.begin = [own.begin(k) for k in range(len(self.cases))]
+    def _lesser(self) -> list[Samples]:
+        """Recordings as they are where what is restarted does not count."""
+        found: list[Samples] = []
+        for k in (k for k, one in enumerate(self.recordings) if one.restarted.any()):
+            try:
+                found.append(self._ready(self.cases[k], restarting=False))
+                self._without[k] = len(self.cases) + len(found) - 1
+            except InputError as error:
+                self._refused[k] = error
+        return found
+
+    def _weighed(self, forms: Sequence[Samples]) -> list[Samples]:
+        """Forms of recordings, with what is uncertain in them weighed."""
+        owner = {at: k for k, at in [*enumerate(self._with), *enumerate(self._without)]}
+        with simulating(self.simulated._replace(recordings=tuple(forms))) as own:
+            weighed = []
+            for at in range(len(forms)):
+                conditions = self.cases[owner[at]].conditions
+                weighed.append(own.weighed(at, {**self.given, **self.system.set_by(conditions)}))
+            self._begins = [own.begin(at) for at in range(len(forms))]
+        return weighed
+
+    def _choose(self) -> None:
+        """Take the forms of recordings that are asked for."""
+        self.recordings[:] = [self._forms[at] for at in self._at]
+        self.begin = [self._begins[at] for at in self._at]
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
-        return Pool(self._workers, simulating, self.simulated)
 
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
         """Let samples of some recordings count, or not, where states can be restarted.
@@ -123,13 +149,12 @@ class Simulations:
         InputError
             If a recording has too little else.
         """
-        if not numbers:
-            return
-        for k, one in [(k, self._ready(self.cases[k], restarting=counting)) for k in numbers]:
-            self.recordings[k] = one
-        self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
-        self._pool.close()
-        self._pool = self._opened()
+        for k in numbers if not counting else ():
+            if k in self._refused:
+                raise self._refused[k]
+        for k in numbers:
+            self._at[k] = (self._with if counting else self._without)[k]
+        self._choose()
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
         """Errors of every recording at its own point.
@@ -138,7 +163,7 @@ class Simulations:
         ----------
         points : values of the FMU's variables and of delays, one mapping for each recording.
         """
-        found = self._gathered({k: (Simulator.at, k, points[k]) for k in self._order})
+        found = self._gathered({k: (Simulator.at, self._at[k], points[k]) for k in self._order})
         return [found[k] for k in range(len(self.recordings))]
 
     def derivatives(
@@ -148,7 +173,7 @@ class Simulations:
     ) -> list[Matrix]:
         """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p)."""
         found = self._gathered(
-            {k: (Simulator.derivatives, k, points[k], columns) for k in self._order}
+            {k: (Simulator.derivatives, self._at[k], points[k], columns) for k in self._order}
         )
         return [found[k] for k in range(len(self.recordings))]
 
@@ -160,13 +185,18 @@ class Simulations:
     ) -> list[Matrix]:
         """As `derivatives`, of columns that act by factors `courses` of each recording, (n, p)."""
         found = self._gathered(
-            {k: (Simulator.derivatives, k, points[k], columns, courses[k]) for k in self._order}
+            {
+                k: (Simulator.derivatives, self._at[k], points[k], columns, courses[k])
+                for k in self._order
+            }
         )
         return [found[k] for k in range(len(self.recordings))]
 
     def along(self, points: Sequence[Mapping[str, float]], watched: Sequence[str]) -> list[Matrix]:
         """Variables of the FMU at the samples of every recording, each (n, w); see `at`."""
-        found = self._gathered({k: (Simulator.along, k, points[k], watched) for k in self._order})
+        found = self._gathered(
+            {k: (Simulator.along, self._at[k], points[k], watched) for k in self._order}
+        )
         return [found[k] for k in range(len(self.recordings))]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
