@@ -68,9 +68,13 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
 
 def test_two_processes_at_the_first_compile_leave_whole_code(home: Path) -> None:
     both = [started(home) for _ in range(2)]
+    told = []
     for process in both:
         with process:
-            assert process.communicate(timeout=120) == ("0 kept\n", "")
+            told.append(process.communicate(timeout=120))
+    # On a busy machine the other one may begin when the first has ended.
+    assert ("0 kept\n", "") in told
+    assert set(told) <= {("0 kept\n", ""), ("1 kept\n", "")}
     assert solved(home) == "1 kept"
     assert [file.suffix for file in home.rglob("*") if file.is_file()] == [".code"] * len(
         [file for file in home.rglob("*") if file.is_file()]

@@ -1,7 +1,7 @@
 """Published recordings become case folders: the publisher's own files, checked by their checksums.
 
 The workbench holds none of them. What it knows of a set is a `Published`, which a system's
-companion has as `PUBLISHED`.
+companion has as `PUBLISHED`, a package in its module `published`.
 """
 
 import hashlib
@@ -16,6 +16,7 @@ from typing import Any
 import tomli_w
 
 from workbench.case import KEYS, Case, read_case
+from workbench.companion import companion_part
 from workbench.errors import InputError
 from workbench.files import claimed, write_json, write_whole
 from workbench.provenance import commit
@@ -144,7 +145,11 @@ def published(which: str) -> Published:
 
 def _known(companion: str) -> Published | None:
     """What a companion knows of published recordings, if there is one, and it does."""
-    found = getattr(import_module(companion), "PUBLISHED", None) if companion else None
+    if not companion:
+        return None
+    # A package has it in a part of its own: commands ask each package whether it has some, too.
+    own = companion_part(companion, "published") or import_module(companion)
+    found = getattr(own, "PUBLISHED", None)
     return found if isinstance(found, Published) else None
 
 

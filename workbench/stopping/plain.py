@@ -78,7 +78,7 @@ def quantile(shortness: Vector, probability: float) -> tuple[float, float, float
     Examples
     --------
     >>> quantile(np.arange(1.0, 10_001.0), 1e-2)
-    (100.0, 81.0, 120.0)
+    (100.0, 81.0, 121.0)
     """
     n = shortness.size
     low, high = (int(binom.ppf(share, n, probability)) for share in (0.025, 0.975))
