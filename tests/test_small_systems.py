@@ -24,6 +24,8 @@ from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.units import quantity
 
+from .built import build_here
+
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
@@ -240,11 +242,10 @@ def test_a_unit_may_begin_with_one_over() -> None:
 # --- without states ---
 
 
-@pytest.mark.parametrize("fmi", ["2", "3"])
-def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, fmi: str) -> None:
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, fmi: int) -> None:
     file = tmp_path / "Balance.fmu"
-    build = ["fmu", "build", str(balance / "package.mo"), "Balance.Observer"]
-    assert main([*build, "--fmi", fmi, "--out", str(file)]) == 0
+    build_here(balance / "package.mo", "Balance.Observer", file, fmi)
     findings = check(file, instantiations=10)
     assert is_fit(findings)
     (integrated,) = [one for one in findings if "not tried: the FMU has no" in one.reason]
