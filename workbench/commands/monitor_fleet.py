@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from workbench.answer import Answer, Measure
+from workbench.commands.cluster import open_cluster
 from workbench.commands.extras import require
 from workbench.commands.output import Done, Output
 from workbench.errors import InputError
@@ -84,21 +85,7 @@ def _written(provenance: dict[str, Any], found: Monitored, out: Path) -> None:
 def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet] | DaskPool[Fleet]":
     if options.cluster is None:
         return Pool(min(options.workers, count), serving, fleet)
-    require("distributed", "cluster", "which works with a Dask cluster", "command line, --cluster")
-    from workbench.tuning.cluster import DaskPool
-
-    modules = [fleet.system.companion] if fleet.system.companion else []
-    try:
-        return DaskPool(options.cluster, serving, fleet, _LIMIT, modules=modules)
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:
-        raise InputError(
-            where=f"command line, --cluster {options.cluster}",
-            found=f"no scheduler ({error})",
-            expected="the address of a running one, such as tcp://10.0.0.1:8786",
-            remedy="start one with 'dask scheduler', and workers with 'dask worker ADDRESS'",
-        ) from None
+    return open_cluster(options.cluster, serving, fleet, _LIMIT, fleet.system)
 
 
 def _summary(

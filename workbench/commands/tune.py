@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from workbench.case import Case
-from workbench.commands.extras import require
+from workbench.commands.cluster import open_cluster
 from workbench.commands.inputs import given_cases, model_names
 from workbench.commands.output import Done, Output
 from workbench.errors import InputError, WorkerError
@@ -148,23 +148,7 @@ def _one_interruption() -> Iterator[None]:
 def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[Evaluator]":
     if options.cluster is None:
         return evaluators(job, options.workers, options.timeout)
-    require("distributed", "cluster", "which works with a Dask cluster", "command line, --cluster")
-    from workbench.tuning.cluster import DaskPool
-
-    try:
-        companion = [job.system.companion] if job.system.companion else []
-        return DaskPool(
-            *(options.cluster, Evaluator, job, options.timeout), modules=companion, warn=_warn
-        )
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:
-        raise InputError(
-            where=f"command line, --cluster {options.cluster}",
-            found=f"no scheduler ({error})",
-            expected="the address of a running one, such as tcp://10.0.0.1:8786",
-            remedy="start one with 'dask scheduler', and workers with 'dask worker ADDRESS'",
-        ) from None
+    return open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, _warn)
 
 
 def _warn(message: str) -> None:

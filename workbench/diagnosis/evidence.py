@@ -85,7 +85,7 @@ class Simulations:
         self.simulated = coarse._replace(parts=settled_parts(coarse, self.nominal))
         self._alone = self._workers == 1
         self._at = list(range(len(cases)))  # of each recording, among all forms
-        self._with, self._without = list(self._at), list(self._at)
+        self._without = list(self._at)
         self._refused: dict[int, InputError] = {}
         self._forms = self._weighed([*self.recordings, *self._lesser()])
         self._pool = Pool(
@@ -126,12 +126,12 @@ class Simulations:
 
     def _weighed(self, forms: Sequence[Samples]) -> list[Samples]:
         """Forms of recordings, with what is uncertain in them weighed."""
-        owner = {at: k for k, at in [*enumerate(self._with), *enumerate(self._without)]}
+        owners = [*self._at, *(k for k, at in enumerate(self._without) if at != k)]
         with simulating(self.simulated._replace(recordings=tuple(forms))) as own:
             weighed = []
-            for at in range(len(forms)):
-                conditions = self.cases[owner[at]].conditions
-                weighed.append(own.weighed(at, {**self.given, **self.system.set_by(conditions)}))
+            for at, k in enumerate(owners):
+                said = self.system.set_by(self.cases[k].conditions)
+                weighed.append(own.weighed(at, {**self.given, **said}))
             self._begins = [own.begin(at) for at in range(len(forms))]
         return weighed
 
@@ -153,7 +153,7 @@ class Simulations:
             if k in self._refused:
                 raise self._refused[k]
         for k in numbers:
-            self._at[k] = (self._with if counting else self._without)[k]
+            self._at[k] = k if counting else self._without[k]
         self._choose()
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:

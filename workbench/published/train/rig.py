@@ -233,7 +233,7 @@ def _pads(train, work, i, v):  # type: ignore[no-untyped-def]
 
 @compiled
 def _turn(train, way, work, i, v, s):  # type: ignore[no-untyped-def]
-    """One implicit step of an axle, by its own speed; sets its creep force and heats its discs."""
+    """One implicit step of an axle, by its own speed; sets its creep force and heats each disc."""
     omega, r = work.omega[i], train.radius[i] + _at(way.rolling, s)
     mu0, load, K = _at(way.mu0, s), work.loads[i], train.stiffness[i]
     w, dw = v - r * omega, 1e-4

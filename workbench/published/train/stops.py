@@ -54,7 +54,7 @@ class Faults:
     late : (8,) delay of a speed sensor.
     lag : (4,) time constant of a bogie's cylinders behind their valve.
     reading : (4,) relative error of a pressure sensor.
-    glazing : share of the friction that is lost on discs far above 110 degrees C.
+    glazing : share of the friction that is lost on a disc far above 110 degrees C.
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
 
