@@ -42,13 +42,13 @@ class Law:
 
     Attributes
     ----------
-    source : C file.
+    sources : C files by the name of the file of the runtime that they take the place of.
     tables : text by name of the headers that it includes.
     described : turns the description of the plain model into that of the stepped one.
     resources : text by name of files that the FMU holds for people.
     """
 
-    source: Path
+    sources: Mapping[str, Path]
     tables: Mapping[str, str]
     described: Callable[[str], str]
     resources: Mapping[str, str]
@@ -84,7 +84,7 @@ def assemble(
     parts: list[str | bytes] = [draft.header, draft.source]
     parts += law.tables.values() if law else []
     parts += [file.read_bytes() for file in sorted(RUNTIME.glob("*.[ch]"))]
-    parts += [law.source.read_bytes()] if law else []
+    parts += [file.read_bytes() for file in law.sources.values()] if law else []
     digits = digest([*parts, str(fmi)])
     groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])
     token = "{" + "-".join(groups) + "}"
@@ -98,8 +98,9 @@ def assemble(
         sources = folder / "sources"
         write_sources(sources, fmi, {**generated, **(law.tables if law else {})}, _HEADERS)
         if law:
-            # Under the name of the file that it replaces, so that the list of sources stays right.
-            (sources / "integrator.c").write_bytes(law.source.read_bytes())
+            # Under the names of files that they replace, so that the list of sources stays right.
+            for replaced, file in law.sources.items():
+                (sources / replaced).write_bytes(file.read_bytes())
             description = law.described(description)
             (folder / "resources").mkdir()
             for resource, text in law.resources.items():

@@ -74,8 +74,14 @@ class GeneratedCode:
     jacobian_p: ca.Sparsity
 
 
-def generate(model: StateSpace, token: str) -> GeneratedCode:
-    """Write the C of `model`; `token` identifies the FMU (FMI's guid, instantiationToken)."""
+def generate(model: StateSpace, token: str, prefix: str = "model") -> GeneratedCode:
+    """Write the C of a model.
+
+    Parameters
+    ----------
+    token : identifies the FMU (FMI's guid, instantiationToken).
+    prefix : of all names in the source, and name of the header that declares them.
+    """
     rows = ca.vertcat(model.f, model.w)
     jacobian_xu = ca.jacobian(rows, ca.vertcat(model.x, model.u))
     jacobian_p = ca.jacobian(rows, model.p)
@@ -88,18 +94,20 @@ def generate(model: StateSpace, token: str) -> GeneratedCode:
     }
     variables = [*model.states, *model.inputs, *model.parameters]
     tables = [
-        _table("double", "model_start", [_number(v.start) for v in variables]),
-        _table("double", "model_nominal", [_number(v.nominal or 1.0) for v in model.states]),
-        _table("unsigned char", "model_tunable", [str(int(t)) for t in model.tunable]),
-        _table("char *const", "model_assertion_text", [_text(t) for t in model.assertion_texts]),
+        _table("double", f"{prefix}_start", [_number(v.start) for v in variables]),
+        _table("double", f"{prefix}_nominal", [_number(v.nominal or 1.0) for v in model.states]),
+        _table("unsigned char", f"{prefix}_tunable", [str(int(t)) for t in model.tunable]),
+        _table(
+            "char *const", f"{prefix}_assertion_text", [_text(t) for t in model.assertion_texts]
+        ),
     ]
     for name, pattern in (("xu", jacobian_xu.sparsity()), ("p", jacobian_p.sparsity())):
         tables += [
-            _table("int", f"model_jacobian_{name}_column", [str(c) for c in pattern.colind()]),
-            _table("int", f"model_jacobian_{name}_row", [str(r) for r in pattern.row()]),
+            _table("int", f"{prefix}_jacobian_{name}_column", [str(c) for c in pattern.colind()]),
+            _table("int", f"{prefix}_jacobian_{name}_row", [str(r) for r in pattern.row()]),
         ]
     functions = [
-        _function(model, name, result, expression)
+        _function(model, f"{prefix}_{name}", result, expression)
         for name, (result, expression) in evaluations.items()
     ]
     sizes = {
@@ -120,7 +128,9 @@ def generate(model: StateSpace, token: str) -> GeneratedCode:
             "",
         ]
     )
-    opening = f'/* Equations of the model {model.name}. */\n#include "model.h"\n#include <math.h>\n'
+    opening = (
+        f'/* Equations of the model {model.name}. */\n#include "{prefix}.h"\n#include <math.h>\n'
+    )
     return GeneratedCode(
         header=header,
         source="\n".join([opening, *tables, "", *functions]),
@@ -158,8 +168,7 @@ def _function(model: StateSpace, name: str, result: str, expression: ca.SX) -> s
     (shared,) = ca.cse([ca.densify(expression)]) if expression.numel() else (expression,)
     function = ca.Function(name, [model.t, model.x, model.u, model.p], [shared])
     signature = (
-        f"int model_{name}(double t, const double *x, const double *u, const double *p, "
-        f"double *{result})"
+        f"int {name}(double t, const double *x, const double *u, const double *p, double *{result})"
     )
     body = list(_statements(model, function, result))
     text = "\n".join(body)

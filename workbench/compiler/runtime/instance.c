@@ -136,7 +136,7 @@ void instance_reset(Instance *i) {
     s->time = 0.0;
     s->stop_time = INFINITY;
     s->tolerance = default_tolerance;
-    s->step = 0.0;
+    memset(&s->memory, 0, sizeof s->memory);
     memcpy(s->value, model_start, (NX + NU + NP) * sizeof *s->value);
     i->valid = 0;
     enter(i, INSTANTIATED);
@@ -331,10 +331,17 @@ static COLD Status refuse_value(const Instance *i, unsigned reference, double va
                   value, reference);
 }
 
+/* Whether a variable may not take a value. */
+static inline int unfit(unsigned reference, double value) {
+    return !isfinite(value) &&
+           !(isnan(value) && (int64_t)reference >= REFERENCE_P - MISSABLE_INPUTS &&
+             (int64_t)reference < REFERENCE_P);
+}
+
 static COLD Status check_finite(const Instance *i, const unsigned reference[], int n,
                                 const double value[]) {
     for (int k = 0; k < n; k++) {
-        if (!isfinite(value[k])) {
+        if (unfit(reference[k], value[k])) {
             return refuse_value(i, reference[k], value[k]);
         }
     }
@@ -382,7 +389,7 @@ static Status set_any(Instance *i, const unsigned reference[], size_t n, const d
         if (group != GROUP_X && group != GROUP_U && check_settable(i, reference[k]) != STATUS_OK) {
             return STATUS_ERROR;
         }
-        if (!isfinite(value[k])) {
+        if (unfit(reference[k], value[k])) {
             return refuse_value(i, reference[k], value[k]);
         }
     }
@@ -760,7 +767,7 @@ Status instance_step(Instance *i, double start, double size) {
     i->valid = 0;
     Rosenbrock *const r = &i->integrator;
     switch (rosenbrock_integrate(r, inputs(i), parameters(i), s->tolerance, start + size, &s->time,
-                                 s->value, &s->step)) {
+                                 s->value, &s->memory)) {
     case OUTCOME_REACHED:
         return STATUS_OK;
     case OUTCOME_ASSERTION:

@@ -47,7 +47,7 @@ static inline Group group_of(unsigned reference) {
 typedef struct {
     double time, stop_time; /* stop_time is infinite if not given */
     double tolerance;
-    double step;                      /* size of the integrator's next step, 0 if not known */
+    Memory memory;                    /* of the integrator */
     double value[NX + NU + NP + 1];   /* x, u, p as in model_start */
     int phase, kind;
 } State;

@@ -223,8 +223,8 @@ static double first_step(const Rosenbrock *r, const double *x, double tolerance)
 }
 
 Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, double tolerance,
-                             double end, double *t, double *x, double *step) {
-    double h = *step;
+                             double end, double *t, double *x, Memory *memory) {
+    double h = memory->step;
     int linearised = 0;
     int rejected = 0;
     for (int steps = 0; *t < end; steps++) {
@@ -264,7 +264,7 @@ Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, do
         const double next = used * (rejected ? fmin(factor, 1.0) : factor);
         /* A step cut short by the communication point tells nothing against a larger one. */
         h = used < h ? fmax(h, next) : next;
-        *step = h;
+        memory->step = h;
         *t = t_new;
         memcpy(x, r->x, NX * sizeof *x);
         linearised = 0;

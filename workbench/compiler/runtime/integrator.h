@@ -7,6 +7,7 @@
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
 
+#include "memory.h"
 #include "model.h"
 
 typedef enum {
@@ -34,10 +35,10 @@ typedef struct {
 enum { MAXIMAL_STEPS = 100000 }; /* internal steps in one call, rejected ones included */
 
 /* Advances `*t` and `x` to `end` with constant inputs. The local error of no state exceeds
- * tolerance * (nominal + |x|). `*step` is the step size that the method would take next (0: not
- * known yet). Whatever the outcome, `*t`, `x` and `*step` are those of the last accepted step. */
+ * tolerance * (nominal + |x|). Whatever the outcome, `*t`, `x` and `*memory` are those of the last
+ * accepted step. */
 Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, double tolerance,
-                             double end, double *t, double *x, double *step);
+                             double end, double *t, double *x, Memory *memory);
 
 /* Number (from 0) of the first assertion that is violated, or -1. `holds` is work space. */
 int first_violated(double t, const double *x, const double *u, const double *p, double *holds);
