@@ -3,105 +3,117 @@
 import argparse
 import hashlib
 import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from workbench.commands.extras import require_compiler
 from workbench.commands.output import Done, Output
-from workbench.errors import InputError, closest
 from workbench.files import claimed, write_json, write_whole
-from workbench.observers import Estimator, Gains, choose
-from workbench.observers.gains_file import read_gains, tuned_file
+from workbench.observers import Estimator, Gains, choose, estimators
+from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
+from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.system import REFERENCE, System
 from workbench.systems import load_system, model_path, open_model
 
 if TYPE_CHECKING:
     from workbench.compiler import BuiltFMU  # an extra, needed by this command alone
 
+# Writes the FMU to a file, of a version of FMI, and says which platform comes next.
+_Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
+
 
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Write the observer as an FMU, and the package."""
     require_compiler()
-    from workbench.export import ObserverModel, build_observer, write_package
+    from workbench.export import write_package
 
     system = load_system(options.system)
-    kind, gains, source = _gains(system, options.estimator, options.gains)
-    observer = ObserverModel(system, kind, gains, source.read_text(encoding="utf-8"))
-    reference: Path = options.reference or model_path(system, REFERENCE)
-    name = observer.model.rpartition(".")[2]
-    with claimed(options.out), tempfile.TemporaryDirectory() as scratch:
+    chosen = _choose(system, options.estimator, options.gains)
+    reference: Path | None = options.reference
+    if reference is None and REFERENCE in system.models:
+        reference = model_path(system, REFERENCE)
+    with claimed(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
+        model, make = _maker(stack, system, chosen)
+        name = model.rpartition(".")[2]
 
         def build(fmi: int) -> "BuiltFMU":
             path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"
-            return build_observer(
-                observer, path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}")
-            )
+            return make(path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}"))
 
-        packed = build(2)
-        built = packed if options.fmi == 2 else build(3)
-        ssp = Path(scratch) / f"{name}.ssp"
-        write_package(system, packed.path, reference, ssp)
-        package = {
-            "file": ssp.name,
-            "sha256": _sha256(ssp),
-            "observer": _identity(packed),
-            "reference": {"file": reference.name, "sha256": _sha256(reference)},
-        }
-        summary = _summary(system, gains, source, built) | {"package": package}
+        built = build(options.fmi)
+        summary = _summary(system, chosen, built)
+        files = [built.path]
+        if reference is not None:
+            packed = built if built.fmi == 2 else build(2)
+            ssp = Path(scratch) / f"{name}.ssp"
+            write_package(system, packed.path, reference, ssp)
+            files.append(ssp)
+            summary["package"] = {
+                "file": ssp.name,
+                "sha256": _sha256(ssp),
+                "observer": _identity(packed),
+                "reference": {"file": reference.name, "sha256": _sha256(reference)},
+            }
         # Nothing is written before everything is made.
-        for file in (built.path, ssp):
+        for file in files:
             write_whole(options.out / file.name, file.read_bytes())
         write_json(options.out / "summary.json", summary)
-    output.result(
-        f"written: {options.out / built.path.name}, {ssp.name} and summary.json beside it"
-    )
+    beside = " and ".join([*(file.name for file in files[1:]), "summary.json"])
+    output.result(f"written: {options.out / built.path.name}, {beside} beside it")
     return Done(summary)
 
 
-def _gains(
-    system: System, asked: str | None, path: Path | None
-) -> tuple[type[Estimator], Gains, Path]:
-    """The estimator, its gains, and their file."""
-    classes = system.export.classes
-    if not classes:
-        raise InputError(
-            where=str(system.source),
-            found="no [export.classes]",
-            expected="Modelica classes of estimators, which become FMUs",
-            remedy='name one, such as disturbance_observer = "Observers.DisturbanceObserver"',
-        )
-    if asked is not None and asked not in classes:
-        raise InputError(
-            where=f"--estimator {asked}",
-            found=f"an estimator without a model in Modelica{closest(asked, classes)}",
-            expected=f"one of {', '.join(classes)}",
-            remedy="choose one of these",
-        )
-    kinds = choose(system, list(classes) if path else [asked or next(iter(classes))])
-    reasoned = {}
-    for name, kind in kinds.items():
-        with open_model(system, kind.role) as fmu:
-            reasoned[name] = kind.reasoned(fmu, system)
-    if path is None:
-        (name,) = kinds
-        path = tuned_file(system, name)
-    if path is None:
-        raise InputError(
-            where=f"system '{system.name}'",
-            found="no tuned gains that come with it",
-            expected="gains.toml of 'python -m workbench tune'",
-            remedy="tune the estimator, and give the file with --gains",
-        )
-    gains = read_gains(path, reasoned)
-    return kinds[gains.estimator], gains, path
+@dataclass(frozen=True)
+class _Choice:
+    """An estimator with its gains, the text of their file, and where they are from."""
+
+    kind: type[Estimator]
+    gains: Gains
+    text: str
+    source: str
 
 
-def _summary(system: System, gains: Gains, source: Path, built: "BuiltFMU") -> dict[str, Any]:
+def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
+    """The estimator that is asked for, that of the gains, or the first that has a class."""
+    known = estimators(system)
+    if asked is None:
+        usual = next(iter(system.export.classes), ExtendedKalmanFilter.name)
+        asked = usual if path is None else estimator_of(path, known)
+    kind = choose(system, [asked])[asked]
+    name = kind.tuned_as or kind.name
+    with open_model(system, kind.role) as fmu:
+        gains = kind.reasoned(fmu, system)
+    path = path or tuned_file(system, name)
+    if path is None:
+        return _Choice(kind, gains, format_gains(gains, kind.meaning, {}), gains.source)
+    gains = read_gains(path, {name: gains})
+    return _Choice(kind, gains, path.read_text(encoding="utf-8"), path.name)
+
+
+def _maker(stack: ExitStack, system: System, chosen: _Choice) -> tuple[str, "_Make"]:
+    """Dotted name of an estimator's FMU, and what builds it: of its Modelica class, or its law."""
+    from workbench.export import EstimatorLaw, ObserverModel, build_law, build_observer
+
+    kind, gains = chosen.kind, chosen.gains
+    if kind.name in system.export.classes:
+        observer = ObserverModel(system, kind, gains, chosen.text)
+        return observer.model, partial(build_observer, observer)
+    fmu = stack.enter_context(open_model(system, kind.role))
+    law = EstimatorLaw(kind(fmu, system, gains), chosen.text)
+    return law.model, partial(build_law, law)
+
+
+def _summary(system: System, chosen: _Choice, built: "BuiltFMU") -> dict[str, Any]:
     from workbench.compiler import source_hash
 
+    gains = chosen.gains
     return {
-        "estimator": gains.estimator,
+        "estimator": chosen.kind.name,
         "gains": dict(zip(gains.names, gains.values.tolist(), strict=True)),
         **{name: values.tolist() for name, values in gains.design.items()},
         "fmu": _identity(built),
@@ -109,7 +121,7 @@ def _summary(system: System, gains: Gains, source: Path, built: "BuiltFMU") -> d
             "workbench": version("wheelset-workbench"),
             "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
             "source_sha256": source_hash(system.library),
-            "gains": source.name,
+            "gains": chosen.source,
         },
     }
 

@@ -3,7 +3,8 @@
 This package needs the extra `[compiler]`.
 """
 
+from workbench.export.laws import EstimatorLaw, build_law
 from workbench.export.observer import ObserverModel, build_observer
 from workbench.export.package import write_package
 
-__all__ = ["ObserverModel", "build_observer", "write_package"]
+__all__ = ["EstimatorLaw", "ObserverModel", "build_law", "build_observer", "write_package"]

@@ -5,7 +5,6 @@ makes C of the model, and `sampled.c` takes the place of the integrator.
 """
 
 import math
-import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from workbench.compiler import PLATFORMS, BuiltFMU, Law, assemble
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError, closest
+from workbench.export.description import co_simulated
 from workbench.observers import Estimator, Gains
 from workbench.system import System
 
@@ -71,9 +71,9 @@ def build_observer(
     """
     space = _with_gains(make_explicit(flatten(observer.system.library, observer.model)), observer)
     law = Law(
-        source=_LAW,
+        sources={"integrator.c": _LAW},
         tables={"sampled_data.h": _tables(space, observer)},
-        described=lambda description: _sampled(description, space),
+        described=lambda text: co_simulated(text, space.experiment["Interval"]),
         resources={"gains.toml": observer.gains_file},
     )
     return assemble(space, observer.model, fmu, fmi, platforms, law, report)
@@ -156,13 +156,3 @@ def _rolls(space: StateSpace, system: System) -> tuple[int, int, int, float, int
 def _limit(limit: float | None, default: float) -> str:
     value = default if limit is None else limit
     return repr(value) if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"
-
-
-def _sampled(description: str, space: StateSpace) -> str:
-    """The model description without Model Exchange, and with the time from sample to sample."""
-    root = ET.fromstring(description)
-    for exchange in root.findall("ModelExchange"):
-        root.remove(exchange)
-    (experiment,) = root.findall("DefaultExperiment")
-    experiment.set("stepSize", repr(space.experiment["Interval"]))
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

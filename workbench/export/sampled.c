@@ -194,14 +194,14 @@ static int start(Rosenbrock *r, const double *u) {
 }
 
 Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, double tolerance,
-                             double end, double *t, double *x, double *step) {
+                             double end, double *t, double *x, Memory *memory) {
     (void)tolerance;
     memcpy(r->x, x, NX * sizeof *x);
     int started = 1;
-    if (*step == 0.0) {
+    if (memory->step == 0.0) {
         started = start(r, u);
     } else {
-        const Outcome outcome = take_sample(r, *t, *step, u, p);
+        const Outcome outcome = take_sample(r, *t, memory->step, u, p);
         if (outcome != OUTCOME_REACHED) {
             return outcome;
         }
@@ -213,7 +213,7 @@ Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, do
         return OUTCOME_ASSERTION;
     }
     memcpy(x, r->x, NX * sizeof *x);
-    *step = started ? end - *t : 0.0;
+    memory->step = started ? end - *t : 0.0;
     *t = end;
     return OUTCOME_REACHED;
 }

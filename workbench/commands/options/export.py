@@ -11,28 +11,28 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     export = commands.add_parser(
         "export",
         help=text,
-        description="Write an observer with its gains as a Co-Simulation FMU for all platforms, "
-        "which runs in any FMI tool without Python, and an SSP 1.0 package in which it observes "
-        "the reference model. One communication step takes one sample. Needs the extra "
-        "[compiler].",
+        description="Write an estimator with its gains as a Co-Simulation FMU for all platforms, "
+        "which runs in any FMI tool without Python, and, where the system has a reference model, "
+        "an SSP 1.0 package in which it observes that. One communication step takes one sample. "
+        "Needs the extra [compiler].",
         epilog="examples:\n"
         "  python -m workbench export\n"
         "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
-        "  python -m workbench export --estimator parameter_estimator --fmi 3 --out /tmp/export",
+        "  python -m workbench export --estimator mhe --fmi 3 --out /tmp/export\n"
+        "  python -m workbench export --estimator imm --gains results/tune/ekf/gains.toml",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    which = export.add_mutually_exclusive_group()
-    which.add_argument(
+    export.add_argument(
         "--gains",
         type=Path,
         metavar="FILE",
-        help="gains.toml of 'workbench tune', which names the observer (default: gains tuned on "
-        "the project's cases)",
+        help="gains.toml of 'workbench tune', which names the estimator unless --estimator does "
+        "(default: those that come tuned with the system, else those that follow from the model)",
     )
-    which.add_argument(
+    export.add_argument(
         "--estimator",
         metavar="NAME",
-        help="observer with these tuned gains (default: the first that the system can export)",
+        help="estimator (default: the first in [export.classes] of the system, else ekf)",
     )
     add_system(export)
     export.add_argument(

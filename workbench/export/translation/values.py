@@ -1,0 +1,215 @@
+"""Types and values of translated Python, and how they are written in C."""
+
+import math
+import re
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+INT, DOUBLE, BOOL = "int", "double", "bool"
+_C_NUMBER = {INT: "int", DOUBLE: "double", BOOL: "int"}
+_BRACKETED = re.compile(r"[(\[][^()\[\]]*[)\]]")
+_ATOM = re.compile(r"[\w.]+(->\w+|\.\w+)*")
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number; `kind` is INT, DOUBLE or BOOL."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class Array:
+    """Numbers in memory.
+
+    Attributes
+    ----------
+    kind : of the elements.
+    shape : sizes, None where a size is known only as it runs.
+    strides : elements from one index to the next, of each axis.
+    constant : whether it is only read.
+    """
+
+    kind: str
+    shape: tuple[int | None, ...]
+    strides: tuple[int, ...]
+    constant: bool
+
+
+@dataclass(frozen=True)
+class Record:
+    """A named tuple: a struct of this name, passed by its address."""
+
+    name: str
+    fields: "tuple[tuple[str, Type], ...]"
+    constant: bool
+
+
+@dataclass(frozen=True)
+class Several:
+    """A tuple of records of one type, passed by the address of the first."""
+
+    of: Record
+    count: int
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a function returns: numbers of these kinds, none or several."""
+
+    kinds: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """In C."""
+        if len(self.kinds) < 2:
+            return _C_NUMBER[self.kinds[0]] if self.kinds else "void"
+        return "LawResult_" + "".join(kind[0] for kind in self.kinds)
+
+    @property
+    def definition(self) -> str:
+        """Struct of several numbers."""
+        fields = [f"    {_C_NUMBER[kind]} part{k};\n" for k, kind in enumerate(self.kinds)]
+        return f"typedef struct {{\n{''.join(fields)}}} {self.name};\n"
+
+
+Type: TypeAlias = Number | Array | Record | Several | Results
+
+
+@dataclass(frozen=True)
+class Value:
+    """An expression of C.
+
+    Attributes
+    ----------
+    text : of it; of an array or record its address.
+    known : the number, if it is known now.
+    offset : of an array, elements from `text` on; empty: none.
+    sizes : of an array, for each axis.
+    natural : a whole number that is never negative.
+    reads : depends on memory, which a call may change.
+    acts : changes memory or the model.
+    """
+
+    type: Type
+    text: str
+    known: float | None = None
+    offset: str = ""
+    sizes: "tuple[Value, ...]" = ()
+    natural: bool = False
+    reads: bool = False
+    acts: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Kind of a number."""
+        assert isinstance(self.type, Number)
+        return self.type.kind
+
+    @property
+    def operand(self) -> str:
+        """Text that can stand beside an operator."""
+        return self.text if _is_atom(self.text) else f"({self.text})"
+
+    @property
+    def address(self) -> str:
+        """Text that is passed to a function."""
+        return f"{self.text} + {self.offset}" if self.offset else self.text
+
+    @property
+    def member(self) -> str:
+        """Text in front of the name of a field of a record."""
+        return f"{self.text[1:]}." if self.text.startswith("&") else f"{self.text}->"
+
+
+def _is_atom(text: str) -> bool:
+    """Whether a text is a name, an element or a call, and not made of several by operators."""
+    left, count = text, 1
+    while count and not text.startswith("("):
+        left, count = _BRACKETED.subn("", left)
+    return _ATOM.fullmatch(left) is not None
+
+
+def number(value: float) -> Value:
+    """A constant."""
+    kind = BOOL if isinstance(value, bool) else INT if isinstance(value, int) else DOUBLE
+    natural = kind != DOUBLE and value >= 0
+    return Value(Number(kind), literal(value), known=value, natural=natural)
+
+
+def literal(value: float) -> str:
+    """A constant in C, with all its digits."""
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return str(int(value)) if isinstance(value, int) else repr(float(value))
+
+
+def expression(kind: str, text: str, *of: Value, natural: bool = False) -> Value:
+    """A number that is made of others."""
+    return Value(
+        Number(kind),
+        text,
+        natural=natural,
+        reads=any(one.reads for one in of),
+        acts=any(one.acts for one in of),
+    )
+
+
+def common(first: str, second: str) -> str:
+    """Kind that holds numbers of both kinds."""
+    return first if first == second else DOUBLE if DOUBLE in (first, second) else INT
+
+
+def declaration(type_: Type, name: str) -> str:
+    """Declaration of a name that is not assigned again."""
+    if isinstance(type_, Number):
+        return f"const {_C_NUMBER[type_.kind]} {name}"
+    if isinstance(type_, Array):
+        return f"{'const ' * type_.constant}{_C_NUMBER[type_.kind]} *const {name}"
+    if isinstance(type_, Results):
+        return f"const {type_.name} {name}"
+    record = type_.of if isinstance(type_, Several) else type_
+    return f"{'const ' * record.constant}{record.name} *const {name}"
+
+
+def c_number(kind: str) -> str:
+    """Type of C of a kind of number."""
+    return _C_NUMBER[kind]
+
+
+def field(record: Value, name: str) -> Value | None:
+    """A field of a record; None if it has none of this name."""
+    assert isinstance(record.type, Record)
+    found = dict(record.type.fields).get(name)
+    if found is None:
+        return None
+    text = f"{record.member}{name_in_c(name)}"
+    if isinstance(found, Number):
+        return Value(found, text, reads=not record.type.constant)
+    if isinstance(found, Array):
+        type_ = replace(found, constant=record.type.constant)
+        return Value(type_, text, sizes=tuple(number(size or 0) for size in found.shape))
+    if isinstance(found, Several):
+        return Value(replace(found, of=_as(found.of, record.type.constant)), text)
+    assert isinstance(found, Record)
+    return Value(_as(found, record.type.constant), f"&{text}")
+
+
+def _as(record: Record, constant: bool) -> Record:
+    return replace(record, constant=constant)
+
+
+# Words of C that may be names in Python, and what the runtime defines.
+_RESERVED = (
+    *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float"),
+    *("goto", "inline", "int", "long", "register", "restrict", "short", "signed", "sizeof"),
+    *("static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile"),
+    *("NA", "NP", "NU", "NW", "NX", "NNZ_P", "NNZ_XU"),
+)
+
+
+def name_in_c(name: str) -> str:
+    """A Python name, which may be a word of C."""
+    return f"{name}_" if name in _RESERVED else name
