@@ -60,7 +60,8 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root: Path, folder: Path
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("[  1/1] z ") == 1
-    assert run.stdout.count("The model lacks Seepage, k 0.0004") == 1
+    said = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
+    assert run.stdout.count(said) == 1
 
 
 def test_a_table_is_the_recording_that_a_file_holds(system: wb.System, case: wb.Case) -> None:

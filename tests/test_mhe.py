@@ -13,10 +13,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares, lsq_linear
 
+from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.observers import Estimate
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.observers.mhe import MovingHorizonEstimator
+from workbench.observers.smoother import Smoother
 from workbench.observers.window_cost import cost
 from workbench.system import System
 from workbench.systems import load_system, open_model
@@ -177,9 +179,38 @@ def horizon(
     return MovingHorizonEstimator(fmu, known, gains)
 
 
+def smoother(fmu: FMU, known: System, rare: float = 1e-300) -> Smoother:
+    gains = Smoother.reasoned(fmu, known)
+    design = {**gains.design, "rare": np.array([rare])}
+    return Smoother(fmu, known, type(gains)("smoother", gains.names, gains.values, design, ""))
+
+
 def kalman(fmu: FMU, known: System, samples: tuple[Vector, Matrix, Matrix]) -> Estimate:
     gains = ExtendedKalmanFilter.reasoned(fmu, known)
     return ExtendedKalmanFilter(fmu, known, gains).run(*samples)
+
+
+def test_samples_that_come_late_count_as_if_they_had_come_in_time(
+    linear: tuple[FMU, System],
+) -> None:
+    """Reference: the same samples in time; the level of the first tank comes 5 steps late."""
+    time, u, y = recording()
+    late = 5
+    expected = horizon(*linear, 20).run(time, u, y)
+    estimator = horizon(*linear, 20)
+    estimator.init(time[0], u[0], y[0])
+    for k in range(1, 60):
+        estimator.step(time[k], u[k], np.array([np.nan, y[k, 1]]))
+        if k > late:
+            estimator.fill_in(late, np.array([y[k - late, 0], np.nan]))
+    for age in range(late):
+        estimator.fill_in(age, np.array([y[59 - age, 0], np.nan]))
+    found = estimator.step(time[60], u[60], y[60])
+    # Rounding, over the 1e6 that lie between variances of levels and flows.
+    assert_allclose(found.values, expected.values[60], rtol=1e-9)
+    assert_allclose(found.sigma, expected.sigma[60], rtol=1e-9)
+    with pytest.raises(InputError, match="20 steps old"):
+        estimator.fill_in(20, y[40])
 
 
 @pytest.mark.parametrize("samples", [1, 2, 7, 20, 200])
@@ -303,3 +334,84 @@ def test_more_iterations_never_raise_the_cost(bent: tuple[FMU, System], seed: in
         costs.append(cost(estimator._memory.window))
     # Rounding of a sum of about a hundred squares; steps are refused beyond 1e-9 of it.
     assert (np.diff(costs) <= 1e-6 * costs[0]).all()
+
+
+# --- the smoother, the same problem over a whole recording ---
+
+
+def test_the_smoother_is_the_batch_least_squares_solution(linear: tuple[FMU, System]) -> None:
+    """Reference: the dense problem of a linear model, by an orthogonal factorisation."""
+    samples = recording("Linear", 60)
+    unit = np.tile([0.01, 0.01, 1e-5], 59)
+    offset = residuals(np.zeros(unit.size), "Linear", samples)[0]
+    columns = [residuals(column, "Linear", samples)[0] - offset for column in np.diag(unit)]
+    matrix = np.column_stack(columns)
+    best = np.linalg.lstsq(matrix, -offset, rcond=None)[0] * unit
+    factor = np.linalg.qr(matrix, mode="r")
+    deviations = np.linalg.norm(np.linalg.inv(factor), axis=1) * unit
+    found = smoother(*linear).run(*samples)
+    ends = residuals(best, "Linear", samples)[1]
+    h1, dleak = found.values[1:, 1], found.values[1:, 2]
+    # Rounding, grown by a condition number of 1e3.
+    assert_allclose(h1, ends[:, 0], rtol=1e-10)
+    assert_allclose(dleak, ends[:, 2], rtol=0, atol=1e-10 * 1e-4)
+    assert_allclose(found.sigma[1:, 2], deviations.reshape(-1, 3)[:, 2], rtol=1e-9)
+
+
+def test_the_smoother_knows_no_less_than_the_filter_and_ends_where_it_does(
+    linear: tuple[FMU, System],
+) -> None:
+    samples = recording()
+    found, filtered = smoother(*linear).run(*samples), kalman(*linear, samples)
+    assert (found.sigma <= filtered.sigma * (1.0 + 1e-12)).all()
+    assert found.sigma[40, 2] < 0.8 * filtered.sigma[40, 2]
+    # Rounding, over the 1e6 that lie between variances of levels and flows.
+    assert_allclose(found.values[-1], filtered.values[-1], rtol=1e-10)
+    assert_allclose(found.sigma[-1], filtered.sigma[-1], rtol=1e-10)
+
+
+def test_the_smoother_solves_the_nonlinear_least_squares_problem(
+    bent: tuple[FMU, System],
+) -> None:
+    """Reference: scipy on the textbook terms, from the true levels."""
+    samples = recording("Bent", 60)
+    scale = np.tile([0.01, 0.01, 1e-5], 59)
+    best = least_squares(
+        lambda x: residuals(x, "Bent", samples)[0],
+        *(np.tile([0.95, 0.75, 0.0], 59),),
+        x_scale=scale,
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    found = smoother(*bent).run(*samples)
+    ends = residuals(best.x, "Bent", samples)[1]
+    # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
+    assert_allclose(found.values[1:, 1] / 0.01, ends[:, 0] / 0.01, rtol=0, atol=2e-4)
+    assert_allclose(found.values[1:, 2] / 1e-5, ends[:, 2] / 1e-5, rtol=0, atol=2e-3)
+
+
+def test_the_smoother_keeps_quantities_within_their_bounds(folder: Path) -> None:
+    """Reference: the moving horizon that holds the whole recording, whose bounds are exact."""
+    known = system(folder, "Linear", low=0.9e-4, high=1.5e-4)
+    samples = recording("Linear", 40, after=4e-4)
+    with open_model(known) as fmu:
+        estimator = horizon(fmu, known, 50, rare=1e-300)
+        estimator.run(*samples)
+        window = estimator._memory.window
+        expected = window.arrived[: window.filled[0]]
+        found = smoother(fmu, known).run(*samples)
+    assert (np.abs(found.values[1:, 2] - 0.5e-4) < 1e-15).sum() > 5
+    assert_allclose(found.values[1:, 2], expected[:, 2], rtol=0, atol=1e-6 * 1e-5)
+    assert_allclose(found.values[1:, 1], expected[:, 0], rtol=0, atol=1e-6 * 0.01)
+
+
+def test_the_smoother_refuses_a_recording_that_is_not_over(linear: tuple[FMU, System]) -> None:
+    time, u, y = recording()
+    estimator = smoother(*linear)
+    with pytest.raises(InputError, match="a part of a recording"):
+        estimator.init(time[0], u[0], y[0])
+    with pytest.raises(InputError, match="a part of a recording"):
+        estimator.step(time[1], u[1], y[1])
+    with pytest.raises(InputError, match="a part of a recording"):
+        estimator.advance(np.diff(time), u[1:], y[1:])

@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import checked, given, instance
+from workbench.kernel import Instance, checked, given, instance
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
 from workbench.system import OBSERVER, System
@@ -33,6 +33,26 @@ class Estimate:
     probability: Vector | Matrix
 
 
+@dataclass(frozen=True)
+class Parts:
+    """A law and what it takes, for who writes it in another language.
+
+    Attributes
+    ----------
+    law : compiled.
+    models : that it steps; `several`: it takes the tuple of them, else the only one.
+    settings, memory : named tuples, whose arrays are those of the estimator.
+    width : entries of an estimate.
+    """
+
+    law: Any
+    models: tuple[Instance, ...]
+    several: bool
+    settings: Any
+    memory: Any
+    width: int
+
+
 class Estimator(ABC):
     """Feeds on measured inputs u and outputs y of a system, sample by sample.
 
@@ -55,6 +75,7 @@ class Estimator(ABC):
     tunable : whether it has gains.
     adapts : whether it makes its feedback as it goes; its gains are noise levels.
     meaning : of the gains, with units, for whoever reads their file.
+    offline : whether it needs a whole recording, and has no `init`, `step` and `advance`.
     tuned_as : estimator whose gains it takes; empty: its own.
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
@@ -74,6 +95,7 @@ class Estimator(ABC):
     tunable: ClassVar[bool] = True
     adapts: ClassVar[bool] = False
     meaning: ClassVar[str] = ""
+    offline: ClassVar[bool] = False
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
@@ -89,7 +111,7 @@ class Estimator(ABC):
         inputs = [one.name for one in system.inputs]
         unseen = [one.name for one in system.outputs if one.name not in fmu.states]
         outputs = [*system.reported, *unseen]
-        self._model = instance(fmu, inputs, system.corrections, outputs)
+        self._model: Any = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
         self._t = 0.0
         self._row = np.empty(2 * len(system.columns) + len(self.modes) + 1)
@@ -165,6 +187,14 @@ class Estimator(ABC):
     @abstractmethod
     def _arguments(self) -> tuple[Any, Any]:
         """Settings and memory of the law."""
+
+    @property
+    def parts(self) -> Parts:
+        """The law and what it takes."""
+        settings, memory = self._arguments()
+        several = not isinstance(self._model, Instance)
+        models = self._model if several else (self._model,)
+        return Parts(self._law, models, several, settings, memory, self._row.size)
 
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""

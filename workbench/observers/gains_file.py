@@ -1,6 +1,6 @@
 """The file of gains, `gains.toml`: what the tuning writes, and who runs observers reads."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,7 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
         If the file cannot be read, is for another estimator, or lacks a gain.
     """
     content = _content(path)
-    estimator = content.get("estimator")
-    if not isinstance(estimator, str) or estimator not in reasoned:
-        raise _wrong(path, f"estimator = {shown(estimator)}", f"one of {', '.join(reasoned)}")
-    blank = reasoned[estimator]
+    blank = reasoned[estimator_of(path, reasoned)]
     given = _table(content, "gains", path)
     if missing := [name for name in blank.names if name not in given]:
         raise _wrong(path, f"no {missing[0]} in [gains]", f"the gains {', '.join(blank.names)}")
@@ -48,6 +45,20 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     }
     source = f"tuned, {path.name}"
     return Gains(blank.estimator, blank.names, values, constants, source)
+
+
+def estimator_of(path: Path, known: Collection[str]) -> str:
+    """Name of the estimator that a file of gains is for, one of those that are known.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is for another estimator.
+    """
+    estimator = _content(path).get("estimator")
+    if not isinstance(estimator, str) or estimator not in known:
+        raise _wrong(path, f"estimator = {shown(estimator)}", f"one of {', '.join(known)}")
+    return estimator
 
 
 def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> str:

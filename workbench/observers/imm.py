@@ -247,7 +247,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
             for one in found
         ]
         k, size = len(found), len(self._settings.walk)
-        self._model: Any = tuple(one._model for one in filters)
+        self._model = tuple(one._model for one in filters)
         self._bank = BankSettings(tuple(one._settings for one in filters), changes(system))
         self._memory = BankMemory(
             members=tuple(one._memory for one in filters),

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri, ndtri
 
+from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
-from workbench.kernel import compiled, inlined, linearise, read
+from workbench.kernel import checked, compiled, given, inlined, linearise, read
 from workbench.observers.adaptive import Learning, learn, note, reset, trust
 from workbench.observers.gains import Gains
 from workbench.observers.kalman import (
@@ -40,7 +41,7 @@ ITERATIONS = 1  # of Gauss and Newton for each sample
 RARE = 1e-6
 _SHORTEST = 0.1  # share of a change that is still tried
 _ROUNDS = 5  # of weights, in each iteration
-_ROUNDING = 1e-9  # share of the cost that is not told apart
+ROUNDING = 1e-9  # share of the cost that is not told apart
 
 
 class HorizonSettings(NamedTuple):
@@ -104,7 +105,7 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
+def expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
     """Take and linearise the step from a node, and the outputs there; returns a status."""
     window, layout, n = memory.window, settings.layout, model.x.size
     arrived, h = window.arrived[k], window.steps[k]
@@ -146,6 +147,15 @@ def _learn(settings, memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _fill_in(model, settings, memory, k, y):  # type: ignore[no-untyped-def]
+    """Put samples that were missing to node k; returns a status."""
+    for j in range(y.size):
+        if not np.isnan(y[j]):
+            memory.window.samples[k, j] = y[j]
+    return expand(model, settings, memory, k)
+
+
+@compiled
 def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
     """Best change of the nodes, to first order; the estimate is what the last step leads to.
 
@@ -178,13 +188,13 @@ def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _move(model, settings, memory, share):  # type: ignore[no-untyped-def]
+def move(model, settings, memory, share):  # type: ignore[no-untyped-def]
     """Move the nodes by a share of their change and take the steps from there; a status."""
     window, status = memory.window, 0
     for k in range(window.filled[0]):
         for i in range(memory.filter.z.size):
             window.nodes[k, i] += share * window.change[k, i]
-        status = status or _expand(model, settings, memory, k)
+        status = status or expand(model, settings, memory, k)
     return status
 
 
@@ -195,18 +205,19 @@ def _relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
     Nodes stay where they were linearised if no part of it does.
     """
     before, share = cost(memory.window), 1.0
-    status = _move(model, settings, memory, share)
+    status = move(model, settings, memory, share)
     while not status and share > 0.0:
-        if cost(memory.window) <= before + _ROUNDING * (1.0 + before):
+        if cost(memory.window) <= before + ROUNDING * (1.0 + before):
             break
         less = 0.5 * share if share > _SHORTEST else 0.0
-        status = _move(model, settings, memory, less - share)
+        status = move(model, settings, memory, less - share)
         share = less
     return status
 
 
 @compiled
-def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def horizon_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Estimate the last samples anew, with one that is added; returns a status."""
     window = memory.window
     if h == 0.0:
         status = begin(model, settings, memory.filter, u, y)
@@ -220,7 +231,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         assign_rows(window.covariance, memory.filter.P)
         return status or finish(model, settings, memory.filter, row)
     _append(settings, memory, h, u, y)
-    status = _expand(model, settings, memory, window.filled[0] - 1)
+    status = expand(model, settings, memory, window.filled[0] - 1)
     for iteration in range(settings.iterations):
         _solve(settings, memory, iteration == 0, row)
         status = status or _relinearise(model, settings, memory)
@@ -230,7 +241,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
 @compiled
 def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = horizon_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
         if status:
             return status
     return 0
@@ -262,7 +273,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
     label = "moving horizon estimator"
     rank = 46
     standard = False
-    _law = staticmethod(_law)
+    _law = staticmethod(horizon_law)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -292,6 +303,29 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         """The problem of the last sample and its solution."""
         window: Window = self._memory.window
         return window
+
+    def fill_in(self, age: int, y: Vector) -> None:
+        """Take samples that come late; they count from the next step on.
+
+        Parameters
+        ----------
+        age : steps since they were taken, 0 of the last one.
+        y : (l,) measured outputs; NaN where there is none, or it came in time.
+
+        Raises
+        ------
+        InputError
+            If they are older than the horizon, or than the first step.
+        """
+        k = int(self.window.filled[0]) - 1 - age
+        if age < 0 or k < 0:
+            raise InputError(
+                where=f"estimator {self.name}",
+                found=f"samples that are {age} steps old",
+                expected=f"0 to {self.window.filled[0] - 1}, as many as the horizon has",
+                remedy="give a longer horizon in [design] of the gains",
+            )
+        checked(_fill_in(self._model, self._settings, self._memory, k, given(y)), self.fmu)
 
     def _begin(self, u: Vector, y: Vector) -> None:
         memory, self._memory = self._memory, self._memory.filter

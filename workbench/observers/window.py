@@ -47,7 +47,7 @@ class Window(NamedTuple):
     active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
     scale : (N, s) variances without bounds.
     offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
-    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see `_absorb`.
+    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see `absorb`.
     change : (N, s) best node less node.
     next_mean, next_covariance : as mean and covariance, of the second node.
     before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
@@ -181,7 +181,7 @@ def shift(window):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _absorb(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
+def absorb(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
     """Correct error and P by a sample of unknown `at`, or of an output with slopes c, `at` < 0.
 
     Returns what the way back needs beside v = P c: c'P c + variance, and residual - c'error.
@@ -210,7 +210,7 @@ def _absorb(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-
 
 
 @compiled
-def _filter(window, seen, bounded):  # type: ignore[no-untyped-def]
+def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
     """Filter along the nodes; error and P are then those of the last arrival."""
     P, error, outputs = window.P, window.error, seen.size
     s, n = error.size, window.F.shape[1]
@@ -239,7 +239,7 @@ def _filter(window, seen, bounded):  # type: ignore[no-untyped-def]
             window.total[k, j] = 0.0
             if not np.isnan(window.errors[k, j]):
                 variance = window.levels[k, j] / window.weight[k, j]
-                window.total[k, j], window.surprise[k, j] = _absorb(
+                window.total[k, j], window.surprise[k, j] = absorb(
                     *(P, error, window.gain[k, j], window.slopes[k, j]),
                     *(seen[j], window.errors[k, j], variance),
                 )
@@ -257,14 +257,20 @@ def _filter(window, seen, bounded):  # type: ignore[no-untyped-def]
             elif abs(window.active[k, i]) == 1 and P[i, i] > DETERMINED * window.scale[k, i]:
                 limit = window.high[i] if window.active[k, i] > 0 else window.low[i]
                 row, missing = outputs + i, limit - window.arrived[k, i]
-                window.total[k, row], window.surprise[k, row] = _absorb(
+                window.total[k, row], window.surprise[k, row] = absorb(
                     P, error, window.gain[k, row], window.work, i, missing, 0.0
+                )
+            elif damping > 0.0 and window.scale[k, i] > 0.0:
+                row = outputs + i
+                window.total[k, row], window.surprise[k, row] = absorb(
+                    *(P, error, window.gain[k, row], window.work, i, 0.0),
+                    window.scale[k, i] / damping,
                 )
 
 
 @compiled
 def _react(costate, v, c, at, total, surprise):  # type: ignore[no-untyped-def]
-    """Force of a sample, which changes the costate; see `_absorb`."""
+    """Force of a sample, which changes the costate; see `absorb`."""
     if total == 0.0:
         return 0.0
     force = surprise
@@ -319,14 +325,21 @@ def solve_free(window, seen):  # type: ignore[no-untyped-def]
     ----------
     seen : (l,) see Layout.
     """
-    _filter(window, seen, False)
+    _filter(window, seen, False, 0.0)
+    _smooth(window, seen)
+
+
+@inlined
+def solve_damped(window, seen, damping):  # type: ignore[no-untyped-def]
+    """Solve with bounds, and with each unknown drawn to where it is."""
+    _filter(window, seen, True, damping)
     _smooth(window, seen)
 
 
 @inlined
 def solve_bounded(window, seen):  # type: ignore[no-untyped-def]
     """Solve with the bounds that are active as samples without noise."""
-    _filter(window, seen, True)
+    _filter(window, seen, True, 0.0)
     _smooth(window, seen)
 
 

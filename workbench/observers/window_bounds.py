@@ -22,7 +22,7 @@ _MOST = 20  # recursions for each node: more would be a circle of rounding
 
 
 @inlined
-def _push(window, outputs, k, i):  # type: ignore[no-untyped-def]
+def push(window, outputs, k, i):  # type: ignore[no-untyped-def]
     """What an active bound pushes with, inwards; negative if it pulls."""
     return -window.active[k, i] * window.force[k, outputs + i]
 
@@ -64,7 +64,7 @@ def _resume(window, seen):  # type: ignore[no-untyped-def]
             for i in range(window.mean.size):
                 if window.active[k, i] == 0:
                     continue
-                window.multiplier[k, i] = _push(window, outputs, k, i)
+                window.multiplier[k, i] = push(window, outputs, k, i)
                 if window.multiplier[k, i] < 0.0 or window.total[k, outputs + i] == 0.0:
                     window.active[k, i], dropped = 0, True
         if not dropped:
@@ -82,13 +82,13 @@ def _advance(window, outputs, node, which):  # type: ignore[no-untyped-def]
         for i in range(window.mean.size):
             if abs(window.active[k, i]) != 1 or (k == node and i == which):
                 continue
-            new, old = _push(window, outputs, k, i), window.multiplier[k, i]
+            new, old = push(window, outputs, k, i), window.multiplier[k, i]
             if new < 0.0 and old < share * (old - new):
                 share, at, of = old / (old - new), k, i
     for k in range(window.filled[0]):
         for i in range(window.mean.size):
             if abs(window.active[k, i]) == 1:
-                new, old = _push(window, outputs, k, i), window.multiplier[k, i]
+                new, old = push(window, outputs, k, i), window.multiplier[k, i]
                 window.multiplier[k, i] = old + share * (new - old)
     if at >= 0:
         window.active[at, of] = 0
