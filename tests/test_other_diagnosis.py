@@ -307,7 +307,8 @@ def test_the_extended_model_rubs_and_lacks_nothing(
 
 def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed: Diagnosed) -> None:
     outcome, _ = diagnosed(rubbing)
-    assert outcome.summary().startswith("The model lacks BearingFriction (or BrushDrop), tau_c 0.0")
+    said = "The model lacks a bearing that rubs: BearingFriction (or BrushDrop), tau_c 0.0"
+    assert outcome.summary().startswith(said)
     table = outcome.to_frame()
     assert list(table["effect"]) == ["BearingFriction"]
     assert (table["low"] < table["value"]).all()

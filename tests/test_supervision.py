@@ -75,6 +75,44 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 
 # --- signals ---
 
+IN_A_CLASS = """\
+import os, signal, sys, time
+from workbench.supervision import supervised
+
+
+class Named:
+    def __set_name__(self, owner, name):
+        os.kill(os.getpid(), signal.{request})
+        time.sleep(60.0)
+
+
+def work():
+    class Holder:
+        member = Named()
+
+
+sys.exit(supervised(work))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the command is no process of its own")
+@pytest.mark.parametrize(("request_", "status"), [("SIGTERM", 143), ("SIGINT", 130)])
+def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(
+    request_: str, status: int, home: Path
+) -> None:
+    """Python makes another error of what comes while a class names its members."""
+    (home / "work.py").write_text(IN_A_CLASS.format(request=request_))
+    command = [sys.executable, "work.py"]
+    run = subprocess.run(
+        command,
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (run.returncode, run.stderr) == (status, "")
+
 
 @contextmanager
 def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]]":

@@ -56,7 +56,8 @@ class Pool(Generic[State]):
     A task is a function of what a worker was prepared with. One whose worker dies is tried again by
     a new worker, which no other task disturbs; if that dies too, its future raises WorkerError, and
     so does one that takes longer than the limit. Other tasks never notice. Workers leave Ctrl-C to
-    this process, do not outlive it, and use one BLAS thread each. Leaving the pool ends them.
+    this process and do not outlive it. They, and it beside them, use one BLAS thread: threads of
+    BLAS wait for one another, and matrices are small. Leaving the pool ends them.
 
     One worker with no limit, not isolated, is this process: `submit` returns when the task is done.
 
@@ -65,8 +66,7 @@ class Pool(Generic[State]):
     workers : how many.
     begin : prepares a worker: makes a context of `given` that yields the state. In a process of its
         own the context is not left: the process ends, and its temporary files are removed.
-    given : what workers need, pickled once. Functions and classes of `__main__` cannot be in it,
-        nor in tasks.
+    given : what workers need, pickled once; as tasks, without functions and classes of `__main__`.
     limit : for one task [s]; a task that may hang needs a process.
     isolated : whether even a single worker is a process, for tasks that may crash.
 
@@ -99,6 +99,7 @@ class Pool(Generic[State]):
         if workers == 1 and limit == math.inf and not isolated:
             return
         self._folder = self._stack.enter_context(scratch_folder())
+        self._stack.enter_context(threadpool_limits(1))
         # In a file, because handing so much to a process that dies as it starts waits for ever.
         Path(self._folder, _GIVEN).write_bytes(pickle.dumps((dict(os.environ), begin, given)))
         preload(begin.__module__, type(given).__module__)
@@ -294,7 +295,6 @@ def _serve(connection: "Connection[bytes, bytes]", folder: str) -> None:
             environment, begin, given = pickle.loads(Path(folder, _GIVEN).read_bytes())
             os.environ.clear()
             os.environ.update(environment)
-            # Matrices are small: with a pool of BLAS threads each, workers wait for one another.
             threadpool_limits(1)
             state = stack.enter_context(begin(given))
         except Exception as error:

@@ -92,19 +92,30 @@ def _worked(work: Callable[[], int], tell: int) -> int:
     """Status of the work, told to the parent, too."""
     try:
         status = work()
-    except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else int(end.code is not None)
-        if isinstance(end.code, str):
-            print(end.code, file=sys.stderr)
-    except KeyboardInterrupt:
-        status = 130
-    except BaseException:
-        traceback.print_exc()
-        status = 1
+    except BaseException as error:
+        status = _status(error)
     with suppress(OSError, ValueError):  # whoever read it has gone
         sys.stdout.flush()
     os.write(tell, bytes([status & 0xFF]))
     return status
+
+
+def _status(error: BaseException) -> int:
+    """Status that work ends with; says what was wrong."""
+    match error:
+        case SystemExit(code=int(status)):
+            return status
+        case SystemExit(code=text):
+            if text is not None:
+                print(text, file=sys.stderr)
+            return int(text is not None)
+        case KeyboardInterrupt():
+            return 130
+        # Python wraps whatever comes while a class names its members, as when modules are imported.
+        case RuntimeError(__cause__=SystemExit() | KeyboardInterrupt() as request):
+            return _status(request)
+    traceback.print_exception(error)
+    return 1
 
 
 @contextmanager

@@ -23,7 +23,7 @@ def commands(folder: Path) -> tuple[Command, ...]:
             ("--resume",),
             lambda out: (out / "gains.toml").read_text(),
         ),
-        Command("power", ("tests.chaos.sets",), (), _verdicts),
+        Command("power", ("tests.chaos.power",), (), _verdicts),
         Command(
             "simulate",
             ("workbench", "simulate", str(folder), "--estimator", "ekf", "--out"),

@@ -21,6 +21,7 @@ from tests.processes import comes_true, living
 
 ROOT = Path(__file__).parents[2]
 LONGEST = 60.0  # s from a signal to the end; a machine may have other work to do
+BEGUN = 0.2  # s from which on a command answers for itself, and no longer Python for it
 ROOM = 64 * 2**20  # bytes, more than any of the commands writes
 KINDS = ("kill", "interrupt", "terminate", "full disk")
 
@@ -93,7 +94,7 @@ def disturb(usual: Undisturbed, kind: str, random: Random, folder: Path) -> list
     failures: list[Failure] = []
     with _started(usual.command, folder, again=False) as process:
         try:
-            process.wait(random.uniform(0.0, usual.seconds))
+            process.wait(random.uniform(BEGUN, usual.seconds))
         except subprocess.TimeoutExpired:
             _send(process, kind)
         try:

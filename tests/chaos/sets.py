@@ -1,13 +1,11 @@
 """A small run of `power` in a folder: three sets of two short stops; again goes on where it was."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 from workbench import resources
 from workbench.power import Planting, diagnose_sets
 from workbench.power.diagnosing import library_effects
-from workbench.supervision import supervised
 from workbench.systems import load_system
 from workbench.wheelset.planting import PlantedStops
 from workbench.wheelset.rig import SCENARIOS, Scenario
@@ -41,7 +39,3 @@ def main(out: Path) -> int:
         report=print,
     )
     return 130 if interrupted else 0
-
-
-if __name__ == "__main__":
-    sys.exit(supervised(lambda: main(Path(sys.argv[1]))))  # as every command is

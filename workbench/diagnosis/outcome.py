@@ -113,11 +113,11 @@ class Outcome:
             label, one = next(iter(cause.parameters.items()))
             twins = f" (or {', '.join(cause.confusable_with)})" if cause.confusable_with else ""
             size = with_interval(one.value, one.low, one.high, one.unit)
-            names.append(f"{cause.effect.name}{twins}, {label} {size}, {cause.effect.text}")
+            names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {size}")
         assert found.gain is not None
         more = " The search was interrupted: more may be missing." if found.interrupted else ""
         return (
-            f"The model lacks {'; and '.join(names)}: on held-out recordings its error falls from "
+            f"The model lacks {'; and '.join(names)}; on held-out recordings its error falls from "
             f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise.{more}{cost}"
         )
 

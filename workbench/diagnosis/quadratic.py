@@ -6,11 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
+from scipy.linalg.lapack import dpocon, dpotrf
 
 from workbench.fmu import Matrix, Vector
 
 # (effect, parameter), (quantity, choice) of a level, ("", quantity) of what differs by nature.
 Key = tuple[str, str]
+
+_ROUNDING = 1e-12  # least eigenvalue of a scaled normal matrix that is not rounding
+_SHOWN = 1e-10  # share of the largest from which on the data show what an eigenvalue stands for
+_CERTAIN = 1e-7  # reciprocal condition far above both, however it is estimated
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +55,41 @@ def add(parts: Sequence[Quadratic]) -> Quadratic:
 
 def covariance(N: Matrix) -> Matrix:
     """Inverse of a normal matrix, (p, p); large where the data do not show an unknown."""
-    scale, values, vectors = _spectrum(N)
-    inverse: Matrix = (vectors / np.maximum(values, 1e-12)) @ vectors.T
+    scale, scaled = _scaled(N)
+    if (factor := _definite(scaled)) is not None:
+        inverse: Matrix = cho_solve(factor, np.eye(len(N)), check_finite=False)
+    else:
+        values, vectors = np.linalg.eigh(scaled)
+        inverse = (vectors / np.maximum(values, _ROUNDING)) @ vectors.T
     return inverse * scale[:, None] * scale[None, :]
 
 
-def _spectrum(N: Matrix) -> tuple[Vector, Vector, Matrix]:
-    """Scale of each unknown, whatever its unit; eigenvalues and eigenvectors of what remains."""
+def _scaled(N: Matrix) -> tuple[Vector, Matrix]:
+    """Scale of each unknown, whatever its unit, and what remains of a normal matrix."""
     scale: Vector = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-100))
-    values, vectors = np.linalg.eigh(N * scale[:, None] * scale[None, :])
-    return scale, values, vectors
+    return scale, N * scale[:, None] * scale[None, :]
+
+
+def _definite(scaled: Matrix) -> tuple[Matrix, bool] | None:
+    """Factor of a matrix all of whose unknowns the data show beyond doubt; None of others.
+
+    For those an eigenvalue decomposition tells which; it takes thirty times as long.
+    """
+    factor, failed = dpotrf(scaled) if scaled.size else (scaled, True)
+    if failed:
+        return None
+    left, _ = dpocon(factor, np.abs(scaled).sum(axis=0).max(initial=0.0))
+    return (factor, False) if left > _CERTAIN else None
 
 
 def minimum(total: Quadratic) -> Vector:
     """Where chi-squared is least; unknowns that the data do not show stay."""
-    scale, values, vectors = _spectrum(total.N)
-    kept = values > 1e-10 * values.max(initial=0.0)
+    scale, scaled = _scaled(total.N)
+    if (factor := _definite(scaled)) is not None:
+        best: Vector = -scale * cho_solve(factor, scale * total.g, check_finite=False)
+        return best
+    values, vectors = np.linalg.eigh(scaled)
+    kept = values > _SHOWN * values.max(initial=0.0)
     along = vectors[:, kept]
     step: Vector = -scale * (along @ ((along.T @ (scale * total.g)) / values[kept]))
     return step
