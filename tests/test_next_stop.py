@@ -49,6 +49,36 @@ def test_what_is_left_is_the_criterion_of_buzzi_ferraris_and_forzatti() -> None:
     assert_allclose(left, np.sum((d + J @ z) ** 2) + z @ N @ z, rtol=1e-9)
 
 
+# discopt 0.5.0 (`discopt.doe.discrimination`): Hunter and Reiner's criterion, that of Buzzi-
+# Ferraris and Forzatti, logarithm of the determinant of the information of the line.
+_DISCOPT = {
+    0.5: (0.8056640624569831, 43.795008527838725, 4.877103901471733),
+    1.0: (4.640624999768022, 287.4425701439068, 6.263398262591624),
+    1.5: (56.82128905962882, 2405.0666133902146, 7.074328478807952),
+}
+
+
+@pytest.mark.parametrize("x", _DISCOPT)
+def test_criteria_are_those_of_an_independent_package(x: float) -> None:
+    """Responses 2 s x and 1.5 (s x)^2, of one unknown factor each, in s = 0.5, 1, 2; noise 0.1.
+
+    discopt takes both models for uncertain, where here one is true: the unknowns are those of both.
+    """
+    noise = 0.1
+    line, curve = (np.array([0.5, 1.0, 2.0]) * x) ** np.array([[1], [2]])
+    d = (2.0 * line - 1.5 * curve) / noise
+    hunter, buzzi, information = _DISCOPT[x]
+    nothing = Quadratic(np.zeros((0, 0)), np.zeros(0), float(d @ d), 3)
+    # Its solver leaves 1e-10 of the unknowns, of which responses are differences.
+    assert_allclose(refitted(nothing, np.zeros((0, 0)))[0], hunter / noise**2, rtol=1e-7)
+    J = np.column_stack([line, -curve]) / noise
+    N = np.diag(np.diag(J.T @ J))
+    both = Quadratic(J.T @ J, J.T @ d, float(d @ d), 3)
+    assert_allclose(refitted(both, N)[0], buzzi, rtol=1e-7)
+    before, _ = precision(np.zeros((1, 1)), N[:1, :1], [0])
+    assert_allclose(-2.0 * np.log(before), information, rtol=1e-7)
+
+
 def test_a_line_and_a_parabola_part_where_their_best_fits_do() -> None:
     """T-optimality by hand: x^2 less its best line in -1, 0, 0, 1 is 1/2 in size everywhere."""
     x = np.array([-1.0, 0.0, 0.0, 1.0])

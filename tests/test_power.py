@@ -15,6 +15,7 @@ from scipy.stats import binom
 
 from workbench.__main__ import main
 from workbench.diagnosis.extension import variables
+from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.power import (
@@ -29,10 +30,12 @@ from workbench.power import (
     summarise,
 )
 from workbench.power.diagnosing import build_everything, library_effects
+from workbench.power.planned import SURE, clear, foresee
 from workbench.power.planting import Group, Kind
 from workbench.power.statistics import intervals_cover, named_all, named_right
 from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
+from workbench.report.power_checks import format_plan, write_plan
 from workbench.systems import load_system
 from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
@@ -365,6 +368,36 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert [one.verdict for one in results] == ["nothing", "found", "nothing"]
     assert named_right(results[1])
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
+
+
+def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
+    """Of the two short stops above: a gain of 1.6 % is plain in them, one of 0.05 % is not."""
+    rig, effects = PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM)
+    sizes = (0.25, 8.0)
+    rows = foresee(SYSTEM, rig, effects, PLANTABLE, sizes, 1)
+    by_name = {one.effect: one for one in rows}
+    (faint, small), (plain, large) = by_name["FxGain"].chances
+    assert (faint, plain) == pytest.approx((0.0005, 0.016))
+    assert small < 0.01
+    assert large > 0.99
+    # Only a slide shows it, and these stops have none.
+    assert by_name["FallingFriction"].least is None
+    write_plan(rows, sizes, PROVENANCE, tmp_path)
+    check("plan", json.loads((tmp_path / "plan.json").read_text()))
+    assert (tmp_path / "plan.svg").exists()
+    assert "these recordings cannot show it" in format_plan(rows, sizes)
+
+
+@pytest.mark.parametrize("unknowns", [1, 7])
+def test_what_is_clear_is_found_in_19_of_20(unknowns: int) -> None:
+    """Estimates drawn by the law that the chance follows from, a share of 4 000 to 3 of its own
+    standard deviations."""
+    decides = thresholds(28)
+    rng = np.random.default_rng(unknowns)
+    drawn = rng.standard_normal((4000, unknowns))
+    drawn[:, 0] += clear(unknowns, decides)
+    found = (np.square(drawn).sum(axis=1) > decides.fall_of(unknowns)).mean()
+    assert found == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
 
 
 def test_one_effect_at_one_size_is_one_set() -> None:

@@ -27,6 +27,7 @@ from workbench.power import (
 )
 from workbench.power.diagnosing import library_effects
 from workbench.power.left_out import propose_left_out
+from workbench.power.planned import foresee
 from workbench.power.planting import Group, plan_sheet_errors, some
 from workbench.power.sensitivity import values, vary_sets
 from workbench.power.sheet import summarise_sheet
@@ -34,9 +35,11 @@ from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
 from workbench.report.power_checks import (
     format_left_out,
+    format_plan,
     format_sheet,
     format_thresholds,
     write_left_out,
+    write_plan,
     write_sheet,
     write_thresholds,
 )
@@ -67,6 +70,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "thresholds": _thresholds,
             "sheet_error": _sheet_error,
             "leave_out_effect": _left_out,
+            "plan": _foreseen,
         }
         return checks[options.check](options, output, system, rig, effects)
 
@@ -184,6 +188,23 @@ def _thresholds(
     output.result(format_thresholds(results, usual))
     output.result(f"data: {out}")
     return _told(out / "thresholds.json", interrupted)
+
+
+def _foreseen(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    rig: VirtualRig,
+    effects: tuple[Effect, ...],
+) -> Done:
+    out = options.out / "plan"
+    sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, rig)
+    output.stage("one set without any effect is made and diagnosed")
+    rows = foresee(system, rig, effects, wanted, sizes, options.seed)
+    write_plan(rows, sizes, _provenance(options, system, rig, False), out)
+    output.result(format_plan(rows, sizes))
+    output.result(f"data and figure: {out}")
+    return _told(out / "plan.json", False)
 
 
 def _told(path: Path, interrupted: bool) -> Done:

@@ -1,14 +1,21 @@
-"""What the diagnosis makes of other thresholds, a wrong sheet, causes it lacks: files, tables."""
+"""What the diagnosis makes of other thresholds, a wrong sheet, causes it lacks, a plan: files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
 from workbench.answer import Answer, Measure
 from workbench.files import write_json
+from workbench.power.planned import SURE, Foreseen
 from workbench.power.sensitivity import FACTORS, Varied
 from workbench.report.answers import with_answer
+from workbench.report.diagnosis_figures import draw_heat
+from workbench.report.figures import STYLE, save_figure
 
 
 def write_thresholds(
@@ -115,3 +122,54 @@ def _rightly(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
     """Sets with the right slot, and those of which the verdict is not "nothing"."""
     known = [row for row in rows if row["left_out"] and row["verdict"] != "nothing"]
     return sum(bool(row["slot_right"]) for row in known), len(known)
+
+
+def write_plan(
+    rows: Sequence[Foreseen], sizes: Sequence[float], provenance: Mapping[str, Any], out: Path
+) -> None:
+    """Write plan.json and the figure of chances.
+
+    Parameters
+    ----------
+    sizes : multiples of what matters.
+    """
+    seen = sum(one.least is not None and one.least <= sizes[-1] * one.matters for one in rows)
+    sentence = (
+        f"Of {len(rows)} effects, these recordings show {seen} with a chance of {SURE:.0%} or more "
+        f"at {sizes[-1]:g} times the size that matters."
+    )
+    headline = {f"effects shown at {sizes[-1]:g} times": Measure(float(seen), "1", "higher")}
+    content = {"provenance": provenance, "sizes": list(sizes), "effects": list(map(asdict, rows))}
+    write_json(out / "plan.json", with_answer(Answer(sentence, headline), content))
+    with mpl.rc_context(STYLE):
+        save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
+
+
+def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
+    """Table of chances, by size."""
+    lines = [f"{'effect':<30}{'1 is':>16}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
+    lines[0] += f"{f'found by {SURE:.0%} from':>24}"
+    for one in rows:
+        row = f"{one.effect:<30}{f'{one.matters:g} {one.unit}'.removesuffix(' 1'):>16}"
+        if one.least is None:
+            lines.append(f"{row}  these recordings cannot show it")
+            continue
+        row += "".join(f"{f'{chance:.0%}':>8}" for _, chance in one.chances)
+        lines.append(f"{row}{f'{one.least:.3g} {one.unit}'.removesuffix(' 1'):>24}")
+    return "\n".join(lines)
+
+
+def _chances(rows: Sequence[Foreseen], sizes: Sequence[float]) -> Figure:
+    """Chance that an effect is named [%], by effect and size."""
+    table = np.array(
+        [[100.0 * c for _, c in one.chances] or [0.0] * len(sizes) for one in rows]
+    ).reshape(len(rows), len(sizes))
+    sheet = Figure(figsize=(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)), layout="constrained")
+    axes = sheet.subplots()
+    axes.grid(visible=False)
+    draw_heat(axes, table, 100.0)
+    axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
+    axes.set_yticks(range(len(rows)), [one.effect for one in rows])
+    axes.set_xlabel("size over the least that matters")
+    sheet.suptitle("Chance that the planned recordings show it [%]")
+    return sheet

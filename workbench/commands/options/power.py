@@ -34,6 +34,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
         "  python -m workbench power --clean 200 --resume\n"
         "  python -m workbench power --thresholds --sets 8\n"
+        "  python -m workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
         "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  python -m workbench power --sheet-error --repeats 2\n"
         "  python -m workbench power --system train --recorded labelled healthy",
@@ -107,6 +108,11 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
             "--leave-out-effect",
             "leave the planted effect out of the catalogue, and tell which law is proposed in its "
             "place, on --repeats sets of each at the largest size (into OUT/left_out)",
+        ),
+        (
+            "--plan",
+            "before a recording is made: the chance that the recordings named by --case show each "
+            "effect at --sizes, from one set without any (into OUT/plan)",
         ),
         (
             "--sheet-error",
