@@ -143,14 +143,63 @@ def shares(summary: Mapping[str, Any]) -> Table:
     return rows
 
 
+def timed_models(summary: Mapping[str, Any]) -> Table:
+    """Calls into each FMU, in brackets as a ratio to plain C."""
+    rows: Table = [["", "states", "derivatives", "Jacobian", "Co-Simulation steps of 5 ms"]]
+    for name, one in summary["calls"].items():
+        calls = [
+            f"{1e6 * one[f'{call}_fmi']:.3f} us ({one['ratios'][call]:.2f})"
+            for call in ("derivatives", "jacobian")
+        ]
+        rows.append([f"`{name}`", str(one["states"]), *calls, f"{one['steps_per_second']:,.0f} /s"])
+    return rows
+
+
+def timed_observers(summary: Mapping[str, Any]) -> Table:
+    """Loops of observers, and how many times as long other ways take."""
+    rows: Table = [
+        ["observer", "us per step", "times real time", "by FMPy's methods and numpy", "in plain C"]
+    ]
+    for one in summary["observers"]["steps"]:
+        ratios = [
+            f"{one[way] / one['step']:.{2 * (way == 'c')}f} times" if one[way] else ""
+            for way in ("fmpy", "c")
+        ]
+        name = f"{titled(one['observer'])} ({one['states']} states)"
+        step, pace = f"{1e6 * one['step']:.2f}", f"{one['times_real_time']:.0f}"
+        rows.append([name, step, pace, *ratios])
+    return rows
+
+
+def said_of_errors(summary: Mapping[str, Any]) -> Table:
+    """Verdict on sets of a rig that differs from its sheet."""
+    rows: Table = [["wrong in the sheet", "what is said"]]
+    for one in summary["sets"]:
+        wrong = ", ".join(
+            f"{name.replace('_', ' ')} {100.0 * size:+.3g} %" for name, size in one["wrong"].items()
+        )
+        groups = "; ".join(" or ".join(group) for group in one["causes"])
+        rows.append([wrong, groups or one["verdict"]])
+    return rows
+
+
 # --- the page ---
 
 _RIG = ("rig --seed 1 --out {out}/rig", "accuracy {out}/rig --out {out}/accuracy")
+_BENCH = ("bench --out {out}/bench",)
 FIGURES = {
     "simulate": Figure(("simulate --out {out}/simulate",), Path("simulate/summary.json"), errors),
     "accuracy": Figure(_RIG, Path("accuracy/accuracy.json"), worst),
     "coverage": Figure(_RIG, Path("accuracy/accuracy.json"), covered),
     "diagnose": Figure(("diagnose --out {out}/diagnose",), Path("diagnose/summary.json"), causes),
+    "models": Figure(_BENCH, Path("bench/bench.json"), timed_models),
+    "observers": Figure(_BENCH, Path("bench/bench.json"), timed_observers),
+    "sheet": Figure(
+        ("power --sheet-error --repeats 1 --out {out}/power",),
+        Path("power/sheet_error/sheet_error.json"),
+        said_of_errors,
+        long=True,
+    ),
     "power": Figure(
         ("power --clean 50 --sizes 2 4 8 --repeats 1 --pairs 20 --resume --out {out}/power",),
         Path("power/power.json"),

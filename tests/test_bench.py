@@ -1,5 +1,6 @@
 """Times of calls into an FMU: that they are measured, and of the same numbers."""
 
+import dataclasses
 import shutil
 import zipfile
 from pathlib import Path
@@ -12,10 +13,14 @@ pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 from workbench.benchmark.calls import points
+from workbench.benchmark.horizon import HorizonTimes
+from workbench.benchmark.observers import ObserverTimes, ProcessTimes
+from workbench.benchmark.tuning import EvaluationTimes, TuningMemory, WorkerRates
 from workbench.compiler.benchmark import CallTimes, time_sources
 from workbench.description import read_description
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix
+from workbench.schemas import summaries
 from workbench.system import System
 
 STEP = 0.005  # [s]
@@ -54,6 +59,25 @@ def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path, at: Mat
     # whole columns and all inputs in instance.c they are 1.5 and 2.9.
     assert times.ratios()["derivatives"] < 2.0
     assert times.ratios()["jacobian"] < 2.0
+
+
+def test_the_schema_of_times_has_what_is_written_of_them() -> None:
+    """A run of the command takes minutes; its file is made of these."""
+    sections = summaries()["bench"]["properties"]
+    observers, tuning = (sections[name]["properties"] for name in ("observers", "tuning"))
+    beside = {"ratios", "unit", "steps_per_second"}
+    for kind, schema in (
+        (CallTimes, sections["calls"]["additionalProperties"]),
+        (ObserverTimes, observers["steps"]["items"]),
+        (ProcessTimes, observers["processes"]),
+        (HorizonTimes, observers["horizon"]),
+        (EvaluationTimes, tuning["evaluations"]["items"]),
+        (WorkerRates, tuning["workers"]),
+        (TuningMemory, tuning["memory"]),
+    ):
+        assert set(schema["properties"]) - beside == {one.name for one in dataclasses.fields(kind)}
+        assert schema["required"] == list(schema["properties"])
+        assert not schema["additionalProperties"]
 
 
 def test_a_delay_in_the_interface_shows_in_the_ratio(

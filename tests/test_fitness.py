@@ -51,7 +51,7 @@ FAULTS = {
     "rollback forgets the integrator's step": (
         "rollback in Co-Simulation",
         "    i->state = *s;",
-        "    i->state = *s;\n    if (s->kind == CO_SIMULATION) i->state.step = 0.0;",
+        "    i->state = *s;\n    if (s->kind == CO_SIMULATION) i->state.memory.step = 0.0;",
     ),
     "serialised bytes forget an input": (
         "serialised rollback",

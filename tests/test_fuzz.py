@@ -1,7 +1,7 @@
 """What users give is read or refused in words, however damaged; `make fuzz` reads many more."""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
 from tests.fuzz import harness
+from tests.fuzz.apart import one_process
 from tests.fuzz.harness import Target, fuzz, generator, write
 from tests.fuzz.targets import targets
 from workbench.errors import InputError
@@ -17,9 +18,17 @@ from workbench.errors import InputError
 # Mutants of each kind of file, some seconds in all; FMUs take longest, which are tried and loaded.
 COUNTS = {
     "case": 500,
-    "german.csv": 300,
-    "stamps.txt": 300,
+    "german.csv": 100,
+    "stamps.txt": 50,
+    "indices.csv": 50,
+    "midnight.csv": 50,
+    "comments.csv.gz": 100,
+    "workbook.xlsx": 200,
     "labview.tdms": 300,
+    "structures.mat": 100,
+    "new.mat": 100,
+    "table.parquet": 100,
+    "logger.mf4": 100,
     "gains": 500,
     "checkpoint": 500,
     "verdicts": 300,
@@ -32,8 +41,9 @@ COUNTS = {
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Target]:
-    return {one.name: one for one in targets(tmp_path_factory.mktemp("originals"))}
+def known(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Target]]:
+    with one_process():
+        yield {one.name: one for one in targets(tmp_path_factory.mktemp("originals"))}
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())

@@ -13,12 +13,15 @@ from numpy.testing import assert_allclose
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case
+from workbench.case import Case, read_cases
 from workbench.errors import InputError
 from workbench.foreign import read_foreign
+from workbench.plausibility import Origin, doubts
 from workbench.system import System
+from workbench.systems import load_system
 
 from .recorder_files import DIGITS, FORMATS, csv_of_a_german_rig, german, mdf_4, recorded
+from .train_stops import write_stop
 
 UNITS = {"pB": 1e5, "tauR": 1e3, "omegaW": 1 / 3.6 / 0.4, "omegaR": 1 / 3.6 / 0.6, "Fx": 1e3}
 
@@ -122,6 +125,15 @@ def test_the_end_that_a_tdms_file_lacks_is_told(
         wb.read_cases(path, system, conditions={"wheel_rail": "dry", "discs": ["dry"] * 3})
 
 
+def test_what_a_library_warns_of_is_noted(tmp_path: Path, stop: Case, system: System) -> None:
+    """A variable that a MAT file holds twice: scipy says so by a warning, which nobody saw."""
+    path = tmp_path / "stop.mat"
+    FORMATS["structures.mat"](path, recorded(stop, system))
+    whole = path.read_bytes()
+    path.write_bytes(whole + whole[128:])  # without the header
+    assert any("Duplicate variable name" in note for note in read_foreign(path).notes)
+
+
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
 def test_a_missing_reader_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
@@ -171,7 +183,9 @@ def test_what_is_no_recording_is_refused_in_words(
 def test_a_case_folder_may_hold_the_recorders_file(
     tmp_path: Path, stop: Case, system: System
 ) -> None:
-    mdf_4(tmp_path / "stop.mf4", recorded(stop, system))
+    columns = recorded(stop, system)
+    unit, force = columns["Längskraft"]
+    mdf_4(tmp_path / "stop.mf4", {**columns, "Längskraft": (unit, -force)})
     (tmp_path / "case.toml").write_text(
         """title = "as it was recorded"
 [conditions]
@@ -192,7 +206,7 @@ Fx = { channel = "Längskraft", reversed = true }
     )
     (case,) = wb.read_cases(tmp_path, system)
     assert_allclose(case["omegaR"], stop["omegaR"], rtol=1e-12, atol=1e-12)
-    assert_allclose(case["Fx"], -stop["Fx"], rtol=1e-12, atol=1e-9)
+    assert_allclose(case["Fx"], stop["Fx"], rtol=1e-12, atol=1e-9)
 
 
 def test_a_bare_file_is_a_case_with_its_conditions_as_options(
@@ -263,6 +277,64 @@ def test_channels_confirmed_for_a_folder_hold_for_its_files(
     unknown = {"wheel_rail": "unknown", "discs": "unknown"}
     (case,) = wb.read_cases(tmp_path / "b.csv", system, conditions=unknown)
     assert_allclose(case["pB"], stop["pB"], atol=rounding("pB"))
+
+
+@pytest.fixture(scope="module")
+def train_stop(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """A stop of a train on the level, without faults."""
+    folder = tmp_path_factory.mktemp("train") / "01_stop"
+    write_stop(folder, 1, {})
+    (case,) = read_cases([folder], load_system("train"))
+    return case
+
+
+GERMAN = ("Bremsdruck {} [bar]", "Masse Wagen {} [t]", "Neigung {} [1]", "v_Achse{} [km/h]")
+ENGLISH = ("BCP {} [bar]", "vehicle mass {} [t]", "slope {} [1]", "axle speed {} [km/h]")
+
+
+@pytest.mark.parametrize(
+    ("names", "curve", "acceleration"),
+    [
+        (GERMAN, "Bogenwiderstand [1]", "Beschleunigung [m/s2]"),
+        (ENGLISH, "curve resistance [1]", "longitudinal acceleration [m/s2]"),
+    ],
+    ids=["German", "English"],
+)
+def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
+    tmp_path: Path, train_stop: Case, names: tuple[str, ...], curve: str, acceleration: str
+) -> None:
+    factors = 1e-5, 1e-3, 1.0, 3.6 * 0.46
+    kinds = zip(("pB", "mass", "slope", "omega"), names, factors, strict=True)
+    columns = {"Zeit [s]": train_stop.time}
+    for kind, name, factor in kinds:
+        for i in range(1, 9):
+            if f"{kind}{i}" in train_stop:
+                columns[name.format(i)] = factor * train_stop[f"{kind}{i}"]
+    columns |= {curve: train_stop["curve"], acceleration: train_stop["a"]}
+    assert len(columns) == 1 + len(train_stop.signals)
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    (tmp_path / "stop.csv").write_text("\n".join(lines))
+    out = tmp_path / "cases"
+    command = ["import", str(tmp_path / "stop.csv"), "--system", "train", "--out", str(out)]
+    assert main([*command, "--condition", "rail=dry", "--yes"]) == 0
+    (case,) = read_cases([out], load_system("train"))
+    for name, values in train_stop.signals.items():
+        assert_allclose(case[name], values, rtol=1e-12, atol=1e-12)
+
+
+def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_stop: Case) -> None:
+    """In km/h declared as rad/s they agree with each other."""
+    train = load_system("train")
+    wrong = {f"omega{i}": 3.6 * 0.46 * train_stop[f"omega{i}"] for i in range(1, 9)}
+    origin = Origin("stop.csv", 2, {}, "")
+    signals = {**train_stop.signals, **wrong}
+    right, told = (
+        doubts(train_stop.time, one, train_stop.conditions, train, origin)
+        for one in (train_stop.signals, signals)
+    )
+    (doubt,) = set(told) - set(right)
+    assert "what a train accelerates by turns its axles faster" in doubt
 
 
 # --- what is proposed, and what is asked ---

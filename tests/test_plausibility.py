@@ -1,5 +1,6 @@
 """Recordings that contradict themselves: refused where impossible, warned of where unlikely."""
 
+import dataclasses
 import json
 import re
 from collections.abc import Callable
@@ -13,8 +14,16 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.case import read_case, read_cases
 from workbench.errors import InputError
+from workbench.plausibility import Origin, doubts
+from workbench.power import Repertoire
+from workbench.power.diagnosing import library_effects
+from workbench.prepare import read_recorded
+from workbench.systems import load_system
+from workbench.wheelset.planting import PLANTABLE, PlantedStops
+from workbench.wheelset.rig import SCENARIOS, Effects
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings"
+REFERENCE = Path(__file__).parent.parent / "fmus" / "fmi2" / "Reference.fmu"
 NAME = "03_dry_120_3.6"
 SPEEDS = ("omegaW [rad/s]", "omegaR [rad/s]")
 
@@ -146,17 +155,76 @@ def test_a_condition_that_the_record_belies_is_refused(tmp_path, system, stop, o
             "column 'omegaR': found .* by 9% apart in half of",
         ),
         (
-            lambda t: changed(t, tauR=np.zeros_like(t["tauR [N.m]"])),
-            "column 'tauR': found 0 kN.m in all .* samples",
+            lambda t: changed(t, tauR=t["tauR [N.m]"] / 1e3),  # kN.m
+            r"line 603, column 'tauR': found tauR = 1.0\d* N.m beside rR\*Fx .* by 100% apart",
+        ),
+        (
+            lambda t: {
+                h: v / 1e3 if h.startswith("tauR") else v
+                for h, v in t.items()
+                if not h.startswith("Fx")
+            },
+            r"line \d+, column 'tauR': found tauR = .* beside sign.*pB.* by 100% apart",
+        ),
+        (
+            lambda t: changed(t, Fx=t["Fx [N]"] / 1e3),
+            r"column 'tauR': found tauR = .* beside rR\*Fx .* apart",
         ),
     ],
-    ids=["10 Hz", "1 Hz", "gap", "one cell", "wrong radius", "torque that rests"],
+    ids=[
+        *("10 Hz", "1 Hz", "gap", "one cell", "wrong radius"),
+        *("kN.m as N.m", "kN.m as N.m, no force", "kN as N"),
+    ],
 )
 def test_a_recording_that_is_unlikely_is_read_with_a_doubt(tmp_path, system, stop, change, match):
     toml, table = stop
     case = read_case(write(tmp_path / "a", toml, change(table)), system)
     (doubt,) = case.doubts
     assert re.search(match, doubt), doubt
+
+
+def test_a_torque_that_rests_is_doubted_by_its_noise_and_by_the_balance(tmp_path, system, stop):
+    toml, table = stop
+    rests = changed(table, tauR=np.zeros_like(table["tauR [N.m]"]))
+    noise, balance = read_case(write(tmp_path / "a", toml, rests), system).doubts
+    assert "column 'tauR': found 0 kN.m in all" in noise
+    assert "what the drive gives turns the roller" in balance
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_sensor_of_torque_that_is_off_by_a_tenth_raises_no_doubt(tmp_path, system, stop, share):
+    toml, table = stop
+    off = changed(table, tauR=share * table["tauR [N.m]"])
+    assert read_case(write(tmp_path / "a", toml, off), system).doubts == ()
+
+
+def test_a_recording_without_forces_raises_no_doubt(system, root):
+    for case in read_cases([root / "cases"], system):
+        origin = Origin("a.csv", 2, {}, "")
+        signals = case.without(["Fx"]).signals
+        assert doubts(case.time, signals, case.conditions, system, origin) == ()
+
+
+@pytest.mark.long
+def test_no_effect_of_the_virtual_rig_makes_a_recording_doubtful(tmp_path, system):
+    """Each as large as sixteen times what matters, to either side, where it can be so large."""
+    known = Repertoire(PLANTABLE, library_effects(system))
+    usual = SCENARIOS["03_dry_120_3.6"]
+    slower = dataclasses.replace(usual.conditions, initial_speed=60 / 3.6)
+    rig = PlantedStops((dataclasses.replace(usual, conditions=slower),), REFERENCE)
+    least = {one.name: one.metadata["least"] for one in dataclasses.fields(Effects)}
+    tried = 0
+    for one in PLANTABLE:
+        for size in (16.0, -16.0) if one.signed else (16.0,):
+            gains = {one.name: size * known.size(one)}
+            if gains[one.name] < least[one.name]:
+                continue
+            folder = tmp_path / f"{one.name} {size:g}"
+            rig.write(rig.simulate(1, gains), gains, folder)
+            (case,) = read_cases([folder], system)
+            assert case.doubts == (), one.name
+            tried += 1
+    assert tried > len(PLANTABLE)
 
 
 def test_doubts_are_told_by_commands_and_warned_of_in_notebooks(tmp_path, system, stop, capsys):
@@ -192,6 +260,17 @@ def test_recordings_that_are_right_raise_no_doubt(root, system, folder):
         pytest.skip("recordings that are not at hand")
     for case in read_cases([root / folder], system):
         assert case.doubts == ()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("set_", ["healthy", "labelled", "history"])
+def test_recordings_of_a_train_that_are_right_raise_no_doubt(set_):
+    cases = sorted((RECORDINGS / "train" / set_).rglob("case.toml"))
+    if not cases:
+        pytest.skip("recordings that are not at hand")
+    train = load_system("train")
+    for path in cases:
+        assert read_recorded(path.parent, train).doubts == (), path
 
 
 def test_a_film_of_water_that_lets_the_wheel_slide_raises_no_doubt(system, root):

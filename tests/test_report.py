@@ -274,6 +274,22 @@ then = () => {
   told.hidden_again = document.querySelector(".readout").hidden;
   point("pointermove", 0.5);
   told.pointed = document.querySelector(".readout b").textContent;
+  const titles = [...plot.querySelectorAll(".title")];
+  const captions = titles.map((title) => title.textContent);
+  const right = () => Math.max(...titles.map((title) => title.getBBox().x + title.getBBox().width));
+  const wide = (width) => {
+    document.body.style.width = width;
+    dispatchEvent(new Event("resize"));
+  };
+  wide("376px");
+  told.narrow = {
+    room: place.clientWidth, scrolls: place.scrollWidth, drawn: plot.viewBox.baseVal.width,
+    right: right(), panel: Number(panels[0].getAttribute("width")), captions,
+    titles: titles.map((title) => title.textContent),
+    note: place.nextElementSibling.textContent,
+  };
+  wide("");
+  told.wide = [plot.viewBox.baseVal.width, titles.map((title) => title.textContent)];
 };
 """
 
@@ -378,6 +394,20 @@ def test_cursor_follows_the_pointer(browser: dict[str, Any], results: Path, page
     # A pixel of the pointer is 1/900 of the time.
     at = float(browser["pointed"].removesuffix(" s"))
     assert at == pytest.approx(middle, abs=2e-3 * (time.iloc[-1] - time.iloc[0]))
+
+
+def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(
+    browser: dict[str, Any],
+) -> None:
+    narrow = browser["narrow"]
+    assert narrow["room"] <= 376
+    assert narrow["drawn"] == narrow["room"] == narrow["scrolls"]  # one unit is one pixel
+    assert narrow["right"] <= narrow["room"]
+    assert 200 < narrow["panel"] < narrow["room"]
+    cut = [one for one in narrow["captions"] if one not in narrow["titles"]]
+    assert cut
+    assert narrow["note"] == "; ".join(cut)
+    assert browser["wide"] == [988, narrow["captions"]]
 
 
 def test_legend_hides_an_estimator_everywhere(browser: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,9 @@ def test_what_else_differs_is_said(
     said = capsys.readouterr().out
     assert f"recordings with other content: {CASE}" in said
     assert "settings: ekf." in said
+    (settings,) = [line for line in said.splitlines() if "settings: " in line]
+    assert re.search(r" and \d+ more$", settings)  # a dozen of them tell enough
+    assert "meanings" not in settings
     assert f"gone     {NAME}" in said
 
 

@@ -23,7 +23,10 @@ SYSTEMS = {
     **system_files(),
     "template": Path(workbench.template.__file__).with_name("system.toml"),
 }
-READERS = ("system_file", "system_tables", "comparison_tables", "experiment_tables")
+READERS = (
+    *("system_file", "system_tables", "recording_tables", "comparison_tables"),
+    *("experiment_tables", "distance_tables"),
+)
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -69,6 +72,24 @@ WRONG: dict[str, Callable[[dict[str, Any]], object]] = {
 def test_a_wrong_system_file_is_refused(name: str) -> None:
     content = tomllib.loads(SYSTEMS["template"].read_text())
     WRONG[name](content)
+    assert not validator(system_schema()).is_valid(content)
+
+
+OF_A_STOP: dict[str, Callable[[dict[str, Any]], object]] = {
+    "an unknown key": lambda one: one.update(sped="vTrain"),
+    "no speed is asked": lambda one: one["asked"].pop("speed"),
+    "a pressure at some time": lambda one: one["asked"]["pressure"].update(at="then"),
+    "an input along nothing": lambda one: one["inputs"]["pB1"].update(along="1 m"),
+    "neither spread nor share": lambda one: one["differs"][0].pop("spread"),
+    "a limit on no side": lambda one: one["outside"][0].pop("above"),
+    "three constants": lambda one: one["rating"]["constants"].update({"9 km/h": [1.0, 2.0, 3.0]}),
+}
+
+
+@pytest.mark.parametrize("name", OF_A_STOP)
+def test_a_wrong_table_of_how_a_machine_stops_is_refused(name: str) -> None:
+    content = tomllib.loads(SYSTEMS["train"].read_text())
+    OF_A_STOP[name](content["distance"])
     assert not validator(system_schema()).is_valid(content)
 
 

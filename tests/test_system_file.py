@@ -170,6 +170,14 @@ MISTAKES = {
         ("within = [0.05, 0.3]", "within = [0.3, 0.05]"),
         r"\[\[redundancies\]\] 1 within: found \[0\.3, 0\.05\]; expected the largest likely",
     ),
+    "balance over no time": (
+        ('over = "1 s"', 'over = "0 s"'),
+        r"\[\[redundancies\]\] 2 over: found '0 s'; expected a time above 0",
+    ),
+    "balance of an unknown store": (
+        ('stores = "JR*omegaR"', 'stores = "JR*omegar"'),
+        r"\[\[redundancies\]\] 2 stores: found 'omegar' \(closest: 'omegaR'\)",
+    ),
     "redundancy of an unknown signal": (
         ('is = "rW*omegaW"', 'is = "rW*omegaw"'),
         r"\[\[redundancies\]\] 1 is: found 'omegaw' \(closest: 'omegaW'\)",

@@ -172,17 +172,36 @@ def test_a_hostile_name_of_a_case_stays_text(page: Any) -> None:
     assert not page.xpath("//img|//@onerror")
 
 
+NARROW = """
+const dots = document.querySelector(".dots");
+then = () => {
+  document.body.style.width = "376px";
+  dispatchEvent(new Event("resize"));
+  told.room = dots.parentElement.clientWidth;
+  told.drawn = dots.viewBox.baseVal.width;
+  told.dots = [...dots.querySelectorAll("circle")].map((one) => one.cx.baseVal.value);
+  told.names = [...dots.querySelectorAll("text[text-anchor=start]")].map((one) => one.getBBox().x)
+    .map(Math.round);
+};
+"""
+
+
 def test_page_opens_without_errors_and_draws_its_curve(
     results: Path, probe: Callable[[Path, str], dict[str, Any]]
 ) -> None:
     curve = "document.querySelector('.dots .curve')"
     found = probe(
         results / "index.html",
-        f"told.length = {curve}.getTotalLength(); told.fill = getComputedStyle({curve}).fill;",
+        f"told.length = {curve}.getTotalLength(); told.fill = getComputedStyle({curve}).fill;"
+        f"{NARROW}",
     )
     assert found["errors"] == []
     assert found["length"] > 100  # [px]
     assert found["fill"] == "none"
+    # On a narrow screen all dots are in sight, and names stand above them.
+    assert found["drawn"] == found["room"] <= 376
+    assert 0 <= min(found["dots"]) < max(found["dots"]) <= found["room"]
+    assert set(found["names"]) == {0}
 
 
 # --- the result ---

@@ -15,6 +15,7 @@ SUMMARIES = (
     "thresholds.json",
     "sheet_error.json",
     "left_out.json",
+    "plan.json",
     "next.json",
     "distance.json",
     "bench.json",

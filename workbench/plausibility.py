@@ -14,7 +14,7 @@ import numpy as np
 from workbench.errors import InputError
 from workbench.recording import Vector
 from workbench.system import System
-from workbench.system_parts import FIRST, Condition, Signal, Tolerance
+from workbench.system_parts import FIRST, Condition, Redundancy, Signal, Tolerance
 from workbench.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
@@ -176,18 +176,18 @@ def _redundancies(
     time: Vector, signals: Mapping[str, Vector], system: System, origin: Origin
 ) -> Iterator[_Finding]:
     """Signals that contradict each other while they ought to agree."""
+    told: set[str] = set()  # of several that tell the same of one, the first
     for one in system.redundancies:
-        names = one.formula.names | one.other.names
-        if one.while_below is not None:
-            names |= {one.while_below.signal}
-        if not _has(names, signals, system):
+        names = _named(one)
+        if one.formula.text in told or not _has(names, signals, system):
             continue
-        left, right = (system.evaluate(formula, signals) for formula in (one.formula, one.other))
+        left, right = _sides(one, time, signals, system)
         large = np.maximum(np.abs(left), np.abs(right))
         compared = large > one.tolerance.slack
-        if one.while_below is not None:
-            known = system.signal(one.while_below.signal, signals)
-            compared &= np.abs(known) < one.while_below.level
+        for limit, side in ((one.while_below, -1.0), (one.while_above, 1.0)):
+            if limit is not None:
+                size = np.abs(system.signal(limit.signal, signals))
+                compared &= side * size > side * limit.level
         chosen = np.flatnonzero(compared)
         if chosen.size < _FEW:
             continue
@@ -195,17 +195,57 @@ def _redundancies(
         share = float(np.median(shares))  # whatever single samples read
         if not share > one.tolerance.likely:
             continue
+        told.add(one.formula.text)
         first = int(chosen[shares > one.tolerance.likely][0])
-        columns = [name for name in signals if name in one.formula.names | one.other.names]
+        columns = [name for name in signals if name in _compared(one)]
+        told_by = [name for name in columns if one.store is None or name in one.formula.names]
+        where = f"at {time[first]:.9g} s"
+        other = one.other.text
+        if one.store is not None:
+            other = f"{other}, with what {one.store.formula.text} gains,"
+            where = f"in the mean of {one.store.over:g} s from {time[first]:.9g} s on"
         yield _Finding(
             share > one.tolerance.possible,
-            origin.at(first, columns[-1] if columns else "time"),
-            f"{one.formula.text} = {left[first]:.6g} {one.unit} beside {one.other.text} = "
-            f"{right[first]:.6g} {one.unit} at {time[first]:.9g} s, and by {share:.0%} apart in "
+            origin.at(first, told_by[-1] if told_by else "time"),
+            f"{one.formula.text} = {left[first]:.6g} {one.unit} beside {other} = "
+            f"{right[first]:.6g} {one.unit} {where}, and by {share:.0%} apart in "
             f"half of {chosen.size} samples",
             f"the same within {one.tolerance.likely:.0%}: {one.reason}",
             f"check units, signs and columns of {', '.join(columns)}",
         )
+
+
+def _compared(one: Redundancy) -> Set[str]:
+    """Names in the formulas that are compared."""
+    stored: Set[str] = one.store.formula.names if one.store is not None else frozenset()
+    return one.formula.names | one.other.names | stored
+
+
+def _named(one: Redundancy) -> Set[str]:
+    """All names that a redundancy needs."""
+    limits = [limit.signal for limit in (one.while_below, one.while_above) if limit is not None]
+    return _compared(one) | set(limits)
+
+
+def _sides(
+    one: Redundancy, time: Vector, signals: Mapping[str, Vector], system: System
+) -> tuple[Vector, Vector]:
+    """Both sides of a redundancy from each sample on, (n,) each; NaN beyond the end."""
+    left, right = (system.evaluate(formula, signals) for formula in (one.formula, one.other))
+    if one.store is None:
+        return left, right
+    over = one.store.over
+    end = time + over
+
+    def gained(values: Vector) -> Vector:
+        later: Vector = np.interp(end, time, values, right=np.nan)
+        return (later - values) / over
+
+    def mean(values: Vector) -> Vector:
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+        return gained(np.append(0.0, np.cumsum(steps)))
+
+    return mean(left), mean(right) + gained(system.evaluate(one.store.formula, signals))
 
 
 def _has(names: Set[str], signals: Mapping[str, Vector], system: System) -> bool:

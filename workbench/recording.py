@@ -68,7 +68,7 @@ def read_text(path: Path, remedy: str) -> str:
         If the file cannot be read or is not UTF-8; `remedy` is for a file that cannot be read.
     """
     raw = read_bytes(path, remedy)
-    save_as_utf8 = "save the file as UTF-8"
+    save_as_utf8 = "save the file as UTF-8, or take it as it is: workbench import"
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw:
         raise InputError(
             where=str(path),

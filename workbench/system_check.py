@@ -90,6 +90,7 @@ def _formulas(system: System) -> Iterator[_Reference]:
     compared = system.comparison
     for formula in (
         *(side for one in system.redundancies for side in (one.formula, one.other)),
+        *(one.store.formula for one in system.redundancies if one.store),
         *(one.agrees.formula for one in system.conditions if one.agrees),
         *(one.recorded_as.formula for one in system.signals.values() if one.recorded_as),
         *(one.formula for one in system.work),

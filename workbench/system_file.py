@@ -9,6 +9,7 @@ from workbench.description import Description, read_description
 from workbench.distance_tables import read_stopping
 from workbench.errors import InputError
 from workbench.experiment_tables import read_experiments
+from workbench.recording_tables import read_cutting, read_redundancy, read_sampling
 from workbench.system import OBSERVER, System
 from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
@@ -16,7 +17,6 @@ from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     positive,
     read_condition_kinds,
-    read_cutting,
     read_derived,
     read_estimated,
     read_export,
@@ -27,9 +27,7 @@ from workbench.system_tables import (
     read_objective,
     read_of_states,
     read_point,
-    read_redundancy,
     read_rolling,
-    read_sampling,
     read_view,
     within,
 )

@@ -200,14 +200,29 @@ class Cutting:
 
 
 @dataclass(frozen=True)
+class Store:
+    """What a flow in and a flow out differ by is stored.
+
+    Attributes
+    ----------
+    formula : what is stored [unit of the flows times s].
+    over : time over which the flows are averaged [s].
+    """
+
+    formula: Expression
+    over: float
+
+
+@dataclass(frozen=True)
 class Redundancy:
-    """Two formulas of measured signals that agree while a third signal is small.
+    """Two formulas of measured signals that agree while a third signal is small, or is large.
 
     Attributes
     ----------
     reason : why they agree, for people.
     unit : of both.
-    while_below : the signal and its level; None: always.
+    store : what their difference is stored in; None: they agree in each sample.
+    while_below, while_above : the signal and its level; None: always.
     """
 
     reason: str
@@ -215,7 +230,9 @@ class Redundancy:
     other: Expression
     unit: str
     tolerance: Tolerance
+    store: Store | None
     while_below: Threshold | None
+    while_above: Threshold | None
 
 
 @dataclass(frozen=True)

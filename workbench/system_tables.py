@@ -13,7 +13,6 @@ from workbench.system_parts import (
     LARGEST,
     Agreement,
     Condition,
-    Cutting,
     Derived,
     Estimated,
     Export,
@@ -23,9 +22,7 @@ from workbench.system_parts import (
     Model,
     Objective,
     OperatingPoint,
-    Redundancy,
     Rolling,
-    Sampling,
     Signal,
     Threshold,
     Tolerance,
@@ -253,50 +250,15 @@ def _agreement(condition: Table) -> Agreement:
         raise table.wrong("at", f"'{FIRST}' or '{LARGEST}'")
     unit = condition.text("unit", "1")
     formula = Expression(table.take("is", str), f"{table.where} is")
-    return Agreement(formula, place, _tolerance(table, unit))
+    return Agreement(formula, place, read_tolerance(table, unit))
 
 
-def _tolerance(table: Table, unit: str) -> Tolerance:
+def read_tolerance(table: Table, unit: str) -> Tolerance:
     """By how much two values in a unit may differ."""
     likely, possible = table.numbers("within", "1", 2)
     if not 0.0 <= likely <= possible:
         raise table.wrong("within", "the largest likely share before the largest possible one")
     return Tolerance(likely, possible, table.number("slack", unit, 0.0))
-
-
-def read_redundancy(table: Table, system: System) -> Redundancy:
-    """Two formulas that tell the same."""
-    table.refuse_unknown("reason is equals unit within slack only_while")
-    while_ = table.table("only_while")
-    return Redundancy(
-        reason=table.take("reason", str),
-        formula=Expression(table.take("is", str), f"{table.where} is"),
-        other=Expression(table.take("equals", str), f"{table.where} equals"),
-        unit=table.unit("unit"),
-        tolerance=_tolerance(table, table.unit("unit")),
-        while_below=read_threshold(while_, system, "below") if "only_while" in table else None,
-    )
-
-
-def read_cutting(table: Table, system: System) -> Cutting:
-    """Which parts of a long recording are recordings of their own."""
-    table.refuse_unknown("begins ends released before after")
-    return Cutting(
-        begins=read_threshold(table.table("begins"), system),
-        ends=read_threshold(table.table("ends"), system, "below"),
-        released=table.number("released", "s", 0.0),
-        before=table.number("before", "s", 0.0),
-        after=table.number("after", "s", 0.0),
-    )
-
-
-def read_sampling(table: Table) -> Sampling:
-    """Which times between samples are likely."""
-    table.refuse_unknown("slowest gaps")
-    likely, possible = table.numbers("gaps", "s", 2) if "gaps" in table else (math.inf, math.inf)
-    if likely > possible:
-        raise table.wrong("gaps", "the longest likely time before the longest possible one")
-    return Sampling(table.number("slowest", "s", math.inf), likely, possible)
 
 
 def positive(table: Table, key: str) -> float:

@@ -6,6 +6,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from tests.fuzz.apart import one_process
 from tests.fuzz.harness import Report, fuzz
 from tests.fuzz.targets import targets
 
@@ -23,7 +24,7 @@ def main() -> int:
         "--out", type=Path, default=Path("build/fuzz"), help="where those that fail are kept"
     )
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, one_process():
         wanted = [one for one in targets(Path(folder)) if options.target in (None, one.name)]
         numbers = range(-(-options.count // max(1, len(wanted))))
         if options.number is not None:

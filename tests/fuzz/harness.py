@@ -10,6 +10,7 @@ import shutil
 import signal
 import sys
 import tempfile
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -76,7 +77,7 @@ class Report:
     failures: list[Failure] = field(default_factory=list)
 
 
-class _Hang(BaseException):
+class Hang(BaseException):
     """A reader takes too long; no reader catches this."""
 
 
@@ -122,11 +123,11 @@ def _outcome(target: Target, folder: Path, scratch: Path) -> tuple[str, str]:
     """Class of what happened, and what was wrong with it; empty if nothing was."""
     outside: list[str] = []
     try:
-        with _limited(), _watched(scratch, outside):
+        with _limited(), _watched(scratch, outside), warnings.catch_warnings(action="error"):
             value = target.read(folder)
     except (InputError, FMUError):
         outcome, said = "refused", ""
-    except _Hang:
+    except Hang:
         outcome, said = "hang", f"more than {LONGEST:g} s of processor time"
     except Exception as error:
         kind = type(error).__name__
@@ -157,7 +158,7 @@ def _apart(folder: Path) -> Iterator[None]:
 @contextmanager
 def _limited() -> Iterator[None]:
     def stop(_: int, __: FrameType | None) -> None:
-        raise _Hang
+        raise Hang
 
     limits = {signal.ITIMER_PROF: LONGEST, signal.ITIMER_REAL: LONGEST_WAIT}
     kinds = (signal.SIGPROF, signal.SIGALRM)

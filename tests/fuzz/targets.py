@@ -1,5 +1,7 @@
 """What is fuzzed: every kind of file that a user may give, with the reader that takes it."""
 
+import gzip
+import io
 import re
 import zipfile
 from collections.abc import Iterator
@@ -11,13 +13,13 @@ import numpy as np
 
 from tests.case_folders import LINES, TOML
 from tests.fuzz.harness import Target
-from tests.fuzz.mutations import BYTES, Files, mutate, zipped
+from tests.fuzz.mutations import BYTES, SMALL, Files, change_one, mutate, zipped
 from tests.recorder_files import FORMATS, recorded
 from workbench import resources
-from workbench.case import Case, read_case
+from workbench.case import Case, read_case, read_file
 from workbench.description import Description, read_description
 from workbench.fmu import FMU
-from workbench.foreign import Recorded, read_foreign
+from workbench.mapping import Named, Told
 from workbench.modelica import check, read_library
 from workbench.observers.gains import Gains
 from workbench.observers.gains_file import read_gains
@@ -82,24 +84,61 @@ def _impossible_case(case: Case) -> str:
 
 
 def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
-    """Files that are read here; others are read in processes, which fuzzing would wait for."""
-    stop = read_case(resources.cases() / "01_dry_80_1.5", system).part(slice(None, None, 100))
-    for name in ("german.csv", "stamps.txt", "labview.tdms"):
-        FORMATS[name](folder / name, recorded(stop, system))
-        content = (folder / name).read_bytes()
-        yield Target(name, {name: content}, partial(_read_recorded, name), _impossible_channels)
+    """Files as recorders left them, with conditions and channels that a user has named."""
+    stop = read_case(resources.cases() / "01_dry_80_1.5", system).part(slice(None, None, 40))
+    changes = {".csv": change_one, ".txt": change_one, ".gz": _packed, ".xlsx": _workbook}
+    for name, write in FORMATS.items():
+        write(folder / name, recorded(stop, system))
+        named = _CHANNELS_OF_MATLAB if name.endswith(".mat") else _CHANNELS
+        told = Told(
+            conditions={"wheel_rail": "dry", "discs": ["dry"] * 3},
+            columns={signal: Named(channel) for signal, channel in named.items()},
+            step=0.2 if name == "indices.csv" else None,
+        )
+        yield Target(
+            name,
+            {name: (folder / name).read_bytes()},
+            partial(_read_recorded, name, system, told),
+            _impossible_case,
+            changes.get(Path(name).suffix, _recording),
+        )
 
 
-def _read_recorded(name: str, folder: Path) -> Recorded:
-    return read_foreign(folder / name)
+_CHANNELS = {
+    **{"pB": "Bremsdruck", "tauR": "Antriebsmoment", "omegaW": "v_Rad", "omegaR": "v_Rolle"},
+    "Fx": "Längskraft",
+}
+_CHANNELS_OF_MATLAB = {**_CHANNELS, "Fx": "Laengskraft", "time": "Zeit"}
 
 
-def _impossible_channels(recording: Recorded) -> str:
-    """What no file can hold: channels of one group and of different lengths."""
-    for group in recording.groups:
-        if len({channel.values.shape for channel in group.channels}) > 1:
-            return "channels of different lengths"
-    return ""
+def _read_recorded(name: str, system: System, told: Told, folder: Path) -> Case:
+    return read_file(folder / name, system, told)
+
+
+def _recording(files: Files, random: Random) -> tuple[Files, str]:
+    """A mutant of a recorder's file of bytes."""
+    ((name, content),) = files.items()
+    changed, mutation = mutate(content, random, BYTES)
+    return {name: changed[:SMALL]}, mutation
+
+
+def _packed(files: Files, random: Random) -> tuple[Files, str]:
+    """A mutant of a packed file, or of what is in it."""
+    if random.random() < 0.3:
+        return _recording(files, random)
+    ((name, content),) = files.items()
+    changed, mutation = mutate(gzip.decompress(content), random)
+    return {name: gzip.compress(changed[:SMALL], mtime=0)}, f"in it: {mutation}"
+
+
+def _workbook(files: Files, random: Random) -> tuple[Files, str]:
+    """A mutant of a workbook, which is an archive of texts."""
+    ((name, content),) = files.items()
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = {one: archive.read(one) for one in archive.namelist()}
+    texts = [one for one in entries if one.startswith("xl/")]
+    changed, mutation = _archive(entries, random.choice(texts), random)
+    return {name: changed}, mutation
 
 
 # --- what the workbench writes and reads again ---
@@ -192,23 +231,28 @@ def _fmu(name: str, path: Path) -> Target:
     """An archive; binaries may be damaged, but only sound ones are loaded."""
     with zipfile.ZipFile(path) as archive:
         entries = {n: archive.read(n) for n in archive.namelist() if re.match(_ENTRIES, n)}
-    change = partial(_archive, entries=entries)
+    change = partial(_changed_fmu, entries=entries)
     return Target(name, {"model.fmu": zipped(entries)}, _read_fmu, change=change)
 
 
-def _archive(_: Files, random: Random, *, entries: Files) -> tuple[Files, str]:
-    """A mutant of the description, of what entries are named and hold, or of the archive itself."""
-    changed, kind = dict(entries), random.choice(("description", "names", "bytes"))
-    if kind == "description":
-        changed[DESCRIPTION], mutation = mutate(entries[DESCRIPTION], random)
-        return {"model.fmu": zipped(changed)}, f"{kind}: {mutation}"
+def _changed_fmu(_: Files, random: Random, *, entries: Files) -> tuple[Files, str]:
+    content, mutation = _archive(entries, DESCRIPTION, random)
+    return {"model.fmu": content}, mutation
+
+
+def _archive(entries: Files, text: str, random: Random) -> tuple[bytes, str]:
+    """A mutant of a text in it, of what entries are named and hold, or of the archive itself."""
+    changed, kind = dict(entries), random.choice(("text", "names", "bytes"))
+    if kind == "text":
+        changed[text], mutation = mutate(entries[text], random)
+        return zipped(changed), f"{text}: {mutation}"
     if kind == "names":
         old, new = random.choice(list(entries)), random.choice(_NAMES)
         content = changed.pop(old) if random.random() < 0.5 else b"x" * random.choice((0, 9, 10**6))
         changed[new or old.upper()] = content
-        return {"model.fmu": zipped(changed)}, f"{kind}: {old} is {new}"
+        return zipped(changed), f"{kind}: {old} is {new}"
     packed, mutation = mutate(zipped(entries), random, BYTES)
-    return {"model.fmu": packed}, f"{kind}: {mutation}"
+    return packed, f"{kind}: {mutation}"
 
 
 def _read_fmu(folder: Path) -> Description:

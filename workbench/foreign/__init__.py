@@ -7,9 +7,10 @@ channel means for a machine is not known here.
 import gzip
 import hashlib
 import io
+import warnings
 import zlib
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, redirect_stdout
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -24,6 +25,7 @@ from workbench.resources import installing
 __all__ = ["Channel", "Group", "Recorded", "is_foreign", "read_foreign"]
 
 _Reader = Callable[[Path, bytes], Contents]
+_OF_THE_FILE = (UserWarning, RuntimeWarning)
 _MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
 # Packages that read a format, by the module here, and what people call its files.
 _PACKAGES = {
@@ -133,8 +135,16 @@ def _reader(path: Path, raw: bytes) -> _Reader:
 
 
 def _here(module: str, path: Path, raw: bytes) -> Contents:
-    found: Contents = import_module(f"workbench.foreign.{module}").read(path, raw)
-    return found
+    reader = import_module(f"workbench.foreign.{module}")
+    # Some print what puzzles them, where results are expected.
+    with (
+        redirect_stdout(io.StringIO()),
+        warnings.catch_warnings(record=True, action="always") as told,
+    ):
+        found: Contents = reader.read(path, raw)
+    # What libraries warn of is about the file, or is about themselves.
+    notes = [str(one.message)[:200] for one in told if issubclass(one.category, _OF_THE_FILE)]
+    return found._replace(notes=[*found.notes, *dict.fromkeys(notes)])
 
 
 def _apart(module: str, path: Path, raw: bytes) -> Contents:

@@ -1,6 +1,9 @@
 """MDF of data loggers, version 3 and 4: each channel group has its own times."""
 
 import io
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +22,30 @@ def read(path: Path, raw: bytes) -> Contents:
         raise ValueError("no header")  # asammdf stumbles over itself without one
     groups: list[Group] = []
     notes: list[str] = []
-    with MDF(io.BytesIO(raw)) as file:
+    doubts: dict[str, None] = {}
+    with _heard(doubts), MDF(io.BytesIO(raw)) as file:
         version, start = file.version, file.start_time.timestamp()
         for index, held in enumerate(file.groups):
             group = _group(file, index, held, start, notes)
             if group is not None:
                 groups.append(group)
-    return Contents(f"MDF {version}", groups, notes)
+    return Contents(f"MDF {version}", groups, notes, tuple(doubts))
+
+
+@contextmanager
+def _heard(doubts: dict[str, None]) -> Iterator[None]:
+    """Take down what the library only logs, such as blocks that are missing."""
+
+    def take(record: logging.LogRecord) -> bool:
+        doubts[f"asammdf: {record.getMessage()[:200]}"] = None
+        return False
+
+    logger = logging.getLogger("asammdf")
+    logger.addFilter(take)
+    try:
+        yield
+    finally:
+        logger.removeFilter(take)
 
 
 def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> Group | None:

@@ -64,8 +64,11 @@ class Assigned:
 
     @property
     def values(self) -> Vector:
-        """(n,) SI, NaN in gaps."""
-        return self.factor * self.channel.values + self.zero
+        """(n,) SI, not finite in gaps."""
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # what no machine reads is none of its readings
+            return self.factor * self.channel.values + self.zero
 
     @property
     def named(self) -> Named:

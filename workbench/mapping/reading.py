@@ -104,6 +104,8 @@ def _unsure(path: Path, proposal: Proposal) -> InputError:
     found = [*proposal.problems, *(f"perhaps {one}" for one in proposed)]
     found += [
         f"perhaps time = {clock.channel} [{clock.unit}]"
+        if clock.channel
+        else f"perhaps time {clock.reason}"
         for clock in proposal.clocks.values()
         if not clock.certain
     ]

@@ -1,5 +1,6 @@
 const SHORTEST = 200; // [ms] that can be seen at once
 const FOLDED = "details:not([open])";
+const NARROW = 640; // [px] of a place; below, a figure is drawn as wide as that
 const MARGIN = 0.06; // of a fitted panel, above and below its curves
 
 /** Round values between low and high, at most `most` of them. */
@@ -18,9 +19,11 @@ function ticks(low, high, most) {
 function zoomable(figure) {
   const plot = figure.querySelector(".plot");
   const place = figure.querySelector(".scroll");
-  const [left, width, bottom, begin, duration] = ["left", "width", "bottom", "begin", "duration"].map(
+  const [left, wide, bottom, begin, duration] = ["left", "width", "bottom", "begin", "duration"].map(
     (name) => Number(plot.dataset[name]),
   );
+  const { width: breadth, height: depth } = plot.viewBox.baseVal;
+  let width = wide;
   const { axis, unit: axisUnit } = plot.dataset;
   /** A place on the axis at the bottom, in thousandths after its begin, for people. */
   const placed = (after, digits) => {
@@ -43,9 +46,11 @@ function zoomable(figure) {
     const lines = [...view.querySelectorAll(".curve")];
     const further = axes.dataset.further && [axes.dataset.further, Number(axes.dataset.factor)];
     const { unit } = axes.dataset;
-    const title = axes.querySelector(".title").textContent;
+    const heading = axes.querySelector(".title");
+    const title = heading.textContent;
+    const beside = axes.querySelector(":scope > .further");
     const levels = view.viewBox.baseVal.height;
-    return { view, grid, top, height, low, high, levels, bands, lines, unit, further, title, curves: null };
+    return { view, grid, top, height, low, high, levels, bands, lines, unit, further, title, heading, beside, curves: null };
   });
   const times = plot.querySelector(".time");
   const range = document.createElement("output");
@@ -116,7 +121,7 @@ function zoomable(figure) {
 
   function draw() {
     const at = (time) => (left + (width * (1e3 * (time - begin) - from)) / (to - from)).toFixed(1);
-    const vertical = ticks(begin + from / 1e3, begin + to / 1e3, 12);
+    const vertical = ticks(begin + from / 1e3, begin + to / 1e3, Math.ceil((12 * width) / wide));
     for (const panel of panels) {
       const [upper, lower] = fit(panel);
       panel.view.setAttribute("viewBox", `${from} ${upper} ${to - from} ${lower - upper}`);
@@ -146,6 +151,44 @@ function zoomable(figure) {
       .join("");
     range.value = `${placed(from, 2)} to ${placed(to, 2)}`;
     if (read !== null) point(read);
+  }
+
+  // --- narrow screens ---
+
+  const notes = document.createElement("p");
+  notes.className = "note";
+  notes.hidden = true;
+  place.after(notes);
+
+  /** A title that fits; what follows its first comma stands below the figure where it does not. */
+  function head({ heading, title }, total) {
+    heading.textContent = title;
+    heading.setAttribute("x", left);
+    if (total === breadth || heading.getComputedTextLength() <= total - left) return "";
+    heading.setAttribute("x", 0);
+    if (heading.getComputedTextLength() <= total) return "";
+    heading.textContent = title.split(", ")[0];
+    return title;
+  }
+
+  /** Draw the figure as wide as its place is, with letters as large as ever. */
+  function widen() {
+    const room = place.clientWidth;
+    const total = room < NARROW ? room : breadth;
+    if (!room || total === plot.viewBox.baseVal.width) return;
+    const right = total === breadth || panels.some(({ further }) => further) ? breadth - left - wide : 8;
+    width = total - left - right;
+    plot.setAttribute("viewBox", `0 0 ${total} ${depth}`);
+    plot.classList.toggle("narrow", total < breadth);
+    for (const { view, beside } of panels) {
+      view.setAttribute("width", width);
+      beside?.setAttribute("x", total);
+    }
+    const cut = panels.map((panel) => head(panel, total)).filter(Boolean);
+    notes.textContent = cut.join("; ");
+    notes.hidden = !cut.length;
+    plot.querySelector(".axis").setAttribute("x", left + width / 2);
+    draw();
   }
 
   // --- reading values ---
@@ -359,5 +402,6 @@ function zoomable(figure) {
     });
   }
   range.value = "whole recording";
+  fitted(widen);
   return figure.closest(FOLDED) ? null : ready;
 }

@@ -49,11 +49,51 @@ function labelled(table) {
     });
 }
 
+/** Fit something to its place now, and whenever that may have another width, or one at all. */
+function fitted(act) {
+  act();
+  addEventListener("resize", act);
+  addEventListener("toggle", act, true);
+}
+
+/** Draw dots as wide as their place, where that is narrow: names stand above their dots. */
+function dotted(plot) {
+  const [left, width] = ["left", "width"].map((name) => Number(plot.dataset[name]));
+  const { width: breadth, height } = plot.viewBox.baseVal;
+  const drawn = plot.innerHTML;
+  const edge = 24; // [px], half of a number
+  const widen = () => {
+    const room = plot.parentElement.clientWidth;
+    const total = room < NARROW ? room : breadth;
+    if (!room || total === plot.viewBox.baseVal.width) return;
+    plot.innerHTML = drawn;
+    plot.setAttribute("viewBox", `0 0 ${total} ${height}`);
+    plot.classList.toggle("narrow", total < breadth);
+    if (total === breadth) return;
+    const at = (x) => (edge + ((Number(x) - left) * (total - 2 * edge)) / width).toFixed(1);
+    for (const one of plot.children) {
+      if (one.getAttribute("text-anchor") === "end") {
+        one.setAttribute("text-anchor", "start");
+        one.setAttribute("x", 0);
+        one.setAttribute("y", Number(one.getAttribute("y")) - 12);
+      } else if (one.matches("path")) {
+        const path = one.getAttribute("d");
+        one.setAttribute("d", path.replace(/([MH])([\d.]+)/g, (_, letter, x) => letter + at(x)));
+      } else {
+        const name = one.matches("circle") ? "cx" : "x";
+        one.setAttribute(name, at(one.getAttribute(name)));
+      }
+    }
+  };
+  fitted(widen);
+}
+
 /** Bring the page to life; resolves when all figures in view have their samples. */
 function start() {
   document.documentElement.classList.add("script");
   document.querySelectorAll("main table").forEach(labelled);
   document.querySelectorAll("table.sortable").forEach(sortable);
+  document.querySelectorAll(".dots[data-left]").forEach(dotted);
   const figures = [...document.querySelectorAll("figure.zoomable")].map(zoomable);
   addEventListener("hashchange", reveal);
   addEventListener("beforeprint", () => {

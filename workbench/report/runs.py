@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from workbench.answer import SUMMARIES, Measure
 from workbench.errors import InputError
+from workbench.mapping import listed
 from workbench.recording import read_text
 
 Verdict = Literal["better", "worse", "changed", "unclear", "unchanged", "gone", "new"]
@@ -242,7 +243,7 @@ def differences(before: Ran, after: Ran) -> list[str]:
         ),
     ):
         if names:
-            found.append(f"{text}: {', '.join(names)}")
+            found.append(f"{text}: {listed(names)}")
     settings = dict(_leaves(before.provenance)), dict(_leaves(after.provenance))
     names = [
         name
@@ -250,7 +251,7 @@ def differences(before: Ran, after: Ran) -> list[str]:
         if settings[0].get(name) != settings[1].get(name)
     ]
     if names:
-        found.append(f"settings: {', '.join(names)}")
+        found.append(f"settings: {listed(names)}")
     return found
 
 
@@ -260,7 +261,7 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, content
         return
     for key, one in content.items():
-        if path or key not in ("run", "workbench", "commit"):
+        if path or key not in ("run", "workbench", "commit", "meanings"):
             yield from _leaves(one, f"{path}.{key}" if path else key)
 
 

@@ -27,8 +27,8 @@ def headline(summary: Mapping[str, Any]) -> str:
     result = (
         f"z stays at {z:.4g}, because no candidate was better than the reasoned gains"
         if z == before
-        else f"z {moved} from {before:.4g} with the reasoned gains to {z:.4g} with the tuned ones "
-        f"({100 * (z / before - 1):+.1f} %)"
+        else f"z, the objective of the worst case, {moved} from {before:.4g} with the reasoned "
+        f"gains to {z:.4g} with the tuned ones ({100 * (z / before - 1):+.1f} %)"
     )
     worst, *others = _worst_first(summary)
     if others:

@@ -15,6 +15,7 @@ from workbench.schemas.words import (
     listed,
 )
 from workbench.system import System
+from workbench.system_distance import COMMAND, END, SPEED
 from workbench.system_parts import FIRST, LARGEST, Condition
 
 
@@ -130,26 +131,27 @@ def system_schema() -> Schema:
         "fewest": NUMBER,
         "cases": NAMED,
         "sampling": closed({"slowest": QUANTITY, "gaps": PAIR}, optional="*"),
-        "redundancies": listed(_redundancy(formula, below)),
+        "redundancies": listed(_redundancy(formula, level, below)),
         "next": _experiments(formula, made, measured),
         "cutting": closed(cutting, optional="released before after"),
         "work": by_name(closed({"is": formula, "label": TEXT}, optional="label")),
-        "distance": {"type": "object"},  # see docs/distance.md
+        "distance": _stopping(formula, level),
     }
     needed = {"title", "models", "outputs", "sample_time"}
     optional = " ".join(name for name in entries if name not in needed)
     return _file("system.toml", closed(entries, optional=optional))
 
 
-def _redundancy(formula: Schema, below: Schema) -> Schema:
+def _redundancy(formula: Schema, level: Schema, below: Schema) -> Schema:
     redundancy = {
         **dict.fromkeys(("reason", "unit"), NAMED),
-        **dict.fromkeys(("is", "equals"), formula),
+        **dict.fromkeys(("is", "equals", "stores"), formula),
+        "over": QUANTITY,
         "within": PAIR,
         "slack": QUANTITY,
-        "only_while": below,
+        "only_while": {"anyOf": [level, below]},
     }
-    return closed(redundancy, optional="slack only_while")
+    return closed(redundancy, optional="stores over slack only_while")
 
 
 def _objective(level: Schema) -> Schema:
@@ -212,6 +214,21 @@ def _comparison(formula: Schema, level: Schema) -> Schema:
     ways = {"enum": ["value", "size", "rate", "integral", "turn"]}
     influence = {"is": formula, "unit": TEXT, "way": ways}
     leads = {"output": NAMED, "together": listed(NAMED), "ripple": QUANTITY}
+    entries = {
+        "begins": level,
+        "rest": closed({"signal": NAMED, "output": NAMED, "zero": QUANTITY}),
+        "leads": closed(leads, optional="together ripple"),
+        "channels": by_name(closed(channel, optional="label shown")),
+        "tolerances": by_name(NUMBER),
+        "levels": by_name(closed({"by": TEXT, "spread": NUMBER}, optional="*")),
+        "excluded": listed(_exclusion(formula, level)),
+        "influences": by_name(closed(influence, optional="way")),
+        **dict.fromkeys(("block", "lasting", "least", "settling", "left"), QUANTITY),
+    }
+    return closed(entries, optional="*")
+
+
+def _exclusion(formula: Schema, level: Schema) -> Schema:
     excluded = {
         "reason": NAMED,
         "is": formula,
@@ -223,18 +240,35 @@ def _comparison(formula: Schema, level: Schema) -> Schema:
     }
     outside = " ".join(name for name in excluded if name not in ("reason", "is"))
     either = [{"required": ["above"]}, {"required": ["below"]}]
-    entries = {
-        "begins": level,
-        "rest": closed({"signal": NAMED, "output": NAMED, "zero": QUANTITY}),
-        "leads": closed(leads, optional="together ripple"),
-        "channels": by_name(closed(channel, optional="label shown")),
-        "tolerances": by_name(NUMBER),
-        "levels": by_name(closed({"by": TEXT, "spread": NUMBER}, optional="*")),
-        "excluded": listed({**closed(excluded, optional=outside), "oneOf": either}),
-        "influences": by_name(closed(influence, optional="way")),
-        **dict.fromkeys(("block", "lasting", "least", "settling", "left"), QUANTITY),
+    return {**closed(excluded, optional=outside), "oneOf": either}
+
+
+def _stopping(formula: Schema, level: Schema) -> Schema:
+    asked = {
+        **dict.fromkeys(("label", "unit", "shown"), NAMED),
+        "is": formula,
+        "at": {"enum": [COMMAND, END]},
+        "usual": QUANTITY,
     }
-    return closed(entries, optional="*")
+    driven = {"is": formula, **dict.fromkeys(("delay", "lag"), QUANTITY), "along": FLAG}
+    differs = {"of": listed(NAMED), **dict.fromkeys(("spread", "share"), QUANTITY), "unit": NAMED}
+    nominal = dict.fromkeys(("mass", "rotating", "resistance"), formula)
+    nominal |= {"reference": QUANTITY, "within": QUANTITY, "speeds": listed(QUANTITY)}
+    constants = by_name({"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2})
+    either = [{"required": ["spread"]}, {"required": ["share"]}]
+    entries = {
+        "speed": formula,
+        **dict.fromkeys(("state", "timed_by"), NAMED),
+        **dict.fromkeys(("rest", "longest"), QUANTITY),
+        "asked": {**by_name(closed(asked, optional="label shown at")), "required": [SPEED]},
+        "inputs": by_name(closed(driven, optional="delay lag along")),
+        "start": by_name(formula),
+        "differs": listed({**closed(differs, optional="spread share unit"), "oneOf": either}),
+        "outside": listed(_exclusion(formula, level)),
+        "nominal": closed(nominal),
+        "rating": closed({"label": NAMED, "constants": constants}),
+    }
+    return closed(entries, optional="differs outside nominal rating")
 
 
 def _experiments(formula: Schema, made: Schema, measured: Schema) -> Schema:

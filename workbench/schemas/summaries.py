@@ -7,6 +7,7 @@ file has and its schema has not is a mistake in one of the two.
 from workbench.companion import companion_part
 from workbench.diagnosis.sample_errors import Errors
 from workbench.installed import companions
+from workbench.power.planned import Foreseen
 from workbench.power.sensitivity import Changed
 from workbench.schemas.words import (
     ANY,
@@ -47,10 +48,12 @@ def summaries() -> dict[str, Schema]:
         "thresholds": _thresholds(),
         "sheet_error": _sheet_error(),
         "left_out": _left_out(),
+        "plan": _plan(),
         "next": _next(),
         "distance": _distance(),
         "monitor": _monitor(),
         "fleet": _fleet(),
+        "bench": _bench(),
     }
     for name in companions():
         if part := companion_part(name, "schemas"):
@@ -274,6 +277,11 @@ def _left_out() -> Schema:
     return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
 
 
+def _plan() -> Schema:
+    entries = {"sizes": listed(NUMBER), "effects": listed(declared(Foreseen))}
+    return summary("power --plan", _SETS, entries)
+
+
 def _next() -> Schema:
     profile = closed({"profile": TEXT, "levels": listed(NUMBER), "every": NUMBER})
     tried = closed(
@@ -356,3 +364,42 @@ def _fleet() -> Schema:
     }
     provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
     return summary("monitor --fleet", closed(provenance), entries)
+
+
+def _bench() -> Schema:
+    ratios = {"ratios": by_name(NUMBER)}
+    wholes = dict.fromkeys(("states", "inputs"), WHOLE)
+    spent = ("derivatives", "derivatives_fmi", "nonzeros", "jacobian", "jacobian_fmi", "step")
+    call = {"unit": TEXT, **wholes, **dict.fromkeys((*spent, "steps_per_second"), NUMBER)}
+    observer = {
+        "observer": TEXT,
+        "states": WHOLE,
+        **dict.fromkeys(("step", "times_real_time", "long"), NUMBER),
+        "by_rate": by_name(NUMBER),
+        **dict.fromkeys(("fmpy", "c"), or_null(NUMBER)),
+    }
+    processes = {"cases": WHOLE, "one": NUMBER, "two": NUMBER, "peak_memory": WHOLE}
+    horizon = {"unknowns": WHOLE, "samples": WHOLE, "ours": NUMBER, "ipopt": NUMBER}
+    observers = {
+        "case": TEXT,
+        "steps": listed(closed(observer)),
+        "processes": closed(processes),
+        "compilation": by_name(NUMBER),
+        "horizon": closed({**horizon, **ratios}),
+    }
+    evaluation = {"estimator": TEXT, "steps": WHOLE, "ours": NUMBER, "fmpy": NUMBER, "z": NUMBER}
+    workers = {"cases": WHOLE, "candidates": WHOLE, "one": NUMBER, "two": NUMBER}
+    tuning = {
+        "case": TEXT,
+        "evaluations": listed(closed({**evaluation, **ratios})),
+        "workers": closed({**workers, "dask": or_null(NUMBER), **ratios}),
+        "memory": closed(dict.fromkeys(("master", "worker", "total"), WHOLE)),
+    }
+    entries = {
+        "machine": closed({"processor": TEXT, "system": TEXT}),
+        "seed": WHOLE,
+        "calls": by_name(closed({**call, **ratios})),
+        "observers": closed(observers),
+        "tuning": closed(tuning),
+    }
+    return summary("bench", closed({"run": RUN}), entries)

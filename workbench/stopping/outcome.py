@@ -264,8 +264,11 @@ class Distance:
         """The answer in one sentence."""
         low, high = self.ahead.band
         middle = self.ahead.quantile(0.5)
+        speed = next(one for one in stopping_of(self.system).asked if one.name == SPEED)
+        told = [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
+        begins = ", ".join([f"From {_shown(self.stop.asked[SPEED], speed)}", *told])
         return (
-            f"Distance {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
+            f"{begins}: {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
             f"{self.rate(middle):.3f} m/s2 after {self.response:.2f} s."
         )
 

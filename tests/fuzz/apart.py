@@ -1,0 +1,42 @@
+"""Files that are read in a process each, read in one for all: fuzzing waits for no other."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.harness import LONGEST, Hang
+from workbench import foreign
+from workbench.errors import WorkerError
+from workbench.foreign.contents import Contents
+from workbench.pool import Pool
+
+
+@contextmanager
+def one_process() -> Iterator[None]:
+    """Have readers that need a process use the same one."""
+    with Pool(1, _quiet, None, limit=LONGEST) as pool, pytest.MonkeyPatch.context() as patch:
+
+        def apart(module: str, path: Path, raw: bytes) -> Contents:
+            try:
+                return pool.submit(_read, module, path, raw).result()
+            except WorkerError as error:
+                if "took longer" in str(error):
+                    raise Hang from None
+                raise
+
+        patch.setattr(foreign, "_apart", apart)
+        yield
+
+
+@contextmanager
+def _quiet(_: None) -> Iterator[None]:
+    """Say nothing of what libraries leave half made: a process of its own ends before that."""
+    sys.unraisablehook = lambda _: None
+    yield
+
+
+def _read(_: None, module: str, path: Path, raw: bytes) -> Contents:
+    return foreign._here(module, path, raw)
