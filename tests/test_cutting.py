@@ -13,9 +13,9 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.case import Case
 from workbench.errors import InputError
-from workbench.foreign import Channel, Group, Recorded
+from workbench.foreign import FileChannel, Group, RecordedFile
 from workbench.importing.cutting import cut
-from workbench.mapping import Named, merge, propose
+from workbench.mapping import NamedChannel, merge, propose
 from workbench.system import System
 
 RATE = 100.0  # Hz
@@ -23,12 +23,12 @@ RATE = 100.0  # Hz
 
 def group(name: str, time: np.ndarray, start: float = math.nan, **signals: np.ndarray) -> Group:
     units = {"pB": "Pa", "tauR": "N.m", "omegaW": "rad/s", "omegaR": "rad/s", "Fx": "N"}
-    channels = tuple(Channel(key, units[key], values) for key, values in signals.items())
-    return Group(name, channels, time=Channel("time", "s", time, start=start))
+    channels = tuple(FileChannel(key, units[key], values) for key, values in signals.items())
+    return Group(name, channels, time=FileChannel("time", "s", time, start=start))
 
 
-def file(*groups: Group) -> Recorded:
-    return Recorded(Path("recorder.mf4"), "made up", groups, (), "")
+def file(*groups: Group) -> RecordedFile:
+    return RecordedFile(Path("recorder.mf4"), "made up", groups, (), "")
 
 
 def rolling(system: System, time: np.ndarray, speed: np.ndarray) -> dict[str, np.ndarray]:
@@ -150,20 +150,20 @@ def test_a_time_without_a_unit_is_read_as_recordings_are_usually_sampled(
 ) -> None:
     time = np.arange(0.0, 5.0, 0.01)
     plain = group("", time, pB=time, **rolling(system, time, np.full(time.size, 20.0)))
-    channels = (Channel("Zeit", "", time * factor), *plain.channels)
+    channels = (FileChannel("Zeit", "", time * factor), *plain.channels)
     proposal = propose([file(Group("", channels))], system, {})
     (clock,) = proposal.clocks.values()
     assert clock.unit == unit
     assert not proposal.certain  # somebody must look
-    named = propose([file(Group("", channels))], system, {"time": Named("Zeit", "s")})
+    named = propose([file(Group("", channels))], system, {"time": NamedChannel("Zeit", "s")})
     assert_allclose(next(iter(named.clocks.values())).times, time * factor)
 
 
 def test_a_counted_time_goes_before_stamps_that_are_coarser(system: System) -> None:
     time = np.arange(0.0, 5.0, 0.01)
     plain = group("", time, pB=time, **rolling(system, time, np.full(time.size, 20.0)))
-    stamps = Channel("Datum", "s", np.ceil(100 * time) / 100 + 1e-3 * time, stamp=True)
-    channels = (stamps, Channel("Zeit", "s", time), *plain.channels)
+    stamps = FileChannel("Datum", "s", np.ceil(100 * time) / 100 + 1e-3 * time, stamp=True)
+    channels = (stamps, FileChannel("Zeit", "s", time), *plain.channels)
     (clock,) = propose([file(Group("", channels))], system, {}).clocks.values()
     assert clock.channel == "Zeit"
 
@@ -174,7 +174,7 @@ def test_one_channel_of_two_groups_is_not_taken_for_the_other(system: System) ->
     held = file(one, group("run 2", time, pB=2 * time))
     proposal = propose([held], system, {})
     assert proposal.problems == ("pB: it may be 'run 1/pB' or 'run 2/pB'",)
-    named = propose([held], system, {"pB": Named("run 2/pB")})
+    named = propose([held], system, {"pB": NamedChannel("run 2/pB")})
     assert_allclose(named.assigned["pB"].values, 2 * time)
 
 

@@ -19,11 +19,11 @@ from workbench.diagnosis.quadratic import Quadratic, RecordingSystem
 from workbench.diagnosis.rivals import read_rivals
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.experiments import NextStop, Proposal, next_stop
+from workbench.experiments import NextStop, RankedExperiment, next_stop
 from workbench.experiments.candidates import Profile
 from workbench.experiments.separation import precision, refitted, told_apart
 from workbench.system import System
-from workbench.system_experiments import SINE, STAIRCASE, STEP, Varied
+from workbench.system_experiments import SINE, STAIRCASE, STEP, VariedInput
 from workbench.systems import load_system
 
 from .distances import parted
@@ -123,7 +123,7 @@ def test_precision_of_one_unknown_is_its_standard_deviation() -> None:
 
 @pytest.mark.parametrize("kind", [STEP, STAIRCASE, SINE])
 def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
-    varied = Varied("u", 2.0, 5.0, (kind,), 3.0, 4.0, ())
+    varied = VariedInput("u", 2.0, 5.0, (kind,), 3.0, 4.0, ())
     time = np.arange(0.0, 60.0, 0.1)
     levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[kind]
     demand = Profile(varied, kind, levels, 4.0).demand(time)
@@ -135,7 +135,7 @@ def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
 
 
 def test_a_lag_is_of_first_order() -> None:
-    varied = Varied("u", 0.5, 1.0, (STEP,), 1.0, 4.0, (0.7,))
+    varied = VariedInput("u", 0.5, 1.0, (STEP,), 1.0, 4.0, (0.7,))
     time = np.arange(0.0, 6.0, 0.01)
     expected = np.where(time >= 1.0, 1.0 - np.exp(-(time - 1.0) / 0.7), 0.0)
     # The filter is exact at samples, one of which the demand may come earlier.
@@ -206,7 +206,7 @@ def proposed(undecided: Outcome) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
-def made(block: System, one: Proposal) -> list[Case]:
+def made(block: System, one: RankedExperiment) -> list[Case]:
     """A recording of an experiment, by SciPy."""
     power = one.prediction.candidate.profiles[0].demand(one.prediction.case.time)
     return cases(block, [heated(9, power, WARM)])

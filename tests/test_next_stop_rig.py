@@ -9,7 +9,7 @@ import pytest
 import workbench as wb
 from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
-from workbench.experiments import NextStop, Proposal
+from workbench.experiments import NextStop, RankedExperiment
 from workbench.system import System
 from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Conditions, Effects, Scenario, plant
 
@@ -57,7 +57,7 @@ def proposed(undecided: Outcome) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
-def made(one: Proposal, system: System, folder: Path) -> Case:
+def made(one: RankedExperiment, system: System, folder: Path) -> Case:
     """The stop as the rig makes it: pressure is asked for anew every 50 ms."""
     said, (profile,) = one.prediction.case.conditions, one.prediction.candidate.profiles
     time = np.arange(0.0, 60.0, 0.05)

@@ -21,7 +21,7 @@ from workbench.fmu import FMU
 from workbench.power import (
     Diagnosed,
     Journal,
-    Named,
+    NamedCause,
     Planting,
     Repertoire,
     diagnose_sets,
@@ -69,7 +69,7 @@ STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
 
 
 def said(
-    gains: dict[str, float], *causes: Named, kind: Kind = "single", other: str = ""
+    gains: dict[str, float], *causes: NamedCause, kind: Kind = "single", other: str = ""
 ) -> Diagnosed:
     """A verdict on a set: causes, or other words, or nothing."""
     verdict = other or ("found" if causes else "nothing")
@@ -77,8 +77,8 @@ def said(
     return Diagnosed(Planting(kind, 1, 4.0, gains, effects), verdict, causes, None, None, 1.0)
 
 
-def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> Named:
-    return Named(effect, intervals, twins)
+def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> NamedCause:
+    return NamedCause(effect, intervals, twins)
 
 
 @pytest.fixture(scope="module")

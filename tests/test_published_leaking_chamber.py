@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from workbench.api import diagnose
 from workbench.case import read_cases
 from workbench.diagnosis import Outcome
-from workbench.prepare import Recording
+from workbench.prepare import PublishedRecording
 from workbench.published.leaking_chamber import PUBLISHED
 from workbench.systems import load_system
 
@@ -75,7 +75,7 @@ def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path: Path) -> Non
     assert above.columns["time [s]"][0] == 0.0
 
 
-def pressure(one: Recording) -> np.ndarray:
+def pressure(one: PublishedRecording) -> np.ndarray:
     return one.columns["p [bar]"]
 
 

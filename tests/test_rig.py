@@ -21,7 +21,7 @@ from workbench.wheelset.rig import (
     ORDINARY_PADS,
     SCENARIOS,
     STANDARD,
-    Stop,
+    StopTruth,
     check_files,
     sample,
     select,
@@ -39,20 +39,20 @@ ROLLER_RADIUS, BRAKE_RADIUS = 0.70, 0.30  # m, data sheet
 
 
 @cache
-def make(name: str) -> Stop:
+def make(name: str) -> StopTruth:
     return simulate(SCENARIOS[name], SEED, ORDINARY_PADS, REFERENCE)
 
 
-def braking_time(stop: Stop) -> float:
+def braking_time(stop: StopTruth) -> float:
     return stop.standstill - stop.drawn.coasting
 
 
-def normal_force(stop: Stop) -> np.ndarray:
+def normal_force(stop: StopTruth) -> np.ndarray:
     """Of one brake unit [N], data sheet."""
     return 0.1086 * np.maximum(0.0, stop.truth["pads"] - 25e3)
 
 
-def friction_power(stop: Stop, disc: int) -> np.ndarray:
+def friction_power(stop: StopTruth, disc: int) -> np.ndarray:
     """Of one disc [W], from the law of the data sheet."""
     force = stop.truth[f"muDC{disc}"] * normal_force(stop)
     return force * BRAKE_RADIUS * abs(stop.truth["omegaW"])

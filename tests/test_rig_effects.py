@@ -14,7 +14,7 @@ from workbench.wheelset.rig import (
     SCENARIOS,
     Effects,
     Scenario,
-    Stop,
+    StopTruth,
     plant,
     simulate,
     write_recording,
@@ -43,27 +43,27 @@ def scenario(name: str, speed: float, direction: int = 1) -> Scenario:
 @cache
 def make(
     *planted: str, name: str = "03_dry_120_3.6", speed: float = 40.0, direction: int = 1
-) -> Stop:
+) -> StopTruth:
     """A stop of ten seconds on constant pads, unless said otherwise."""
     effects = plant(CONSTANT_PADS, planted)
     return simulate(scenario(name, speed, direction), SEED, effects, REFERENCE)
 
 
-def coasting(stop: Stop) -> np.ndarray:
+def coasting(stop: StopTruth) -> np.ndarray:
     return (stop.time > 0.5) & (stop.time < stop.drawn.coasting)
 
 
-def normal_force(stop: Stop) -> np.ndarray:
+def normal_force(stop: StopTruth) -> np.ndarray:
     """Of one brake unit [N], data sheet."""
     return 0.1086 * np.maximum(0.0, stop.truth["pads"] - 25e3)
 
 
-def friction(stop: Stop, disc: int) -> np.ndarray:
+def friction(stop: StopTruth, disc: int) -> np.ndarray:
     """Pad friction over that of constant pads."""
     return stop.truth[f"muDC{disc}"] / (0.30 * stop.drawn.muDC)
 
 
-def friction_energy(stop: Stop, disc: int) -> np.ndarray:
+def friction_energy(stop: StopTruth, disc: int) -> np.ndarray:
     """Of one disc up to each time [J], from the law of the data sheet."""
     force = stop.truth[f"muDC{disc}"] * normal_force(stop)
     return np.cumsum(force * BRAKE_RADIUS * abs(stop.truth["omegaW"])) * 1e-3

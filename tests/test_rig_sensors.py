@@ -13,7 +13,7 @@ from workbench.systems import load_system
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
-    Stop,
+    StopTruth,
     plant,
     sample,
     simulate,
@@ -27,7 +27,7 @@ CHANNELS = ("pB", "tauR", "omegaW", "omegaR", "Fx")
 
 
 @cache
-def make(speed: float = 40.0, direction: int = 1) -> Stop:
+def make(speed: float = 40.0, direction: int = 1) -> StopTruth:
     """A stop from a speed [km/h] on constant pads, of ten seconds unless said otherwise."""
     usual = SCENARIOS["03_dry_120_3.6"]
     conditions = dataclasses.replace(
@@ -37,12 +37,12 @@ def make(speed: float = 40.0, direction: int = 1) -> Stop:
     return simulate(scenario, SEED, CONSTANT_PADS, REFERENCE)
 
 
-def recorded(stop: Stop) -> np.ndarray:
+def recorded(stop: StopTruth) -> np.ndarray:
     """Times [s] of the samples at 200 Hz."""
     return stop.time[stop.time >= 0.0][::5]
 
 
-def added(planted: str, stop: Stop) -> dict[str, np.ndarray]:
+def added(planted: str, stop: StopTruth) -> dict[str, np.ndarray]:
     """What an effect of the sensors adds to each channel."""
     time = recorded(stop)
     without = sample(stop, CONSTANT_PADS, time)

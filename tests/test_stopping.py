@@ -23,7 +23,7 @@ from workbench.stopping.past import Known
 from workbench.stopping.plain import quantile
 from workbench.stopping.recorded import Stop, asked_stop, recorded
 from workbench.stopping.standard import (
-    Conditions,
+    StopConditions,
     equivalent_rate,
     nominal_rate,
     percentage,
@@ -106,7 +106,7 @@ def test_a_correction_undoes_what_gradient_and_mass_do() -> None:
     def rate(mass: float, resistance: float) -> float:
         return (per_mass * mass + 9.81 * resistance * mass) / (mass + turning)
 
-    made = Conditions(mass=88e3, rotating=turning, resistance=slope)
+    made = StopConditions(mass=88e3, rotating=turning, resistance=slope)
     assert_allclose(nominal_rate(rate(88e3, slope), made, 96e3), rate(96e3, 0.0), rtol=1e-12)
 
 
@@ -170,7 +170,7 @@ def test_corrected_stops_are_those_under_nominal_conditions(
     said = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
     stop, response = asked_stop(said, train, stopping), stopping.response
     rate = equivalent_rate(stop.asked["speed"], response, forecaster.halt(stop, {}).distance)
-    made = Conditions(mass=91e3, rotating=8.0 * 110.0 / 0.46**2, resistance=-0.006)
+    made = StopConditions(mass=91e3, rotating=8.0 * 110.0 / 0.46**2, resistance=-0.006)
     fixed = stopping_distance(120.0 / 3.6, response, nominal_rate(rate, made, 96e3))
     nominal = forecaster.halt(asked_stop({}, train, stopping), {}).distance
     assert_allclose(fixed, nominal, rtol=0.01)

@@ -14,7 +14,7 @@ pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
 from workbench.diagnosis.thresholds import RATE, thresholds
-from workbench.power import Diagnosed, Named, Planting, diagnose_sets, open_virtual_rig
+from workbench.power import Diagnosed, NamedCause, Planting, diagnose_sets, open_virtual_rig
 from workbench.power.diagnosing import build_everything, diagnose_set, library_effects
 from workbench.power.planting import plan_sheet_errors, some
 from workbench.power.run import Setup
@@ -137,7 +137,7 @@ def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name() ->
 
 def said(effect: str, *causes: tuple[str, ...]) -> Diagnosed:
     planting = Planting("sheet", 1, 1.0, {"roller_inertia": 0.015}, (effect,))
-    named = tuple(Named(first, {}, tuple(twins)) for first, *twins in causes)
+    named = tuple(NamedCause(first, {}, tuple(twins)) for first, *twins in causes)
     return Diagnosed(planting, "found" if named else "nothing", named, None, None, 1.0)
 
 

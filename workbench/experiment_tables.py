@@ -10,10 +10,10 @@ from workbench.system_experiments import (
     STAIRCASE,
     STEP,
     Cost,
-    Ending,
+    EndsBelow,
     Experiments,
     Setting,
-    Varied,
+    VariedInput,
 )
 from workbench.system_parts import Condition
 from workbench.system_tables import read_measured
@@ -28,7 +28,7 @@ def read_experiments(table: Table, system: System) -> Experiments:
     table.refuse_unknown("lasts ends conditions start inputs cost sensors")
     inputs, start = table.table("inputs"), table.table("start")
     inputs.refuse_unknown(one.name for one in system.inputs)
-    varied: list[Varied] = []
+    varied: list[VariedInput] = []
     driven: dict[str, Expression] = {}
     for signal in system.inputs:
         own = Table(inputs.take(signal.name, dict), f"{inputs.where} {signal.name}")
@@ -51,7 +51,7 @@ def read_experiments(table: Table, system: System) -> Experiments:
     )
 
 
-def read_varied(table: Table, name: str, unit: str) -> Varied:
+def read_varied(table: Table, name: str, unit: str) -> VariedInput:
     """An input that follows profiles."""
     table.refuse_unknown("range profiles begins every lags")
     low, high = table.numbers("range", unit, 2)
@@ -64,12 +64,12 @@ def read_varied(table: Table, name: str, unit: str) -> Varied:
     if every <= 0.0:
         raise table.wrong("every", "a time above 0")
     lags = table.numbers("lags", "s", len(table.take("lags", list))) if "lags" in table else ()
-    return Varied(name, low, high, profiles, table.number("begins", "s", 0.0), every, lags)
+    return VariedInput(name, low, high, profiles, table.number("begins", "s", 0.0), every, lags)
 
 
-def _ending(table: Table) -> Ending:
+def _ending(table: Table) -> EndsBelow:
     table.refuse_unknown("is below")
-    return Ending(
+    return EndsBelow(
         Expression(table.take("is", str), f"{table.where} is"), table.number("below", "1")
     )
 

@@ -30,7 +30,7 @@ _CASE = "case.toml"
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class PublishedRecording:
     """One recording of a published set, or a piece of one.
 
     Attributes
@@ -62,7 +62,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Layout:
+class FolderLayout:
     """A way in which the set lies in a folder.
 
     Attributes
@@ -77,9 +77,9 @@ class Layout:
 
     name: str
     files: Mapping[str, str]
-    read: Callable[[Path], Sequence[Recording]]
+    read: Callable[[Path], Sequence[PublishedRecording]]
     pattern: str = ""
-    one: Callable[[Path], Recording] | None = None
+    one: Callable[[Path], PublishedRecording] | None = None
 
     def found(self, source: Path) -> dict[str, str]:
         """SHA-256 of the files of the layout that are in a folder, by their path there."""
@@ -108,7 +108,7 @@ class Published:
     source: str
     licence: str
     recordings: str
-    layouts: tuple[Layout, ...]
+    layouts: tuple[FolderLayout, ...]
 
     def __str__(self) -> str:
         parts = [f"{self.title}\n\n{self.recordings}\n", f"source:  {self.source}"]
@@ -153,7 +153,7 @@ def _known(companion: str) -> Published | None:
     return found if isinstance(found, Published) else None
 
 
-def write_cases(which: str, source: Path, out: Path) -> list[Recording]:
+def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]:
     """Write case folders of a published set, and what was done as `prepared.json`.
 
     Parameters
@@ -226,7 +226,7 @@ def read_recorded(folder: Path, system: System) -> Case:
     return replace(case, source=folder.parent / one.file)
 
 
-def _described(one: Recording) -> dict[str, Any]:
+def _described(one: PublishedRecording) -> dict[str, Any]:
     time = next(iter(one.columns.values()))
     return {
         "file": one.file,
@@ -250,7 +250,7 @@ def _refuse_other_files(out: Path) -> None:
         )
 
 
-def _layout(known: Published, source: Path) -> Layout:
+def _layout(known: Published, source: Path) -> FolderLayout:
     """The layout in which the set lies in a folder, of files with the right checksums."""
     for layout in known.layouts:
         if layout.found(source):
@@ -307,7 +307,7 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
                 path.parent.rmdir()
 
 
-def _texts(one: Recording) -> dict[str, str]:
+def _texts(one: PublishedRecording) -> dict[str, str]:
     """Files of a case folder, by name."""
     measurement = {"file": "measured.csv"}
     if one.counts_from is not None:

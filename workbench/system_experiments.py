@@ -10,7 +10,7 @@ STEP, STAIRCASE, SINE = "step", "staircase", "sine"
 
 
 @dataclass(frozen=True)
-class Varied:
+class VariedInput:
     """An input that follows a profile.
 
     Attributes
@@ -40,7 +40,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Ending:
+class EndsBelow:
     """A recording ends where the absolute value of a formula is below a level, SI."""
 
     formula: Expression
@@ -77,10 +77,10 @@ class Experiments:
     """
 
     lasts: float
-    ends: Ending | None
+    ends: EndsBelow | None
     settings: Mapping[str, tuple[Setting, ...]]
     start: Mapping[str, Expression]
-    varied: tuple[Varied, ...]
+    varied: tuple[VariedInput, ...]
     driven: Mapping[str, Expression]
     cost: Cost
     sensors: tuple[Signal, ...]

@@ -19,7 +19,7 @@ from workbench import resources
 from workbench.case import Case, read_case, read_file
 from workbench.description import Description, read_description
 from workbench.fmu import FMU
-from workbench.mapping import Named, Told
+from workbench.mapping import NamedChannel, Told
 from workbench.modelica import check, read_library
 from workbench.observers.gains import Gains
 from workbench.observers.gains_file import read_gains
@@ -92,7 +92,7 @@ def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
         named = _CHANNELS_OF_MATLAB if name.endswith(".mat") else _CHANNELS
         told = Told(
             conditions={"wheel_rail": "dry", "discs": ["dry"] * 3},
-            columns={signal: Named(channel) for signal, channel in named.items()},
+            columns={signal: NamedChannel(channel) for signal, channel in named.items()},
             step=0.2 if name == "indices.csv" else None,
         )
         yield Target(

@@ -35,7 +35,7 @@ end Small;
 
 
 @dataclass(frozen=True)
-class Finding:
+class Inspection:
     """One thing that was looked at.
 
     Attributes
@@ -62,13 +62,13 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     return Done({"findings": [asdict(one) for one in findings]}, status=1 if wrong else 0)
 
 
-def _findings() -> Iterator[Finding]:
+def _findings() -> Iterator[Inspection]:
     where = "a wheel" if CHECKOUT is None else f"the checkout {CHECKOUT}"
-    yield Finding("workbench", "ok", f"{version('wheelset-workbench')} from {where}")
-    yield Finding("Python", "ok", f"{platform.python_version()}, {sys.executable}")
-    yield Finding("machine", "ok", f"{platform.platform()}, {os.cpu_count()} processors")
+    yield Inspection("workbench", "ok", f"{version('wheelset-workbench')} from {where}")
+    yield Inspection("Python", "ok", f"{platform.python_version()}, {sys.executable}")
+    yield Inspection("machine", "ok", f"{platform.platform()}, {os.cpu_count()} processors")
     core = missing_packages("")
-    yield Finding(
+    yield Inspection(
         "core packages",
         "wrong" if core else "ok",
         f"without {', '.join(core)}" if core else "complete",
@@ -76,7 +76,7 @@ def _findings() -> Iterator[Finding]:
     )
     for extra, purpose in PURPOSES.items():
         lacking = missing_packages(extra)
-        yield Finding(
+        yield Inspection(
             f"extra [{extra}]",
             "missing" if lacking else "ok",
             f"for {purpose}" + (f"; without {', '.join(lacking)}" if lacking else ""),
@@ -89,7 +89,7 @@ def _findings() -> Iterator[Finding]:
     yield _kept()
 
 
-def _manifest(manifest: Mapping[str, Any]) -> Iterator[Finding]:
+def _manifest(manifest: Mapping[str, Any]) -> Iterator[Inspection]:
     """Whether the FMUs are those that were built."""
     for name, one in manifest["fmus"].items():
         path = fmus() / name
@@ -99,7 +99,9 @@ def _manifest(manifest: Mapping[str, Any]) -> Iterator[Finding]:
         elif hashlib.sha256(path.read_bytes()).hexdigest() != one["sha256"]:
             found = f"its SHA-256 is not that of {nearby(fmus() / 'manifest.json')}"
         sound = found.startswith("as")
-        yield Finding(f"fmus/{name}", "ok" if sound else "wrong", found, "" if sound else _anew())
+        yield Inspection(
+            f"fmus/{name}", "ok" if sound else "wrong", found, "" if sound else _anew()
+        )
 
 
 def _anew() -> str:
@@ -107,17 +109,17 @@ def _anew() -> str:
     return "install the wheel again" if CHECKOUT is None else "make fmus"
 
 
-def _sources() -> Finding:
+def _sources() -> Inspection:
     """Whether the Modelica sources are those that the FMUs were built from."""
     from workbench.compiler import source_hash  # an extra
 
     manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
     same = manifest["source_sha256"] == source_hash(*built_models())
     found = "those that the FMUs were built from" if same else "not those of the FMUs"
-    return Finding("Modelica sources", "ok" if same else "wrong", found, "" if same else _anew())
+    return Inspection("Modelica sources", "ok" if same else "wrong", found, "" if same else _anew())
 
 
-def _compiled() -> Finding:
+def _compiled() -> Inspection:
     """Whether a model can be compiled here, and runs."""
     from workbench.compiler import build, native  # an extra
 
@@ -130,18 +132,18 @@ def _compiled() -> Finding:
                 found = f"compiled and ran a model with the state {', '.join(fmu.states)}"
         except (InputError, FMUError, OSError) as error:
             remedy = f"{installing('compiler')}, in an environment of its own"
-            return Finding("compiler", "wrong", str(error), remedy)
-    return Finding("compiler", "ok", found)
+            return Inspection("compiler", "wrong", str(error), remedy)
+    return Inspection("compiler", "ok", found)
 
 
-def _kept() -> Finding:
+def _kept() -> Inspection:
     """Whether what is compiled can be kept between runs; without that, commands begin slowly."""
     folder = cache_folder()
     try:
         prove_writable(folder / "doctor")
     except InputError as error:
         remedy = "set XDG_CACHE_HOME to a folder that can be written"
-        return Finding("cache", "wrong", f"{folder}: {error.found}", remedy)
+        return Inspection("cache", "wrong", f"{folder}: {error.found}", remedy)
     files = [path for path in folder.rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files) / 1e6
-    return Finding("cache", "ok", f"{folder}: {len(files)} files, {size:.0f} MB; may be deleted")
+    return Inspection("cache", "ok", f"{folder}: {len(files)} files, {size:.0f} MB; may be deleted")

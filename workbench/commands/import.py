@@ -15,7 +15,7 @@ from workbench.commands.output import Done, Output
 from workbench.conditions import UNKNOWN
 from workbench.errors import InputError
 from workbench.files import claimed
-from workbench.foreign import Recorded, read_foreign
+from workbench.foreign import RecordedFile, read_foreign
 from workbench.importing import (
     IMPORTED,
     Import,
@@ -30,7 +30,7 @@ from workbench.importing import (
 from workbench.importing.figure import draw_cuts
 from workbench.mapping import (
     TIME,
-    Proposal,
+    ProposedMapping,
     Told,
     listed,
     parse_named,
@@ -101,8 +101,8 @@ def _free_name(path: Path, others: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _confirmed(
-    files: Sequence[Recorded], known: Told, system: System, yes: bool, output: Output
-) -> tuple[Proposal, dict[str, Any]]:
+    files: Sequence[RecordedFile], known: Told, system: System, yes: bool, output: Output
+) -> tuple[ProposedMapping, dict[str, Any]]:
     """Channels and conditions, after one question at most.
 
     Raises
@@ -134,7 +134,7 @@ def _confirmed(
     return _complete(files, proposal, []), conditions
 
 
-def _answers(files: Sequence[Recorded], proposal: Proposal) -> list[str]:
+def _answers(files: Sequence[RecordedFile], proposal: ProposedMapping) -> list[str]:
     """What the user answers to a proposal: nothing, or corrections."""
     taken = "name what is missing" if proposal.problems else "Enter takes this"
     print(f"{taken}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
@@ -153,7 +153,9 @@ def _answers(files: Sequence[Recorded], proposal: Proposal) -> list[str]:
     return [part.strip() for part in answer.split(";") if part.strip()]
 
 
-def _complete(files: Sequence[Recorded], proposal: Proposal, doubts: Sequence[str]) -> Proposal:
+def _complete(
+    files: Sequence[RecordedFile], proposal: ProposedMapping, doubts: Sequence[str]
+) -> ProposedMapping:
     """The proposal, if all that is needed has a channel.
 
     Raises
@@ -172,7 +174,7 @@ def _complete(files: Sequence[Recorded], proposal: Proposal, doubts: Sequence[st
     return proposal
 
 
-def _shown(files: Sequence[Recorded], proposal: Proposal, system: System) -> str:
+def _shown(files: Sequence[RecordedFile], proposal: ProposedMapping, system: System) -> str:
     """What a file is and what its channels are taken for, a line each."""
     lines = [f"{one.path}: {one.kind}" for one in files]
     for clock in proposal.clocks.values():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from workbench import shelf
 from workbench.compiler.archive import PLATFORMS, RUNTIME, digest, digest_file, native
-from workbench.compiler.assembly import BuiltFMU, Law, assemble
+from workbench.compiler.assembly import BuiltFMU, SteppingLaw, assemble
 from workbench.compiler.explicit import make_explicit
 from workbench.compiler.flat import flatten
 from workbench.description import read_description
@@ -22,7 +22,7 @@ from workbench.modelica import files, packages
 __all__ = [
     "PLATFORMS",
     "BuiltFMU",
-    "Law",
+    "SteppingLaw",
     "assemble",
     "build",
     "build_all",

@@ -37,7 +37,7 @@ class BuiltFMU:
 
 
 @dataclass(frozen=True)
-class Law:
+class SteppingLaw:
     """What steps a model in place of the integrator.
 
     Attributes
@@ -60,7 +60,7 @@ def assemble(
     fmu: Path,
     fmi: int,
     platforms: Sequence[str],
-    law: Law | None = None,
+    law: SteppingLaw | None = None,
     report: Callable[[str], None] = lambda platform: None,
 ) -> BuiltFMU:
     """Write an FMU.
@@ -85,9 +85,7 @@ def assemble(
     parts += law.tables.values() if law else []
     parts += [file.read_bytes() for file in sorted(RUNTIME.glob("*.[ch]"))]
     parts += [file.read_bytes() for file in law.sources.values()] if law else []
-    digits = digest([*parts, str(fmi)])
-    groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])
-    token = "{" + "-".join(groups) + "}"
+    token = _token(digest([*parts, str(fmi)]))
     code = generate(space, token)
     name, files = identifier(model), library_sources(fmi)
     tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
@@ -115,6 +113,12 @@ def assemble(
             (sources / "buildDescription.xml").write_text(_build_description(name, files))
         pack(folder, fmu)
     return BuiltFMU(fmu, model, fmi, token, digest_file(fmu))
+
+
+def _token(digits: str) -> str:
+    """As a GUID, which FMI 2 asks for."""
+    groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])
+    return "{" + "-".join(groups) + "}"
 
 
 def _build_description(name: str, files: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ named arrays, constants with all their digits. `runtime/model.h` documents the i
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -119,24 +119,26 @@ def generate(model: StateSpace, token: str, prefix: str = "model") -> GeneratedC
         "NNZ_XU": jacobian_xu.nnz(),
         "NNZ_P": jacobian_p.nnz(),
     }
-    header = "\n".join(
-        [
-            f"/* Sizes of the model {model.name}. */",
-            f"#define MODEL_IDENTIFIER {_text(identifier(model.name))}",
-            f"#define MODEL_TOKEN {_text(token)}",
-            *(f"#define {name} {size}" for name, size in sizes.items()),
-            "",
-        ]
-    )
     opening = (
         f'/* Equations of the model {model.name}. */\n#include "{prefix}.h"\n#include <math.h>\n'
     )
     return GeneratedCode(
-        header=header,
+        header=_header(model.name, token, sizes),
         source="\n".join([opening, *tables, "", *functions]),
         jacobian_xu=jacobian_xu.sparsity(),
         jacobian_p=jacobian_p.sparsity(),
     )
+
+
+def _header(model: str, token: str, sizes: Mapping[str, int]) -> str:
+    lines = [
+        f"/* Sizes of the model {model}. */",
+        f"#define MODEL_IDENTIFIER {_text(identifier(model))}",
+        f"#define MODEL_TOKEN {_text(token)}",
+        *(f"#define {name} {size}" for name, size in sizes.items()),
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def identifier(model: str) -> str:

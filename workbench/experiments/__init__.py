@@ -15,8 +15,8 @@ from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
-from workbench.experiments.candidates import Candidate, candidates
-from workbench.experiments.outcome import NextStop, Proposal, chosen
+from workbench.experiments.candidates import Experiment, candidates
+from workbench.experiments.outcome import NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import Prediction, predicted_cases, predictions
 from workbench.expression import Expression
 from workbench.modelica import read_library
@@ -24,7 +24,7 @@ from workbench.system import OBSERVER, Channel, System
 from workbench.system_experiments import Experiments
 from workbench.system_parts import Signal
 
-__all__ = ["NextStop", "Proposal", "next_stop"]
+__all__ = ["NextStop", "RankedExperiment", "next_stop"]
 
 _SENSED = 3  # experiments that are tried with further sensors
 
@@ -105,7 +105,7 @@ class _Rig:
         self._everything, self._experiments = everything, experiments
         self._rivals, self._effects, self._workers = rivals, effects, workers
 
-    def cases(self, system: System, plan: Sequence[Candidate]) -> list[tuple[Candidate, Case]]:
+    def cases(self, system: System, plan: Sequence[Experiment]) -> list[tuple[Experiment, Case]]:
         """Recordings that would count."""
         found = predicted_cases(
             *(self._everything, system, self._experiments, self._rivals, self._effects),
@@ -121,7 +121,7 @@ class _Rig:
         return found
 
     def predictions(
-        self, system: System, planned: Sequence[tuple[Candidate, Case]]
+        self, system: System, planned: Sequence[tuple[Experiment, Case]]
     ) -> list[Prediction]:
         """What they would tell."""
         return predictions(
@@ -143,7 +143,7 @@ def _with_sensor(system: System, sensor: Signal) -> System:
     return replace(system, judged=(*system.judged, sensor), comparison=compared)
 
 
-def _proposal(system: System, experiments: Experiments, one: Prediction) -> Proposal:
+def _proposal(system: System, experiments: Experiments, one: Prediction) -> RankedExperiment:
     duration = float(one.case.time[-1] - one.case.time[0])
     cost = float(experiments.cost.formula({**one.candidate.numbers, "duration": duration}))
-    return Proposal(one.candidate.text(system), cost, experiments.cost.unit, one)
+    return RankedExperiment(one.candidate.text(system), cost, experiments.cost.unit, one)

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from workbench.fmu import Vector
 from workbench.system import System
-from workbench.system_experiments import SINE, STAIRCASE, STEP, Experiments, Setting, Varied
+from workbench.system_experiments import SINE, STAIRCASE, STEP, Experiments, Setting, VariedInput
 from workbench.units import si_factor
 
 _STAIRS = 3  # from the least to the largest demand
@@ -25,7 +25,7 @@ class Profile:
     every : [s] that a stair lasts, and the period of a sine.
     """
 
-    input: Varied
+    input: VariedInput
     kind: str
     levels: tuple[float, ...]
     every: float
@@ -62,7 +62,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Experiment:
     """One recording that could be made.
 
     Attributes
@@ -89,19 +89,19 @@ class Candidate:
         return "; ".join([*said, *(one.text(system) for one in self.profiles)])
 
 
-def candidates(experiments: Experiments) -> list[Candidate]:
+def candidates(experiments: Experiments) -> list[Experiment]:
     """All that are tried: every setting of the conditions with every profile of each input."""
     names = list(experiments.settings)
     chosen = list(product(*experiments.settings.values()))
     profiles = list(product(*(_profiles(one) for one in experiments.varied)))
     return [
-        Candidate(dict(zip(names, settings, strict=True)), followed)
+        Experiment(dict(zip(names, settings, strict=True)), followed)
         for settings in chosen
         for followed in profiles
     ]
 
 
-def _profiles(one: Varied) -> list[Profile]:
+def _profiles(one: VariedInput) -> list[Profile]:
     """Steps to the ends of the range and between them; stairs begun at either end; sines."""
     low, high = one.low, one.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()

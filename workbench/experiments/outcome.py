@@ -19,7 +19,7 @@ _PROPOSED = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class RankedExperiment:
     """One experiment.
 
     Attributes
@@ -72,11 +72,11 @@ class NextStop:
     system: System
     rivals: Rivals
     channels: tuple[Channel, ...]
-    tried: tuple[Proposal, ...]
-    sensors: dict[str, Proposal]
+    tried: tuple[RankedExperiment, ...]
+    sensors: dict[str, RankedExperiment]
 
     @property
-    def proposals(self) -> tuple[Proposal, ...]:
+    def proposals(self) -> tuple[RankedExperiment, ...]:
         """The best ones."""
         return self.tried[:_PROPOSED]
 
@@ -162,7 +162,7 @@ def _ratio(found: Prediction) -> float:
     return found.precision[0] / found.precision[1]
 
 
-def _told(one: Proposal) -> str:
+def _told(one: RankedExperiment) -> str:
     found = one.prediction
     cost = f"cost {one.cost:.3g} {one.unit}"
     if len(found.apart) == 1:

@@ -29,7 +29,7 @@ from workbench.diagnosis.rivals import Rival, Rivals
 from workbench.diagnosis.thresholds import SOUND, Thresholds
 from workbench.diagnosis.unknowns import ALL
 from workbench.errors import InputError
-from workbench.experiments.candidates import Candidate
+from workbench.experiments.candidates import Experiment
 from workbench.experiments.recorded import recorded, start_of
 from workbench.experiments.separation import precision, refitted, told_apart
 from workbench.fmu import CoSimulation, Matrix, Vector
@@ -56,7 +56,7 @@ class Prediction:
         its noise.
     """
 
-    candidate: Candidate
+    candidate: Experiment
     case: Case
     apart: Matrix
     chance: Matrix
@@ -111,9 +111,9 @@ def predicted_cases(
     experiments: Experiments,
     rivals: Rivals,
     effects: Mapping[str, Effect],
-    plan: Sequence[Candidate],
+    plan: Sequence[Experiment],
     workers: int,
-) -> list[tuple[Candidate, Case]]:
+) -> list[tuple[Experiment, Case]]:
     """Recordings of all experiments as the first rival predicts them; of those that count."""
     added = {one.name for one in experiments.sensors}
     judged = tuple(one.name for one in system.judged if one.name in {*rivals.signals, *added})
@@ -140,7 +140,7 @@ def _counts(case: Case, system: System) -> bool:
 
 
 def _values(
-    system: System, rivals: Rivals, effects: Mapping[str, Effect], candidate: Candidate
+    system: System, rivals: Rivals, effects: Mapping[str, Effect], candidate: Experiment
 ) -> dict[str, float]:
     """Parameters of the first rival in an experiment."""
     first, values = rivals.models[0], dict(rivals.given)
@@ -159,7 +159,7 @@ def _values(
     return values
 
 
-def _choices(system: System, level: str, candidate: Candidate) -> set[str]:
+def _choices(system: System, level: str, candidate: Experiment) -> set[str]:
     """What the level of a parameter may be called in an experiment."""
     by = system.comparison.levels[level].by
     if not by:
@@ -177,7 +177,7 @@ def predictions(
     experiments: Experiments,
     rivals: Rivals,
     effects: Mapping[str, Effect],
-    planned: Sequence[tuple[Candidate, Case]],
+    planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
     """What each experiment would tell, in their order."""
@@ -273,7 +273,7 @@ def _prediction(
     rivals: Rivals,
     rows: Sequence[_Row],
     k: int,
-    candidate: Candidate,
+    candidate: Experiment,
 ) -> Prediction:
     count_, first = len(rows), rows[0]
     apart, chance = np.zeros((count_, count_)), np.ones((count_, count_))

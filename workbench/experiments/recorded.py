@@ -9,7 +9,7 @@ import numpy as np
 from workbench.case import Case, read_only
 from workbench.conditions import Value
 from workbench.errors import InputError
-from workbench.experiments.candidates import Candidate
+from workbench.experiments.candidates import Experiment
 from workbench.fmu import CoSimulation, Matrix, Vector
 from workbench.system import Condition, System
 from workbench.system_experiments import Experiments
@@ -20,7 +20,7 @@ def recorded(
     model: CoSimulation,
     system: System,
     experiments: Experiments,
-    candidate: Candidate,
+    candidate: Experiment,
     values: Mapping[str, float],
     name: str,
     judged: tuple[str, ...],
@@ -64,7 +64,7 @@ def recorded(
     )
 
 
-def start_of(system: System, experiments: Experiments, candidate: Candidate) -> dict[str, float]:
+def start_of(system: System, experiments: Experiments, candidate: Experiment) -> dict[str, float]:
     """States at the start of an experiment, SI."""
     known = {**system.values, **candidate.numbers}
     return {state: float(formula(known)) for state, formula in experiments.start.items()}
@@ -74,7 +74,7 @@ def _driven(
     model: CoSimulation,
     system: System,
     experiments: Experiments,
-    candidate: Candidate,
+    candidate: Experiment,
     values: Mapping[str, float],
     judged: tuple[str, ...],
     time: Vector,
@@ -123,7 +123,7 @@ def _driven(
 
 
 def _conditions(
-    system: System, candidate: Candidate, clean: Mapping[str, Vector]
+    system: System, candidate: Experiment, clean: Mapping[str, Vector]
 ) -> dict[str, Value]:
     """Conditions as they are set; others as the recording says, or the usual ones."""
     found: dict[str, Value] = {}

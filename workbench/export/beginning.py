@@ -23,7 +23,7 @@ _LARGEST = float(np.finfo(float).max) / 1e9  # sums of it are finite
 _TRIALS = (1.0, -1.0, 10.0)  # samples at which what was found is tried, in sizes of signals
 
 
-class Model(NamedTuple):
+class ModelView(NamedTuple):
     """What a law sees of its model, see `Instance`, and where the model stands.
 
     Attributes
@@ -45,12 +45,12 @@ class Model(NamedTuple):
 class Remembered(NamedTuple):
     """All that a law remembers; `memory` is of the estimator's own kind."""
 
-    model: tuple[Model, ...]
+    model: tuple[ModelView, ...]
     memory: Any
 
 
 @dataclass(frozen=True)
-class Said:
+class FirstValue:
     """A number that the first sample says: constant + slopes @ [u, y].
 
     Attributes
@@ -89,7 +89,7 @@ def usual_sample(estimator: Estimator) -> Vector:
     return np.array([defaults.get(one.name, 0.0) for one in (*system.inputs, *system.outputs)])
 
 
-def said_by_first(estimator: Estimator) -> list[Said]:
+def said_by_first(estimator: Estimator) -> list[FirstValue]:
     """What the first sample says, of all that is remembered.
 
     Raises
@@ -120,7 +120,7 @@ def said_by_first(estimator: Estimator) -> list[Said]:
                 remedy="let the law make it of the first sample, where h is 0",
             )
     return [
-        Said(places[k], _constant(begin[k], slopes[k], usual, sizes), slopes[k])
+        FirstValue(places[k], _constant(begin[k], slopes[k], usual, sizes), slopes[k])
         for k in np.flatnonzero(slopes.any(axis=1))
     ]
 
@@ -138,10 +138,10 @@ def _constant(value: float, slopes: Vector, usual: Vector, sizes: Vector) -> flo
     return 0.0 if abs(constant) < rounding else constant
 
 
-def _model(instance: Instance, fmu: FMU, number: int) -> Model:
+def _model(instance: Instance, fmu: FMU, number: int) -> ModelView:
     at_u = np.array([fmu.defaults.get(name, 0.0) for name in fmu.inputs])
     buffers = instance.x, instance.dx, instance.u, instance.y, instance.jacobian
-    return Model(*buffers, number=number, at_x=fmu.get_states(), at_u=at_u)
+    return ModelView(*buffers, number=number, at_x=fmu.get_states(), at_u=at_u)
 
 
 def _refuse_shared(estimator: Estimator) -> None:

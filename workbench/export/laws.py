@@ -13,7 +13,7 @@ from pathlib import Path
 import casadi as ca
 
 from workbench import kernel
-from workbench.compiler import PLATFORMS, BuiltFMU, Law, assemble
+from workbench.compiler import PLATFORMS, BuiltFMU, SteppingLaw, assemble
 from workbench.compiler.explicit import StateSpace
 from workbench.compiler.flat import FlatVariable
 from workbench.export.beginning import remembered, said_by_first, usual_sample
@@ -77,7 +77,7 @@ def build_law(
     """
     estimator = law.estimator
     plant = plant_of(estimator)
-    stepped = Law(
+    stepped = SteppingLaw(
         sources=_SOURCES,
         tables={**plant_code(plant, estimator), **_law_code(estimator)},
         described=lambda description: sampled(description, estimator.system.sample_time),

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from workbench.compiler import PLATFORMS, BuiltFMU, Law, assemble
+from workbench.compiler import PLATFORMS, BuiltFMU, SteppingLaw, assemble
 from workbench.compiler.explicit import StateSpace, make_explicit
 from workbench.compiler.flat import flatten
 from workbench.errors import InputError, closest
@@ -70,7 +70,7 @@ def build_observer(
         If the sources have errors.
     """
     space = _with_gains(make_explicit(flatten(observer.system.library, observer.model)), observer)
-    law = Law(
+    law = SteppingLaw(
         sources={"integrator.c": _LAW},
         tables={"sampled_data.h": _tables(space, observer)},
         described=lambda text: co_simulated(text, space.experiment["Interval"]),

@@ -16,13 +16,13 @@ from importlib import import_module
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.foreign.contents import Channel, Contents, Group, Recorded
+from workbench.foreign.contents import Contents, FileChannel, Group, RecordedFile
 from workbench.foreign.text import read as read_as_text
 from workbench.pool import Pool
 from workbench.recording import read_bytes
 from workbench.resources import installing
 
-__all__ = ["Channel", "Group", "Recorded", "is_foreign", "read_foreign"]
+__all__ = ["FileChannel", "Group", "RecordedFile", "is_foreign", "read_foreign"]
 
 _Reader = Callable[[Path, bytes], Contents]
 _OF_THE_FILE = (UserWarning, RuntimeWarning)
@@ -56,7 +56,7 @@ def is_foreign(path: Path) -> bool:
     return path.suffix.lower() != ".csv"
 
 
-def read_foreign(path: Path) -> Recorded:
+def read_foreign(path: Path) -> RecordedFile:
     """Read a file of a recorder.
 
     Raises
@@ -84,7 +84,9 @@ def read_foreign(path: Path) -> Recorded:
             expected="a recording",
             remedy="export it again, with its samples",
         )
-    return Recorded(path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256, doubts)
+    return RecordedFile(
+        path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256, doubts
+    )
 
 
 def _unpacked(path: Path, raw: bytes) -> bytes:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.foreign.contents import Channel, Group
+from workbench.foreign.contents import FileChannel, Group
 from workbench.foreign.spelling import named, spelled
 
 _UNIT = re.compile(r"(?P<of>.*?)[_.]?(units?|einheit)", re.IGNORECASE)
@@ -37,7 +37,7 @@ def read_groups(content: Mapping[str, Any]) -> tuple[list[Group], list[str]]:
 
 def _collect(path: str, content: Mapping[str, Any], groups: list[Group], notes: list[str]) -> None:
     units = _units(content)
-    by_size: dict[int, list[Channel]] = {}
+    by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
         name, unit = named(key)
         unit = unit or units.get(key, "")
@@ -106,18 +106,18 @@ def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
     channel = _single(name, content)
     if channel is None:
         return None
-    clock = Channel("time", "s", _flat(times))
+    clock = FileChannel("time", "s", _flat(times))
     return Group(name, (channel,), time=clock)
 
 
-def _single(name: str, content: Mapping[str, Any]) -> Channel | None:
+def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     """A structure with values of one channel, and its unit."""
     values = _entry(content, _VALUES)
     if not isinstance(values, np.ndarray) or values.size != max(values.shape, default=0):
         return None
     unit = _entry(content, ("unit", "units", "einheit"))
     about = _entry(content, _TEXTS)
-    return Channel(
+    return FileChannel(
         name,
         spelled(unit) if isinstance(unit, str) else "",
         _flat(values),
@@ -125,7 +125,9 @@ def _single(name: str, content: Mapping[str, Any]) -> Channel | None:
     )
 
 
-def _columns(name: str, unit: str, value: np.ndarray, content: Mapping[str, Any]) -> list[Channel]:
+def _columns(
+    name: str, unit: str, value: np.ndarray, content: Mapping[str, Any]
+) -> list[FileChannel]:
     """Channels of an array: one of a vector, one of each column of a table.
 
     A table's columns are named by a list of as many texts beside it, if there is one.
@@ -133,7 +135,7 @@ def _columns(name: str, unit: str, value: np.ndarray, content: Mapping[str, Any]
     if value.dtype.kind not in "fiub" or value.ndim > 2:
         return []
     if value.ndim < 2 or 1 in value.shape:
-        return [Channel(name, unit, _flat(value))]
+        return [FileChannel(name, unit, _flat(value))]
     table = value if value.shape[0] >= value.shape[1] else value.T
     width = table.shape[1]
     lists = {key: held for key, held in content.items() if isinstance(held, list)}
@@ -143,7 +145,7 @@ def _columns(name: str, unit: str, value: np.ndarray, content: Mapping[str, Any]
     own = names[0] if len(names) == 1 else [f"{name}({i + 1})" for i in range(width)]
     labels = [named(one) for one in own]
     return [
-        Channel(label, stated or spelled(units[i]), _flat(table[:, i]))
+        FileChannel(label, stated or spelled(units[i]), _flat(table[:, i]))
         for i, (label, stated) in enumerate(labels)
     ]
 

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.foreign.contents import Channel, Group
+from workbench.foreign.contents import FileChannel, Group
 from workbench.foreign.spelling import is_unit, named, spelled
 from workbench.foreign.stamps import has_day, has_day_alone, is_stamp, read_stamps
 from workbench.recording import Vector
@@ -52,7 +52,7 @@ _STEP = re.compile(
 
 
 @dataclass(frozen=True)
-class Table:
+class Cells:
     """Rows of cells, and where the samples among them begin.
 
     Attributes
@@ -70,7 +70,7 @@ class Table:
     units: tuple[str, ...]
 
 
-def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> Table:
+def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> Cells:
     """Find samples and header among rows of any width.
 
     Parameters
@@ -97,7 +97,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     names, units, used = _header(rows[:first], width)
     head = tuple(" ".join(filter(None, row)) for row in rows[: first - used])
     kept = [i for i in samples if i >= first]
-    return Table(
+    return Cells(
         [list(rows[i][:width]) for i in kept], [lines[i] for i in kept], head, names, units
     )
 
@@ -150,7 +150,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def read_group(
-    table: Table, name: str, where: str, *, commas: bool = True
+    table: Cells, name: str, where: str, *, commas: bool = True
 ) -> tuple[Group, str, list[str]]:
     """Channels of a table, how its numbers are written, and notes on what was left out.
 
@@ -164,7 +164,7 @@ def read_group(
         If numbers can be read in two ways.
     """
     columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
-    stamps: list[Channel] = []
+    stamps: list[FileChannel] = []
     numbers: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
@@ -181,7 +181,7 @@ def read_group(
         elif any(cells):
             notes.append(f"'{labels[i][0]}' holds texts")
     reading = _reading(list(numbers.values()), where, commas=commas)
-    channels: list[Channel] = []
+    channels: list[FileChannel] = []
     for i, cells in numbers.items():
         values = _values(cells, reading)
         gaps = np.flatnonzero(np.isnan(values)).tolist()
@@ -191,7 +191,7 @@ def read_group(
                 f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
-        channels.append(Channel(*labels[i], values))
+        channels.append(FileChannel(*labels[i], values))
     return Group(name, (*stamps, *channels), step=_stated_step(table.head)), reading, notes
 
 
@@ -210,7 +210,7 @@ def _joined(
     return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]
 
 
-def _label(table: Table, i: int) -> tuple[str, str]:
+def _label(table: Cells, i: int) -> tuple[str, str]:
     """Name and unit of a column."""
     name, unit = named(table.names[i])
     return name or f"column {i + 1}", unit or table.units[i]

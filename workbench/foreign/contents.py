@@ -9,7 +9,7 @@ from workbench.recording import Vector
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class FileChannel:
     """One channel of a file.
 
     Attributes
@@ -44,8 +44,8 @@ class Group:
     """
 
     name: str
-    channels: tuple[Channel, ...]
-    time: Channel | None = None
+    channels: tuple[FileChannel, ...]
+    time: FileChannel | None = None
     step: float = math.nan
 
     def renamed(self, name: str) -> "Group":
@@ -54,7 +54,7 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RecordedFile:
     """A file as it was read.
 
     Attributes
@@ -74,7 +74,7 @@ class Recorded:
 
 
 class Contents(NamedTuple):
-    """What the reader of a format finds in a file; see `Recorded`."""
+    """What the reader of a format finds in a file; see `RecordedFile`."""
 
     kind: str
     groups: list[Group]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from asammdf import MDF
 
-from workbench.foreign.contents import Channel, Contents, Group
+from workbench.foreign.contents import Contents, FileChannel, Group
 from workbench.foreign.spelling import named, spelled
 
 _TIME = 1  # what a group counts its samples by: 0 nothing said, 1 time, 2 angle, 3 way, 4 index
@@ -51,8 +51,8 @@ def _heard(doubts: dict[str, None]) -> Iterator[None]:
 def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> Group | None:
     """Channels of one group with its times, or None without any."""
     master = file.masters_db.get(index)
-    clock: Channel | None = None
-    channels: list[Channel] = []
+    clock: FileChannel | None = None
+    channels: list[FileChannel] = []
     for number, one in enumerate(held.channels):
         if number == master:
             continue
@@ -64,8 +64,10 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
         values = np.asarray(signal.samples, dtype=np.float64)
         if signal.invalidation_bits is not None:
             values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
-        channels.append(Channel(name, unit or spelled(signal.unit), values, signal.comment or ""))
-        clock = Channel("time", "s", np.asarray(signal.timestamps, np.float64), start=start)
+        channels.append(
+            FileChannel(name, unit or spelled(signal.unit), values, signal.comment or "")
+        )
+        clock = FileChannel("time", "s", np.asarray(signal.timestamps, np.float64), start=start)
     if not channels or channels[0].values.size < 2:
         return None
     # Some are sampled over an angle or a way.

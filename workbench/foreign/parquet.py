@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from workbench.foreign.contents import Channel, Contents, Group
+from workbench.foreign.contents import Contents, FileChannel, Group
 from workbench.foreign.spelling import named, spelled
 from workbench.foreign.stamps import is_stamp, read_stamps
 
@@ -19,7 +19,7 @@ _ABOUT = (b"description", b"comment", b"long_name")
 def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a Parquet file."""
     table = pq.read_table(io.BytesIO(raw))
-    channels: list[Channel] = []
+    channels: list[FileChannel] = []
     notes: list[str] = []
     for field, column in zip(table.schema, table.columns, strict=True):
         name, unit = named(field.name)
@@ -32,11 +32,11 @@ def read(path: Path, raw: bytes) -> Contents:
         elif pa.types.is_duration(kind):
             steps = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
             values = _numbers(column.cast(pa.int64())) * steps
-            channels.append(Channel(name, "s", values, about, stamp=True))
+            channels.append(FileChannel(name, "s", values, about, stamp=True))
         elif pa.types.is_floating(kind) or pa.types.is_integer(kind):
-            channels.append(Channel(name, unit, _numbers(column), about))
+            channels.append(FileChannel(name, unit, _numbers(column), about))
         elif pa.types.is_decimal(kind) or pa.types.is_boolean(kind):
-            channels.append(Channel(name, unit, _numbers(column.cast(pa.float64())), about))
+            channels.append(FileChannel(name, unit, _numbers(column.cast(pa.float64())), about))
         else:
             texts = [str(value) if value is not None else "" for value in column.to_pylist()]
             found = read_stamps(name, texts) if any(map(is_stamp, texts[:100])) else None
@@ -56,12 +56,12 @@ def _numbers(column: pa.ChunkedArray) -> np.ndarray:
     return np.asarray(values, dtype=np.float64)
 
 
-def _stamps(name: str, column: pa.ChunkedArray) -> Channel:
+def _stamps(name: str, column: pa.ChunkedArray) -> FileChannel:
     """Time stamps, without what a float of seconds since 1970 would round."""
     units = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}[column.type.unit]
     counts = column.cast(pa.int64())
     first = next((value for value in counts.to_pylist() if value is not None), None)
     if first is None:
-        return Channel(name, "s", np.full(len(column), math.nan), stamp=True)
+        return FileChannel(name, "s", np.full(len(column), math.nan), stamp=True)
     since = pa.compute.subtract(counts, first)
-    return Channel(name, "s", _numbers(since) / units, start=first / units, stamp=True)
+    return FileChannel(name, "s", _numbers(since) / units, start=first / units, stamp=True)

@@ -7,7 +7,7 @@ from datetime import UTC, date, datetime, timedelta
 
 import numpy as np
 
-from workbench.foreign.contents import Channel
+from workbench.foreign.contents import FileChannel
 from workbench.recording import Vector
 
 _CLOCK = (
@@ -30,7 +30,7 @@ def is_stamp(cell: str) -> bool:
     return any(pattern.fullmatch(text) for pattern in (_DAY, _OF_DAY, _OF_HOUR))
 
 
-def read_stamps(name: str, cells: Sequence[str]) -> Channel | None:
+def read_stamps(name: str, cells: Sequence[str]) -> FileChannel | None:
     """Times of a column, (n,) s from its first one; NaN where a cell is none.
 
     Days that could be read in two ways are refused (None) where a column has several of them. Times
@@ -50,7 +50,7 @@ def read_stamps(name: str, cells: Sequence[str]) -> Channel | None:
     # A step back by more than half a period is the next day, or the next hour.
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
-    return Channel(name, "s", _from_first(times, known), stamp=True)
+    return FileChannel(name, "s", _from_first(times, known), stamp=True)
 
 
 def has_day(cells: Sequence[str]) -> bool:
@@ -68,7 +68,7 @@ def _first_day(cells: Sequence[str]) -> re.Match[str] | None:
     return next((match for cell in cells if (match := _DAY.fullmatch(cell.strip()))), None)
 
 
-def _dated(name: str, texts: Sequence[str]) -> Channel | None:
+def _dated(name: str, texts: Sequence[str]) -> FileChannel | None:
     matches = [_DAY.fullmatch(text) for text in texts]
     order = _day_first(matches)
     if order is None:
@@ -83,7 +83,7 @@ def _dated(name: str, texts: Sequence[str]) -> Channel | None:
     times = (whole - begin) + fractions
     surely = matches[int(known.argmax())]["mark"] != "/"  # type: ignore[index]
     start = begin + float(fractions[known][0]) if surely else math.nan
-    return Channel(name, "s", _from_first(times, known), start=start, stamp=True)
+    return FileChannel(name, "s", _from_first(times, known), start=start, stamp=True)
 
 
 def _day_first(matches: Sequence[re.Match[str] | None]) -> bool | None:

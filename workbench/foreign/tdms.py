@@ -10,7 +10,7 @@ import numpy as np
 from nptdms import TdmsFile
 from nptdms.log import log_manager
 
-from workbench.foreign.contents import Channel, Contents, Group
+from workbench.foreign.contents import Contents, FileChannel, Group
 from workbench.foreign.spelling import named, spelled
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
@@ -41,7 +41,7 @@ def _heard(doubts: list[str]) -> Iterator[None]:
 
 def _groups(held: Any, notes: list[str]) -> list[Group]:
     """A group of the file; channels with other times or lengths are groups of their own."""
-    found: dict[tuple[int, float, float, float], list[Channel]] = {}
+    found: dict[tuple[int, float, float, float], list[FileChannel]] = {}
     for one in held.channels():
         name, unit = named(one.name)
         stated: Mapping[str, Any] = one.properties
@@ -55,7 +55,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
             channel = _stamps(name, values)
         elif values.dtype.kind in "fiub":
             about = str(stated.get("description", ""))
-            channel = Channel(name, unit, np.asarray(values, dtype=np.float64), about)
+            channel = FileChannel(name, unit, np.asarray(values, dtype=np.float64), about)
         else:
             notes.append(f"'{name}' holds texts")
             continue
@@ -68,7 +68,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         clock = None
         if step > 0.0:
             times = offset + step * np.arange(size, dtype=np.float64)
-            clock = Channel("time", "s", times, start=start if start >= 0.0 else np.nan)
+            clock = FileChannel("time", "s", times, start=start if start >= 0.0 else np.nan)
         groups.append(Group(held.name, tuple(channels), time=clock))
     return groups
 
@@ -79,9 +79,11 @@ def _since_1970(moment: Any) -> float:
     return seconds if seconds > 0.0 else np.nan  # TDMS writes 1904 where it knows none
 
 
-def _stamps(name: str, values: Any) -> Channel:
+def _stamps(name: str, values: Any) -> FileChannel:
     """Time stamps, without what a float of seconds since 1970 would round."""
     known = ~np.isnat(values)
     first = values[known][0] if known.any() else np.datetime64(0, "us")
     times = (values - first) / np.timedelta64(1, "s")
-    return Channel(name, "s", np.where(known, times, np.nan), start=_since_1970(first), stamp=True)
+    return FileChannel(
+        name, "s", np.where(known, times, np.nan), start=_since_1970(first), stamp=True
+    )

@@ -17,10 +17,10 @@ from workbench.case import check_recording
 from workbench.conditions import UNKNOWN, conditions_shown, read_conditions
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
-from workbench.foreign import Recorded
+from workbench.foreign import RecordedFile
 from workbench.foreign.stamps import iso
 from workbench.importing.cutting import Cut, cut
-from workbench.mapping import COLUMNS, Measured, Named, Proposal, merge
+from workbench.mapping import COLUMNS, Measured, NamedChannel, ProposedMapping, merge
 from workbench.plausibility import Origin, doubts
 from workbench.provenance import commit
 from workbench.recording import Vector
@@ -79,8 +79,8 @@ class Import:
     pieces : those that become cases.
     """
 
-    files: tuple[Recorded, ...]
-    proposal: Proposal
+    files: tuple[RecordedFile, ...]
+    proposal: ProposedMapping
     measured: Measured
     parts: tuple[Cut, ...]
     pieces: tuple[Piece, ...] = field(default_factory=tuple)
@@ -88,8 +88,8 @@ class Import:
 
 def import_files(
     name: str,
-    files: Sequence[Recorded],
-    proposal: Proposal,
+    files: Sequence[RecordedFile],
+    proposal: ProposedMapping,
     system: System,
     conditions: Mapping[str, Any],
     *,
@@ -167,7 +167,7 @@ def _piece(
     return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
 
 
-def store(out: Path, named: Mapping[str, Named]) -> None:
+def store(out: Path, named: Mapping[str, NamedChannel]) -> None:
     """Keep confirmed channels for all files of a folder; those of earlier files stay.
 
     Raises

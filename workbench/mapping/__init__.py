@@ -1,8 +1,8 @@
 """Channels of a recorder become signals of a system: proposed, named by the user, merged."""
 
 from workbench.mapping.merge import Measured, merge
-from workbench.mapping.names import TIME, Named, listed, parse_named, read_named
-from workbench.mapping.proposal import Proposal, propose
+from workbench.mapping.names import TIME, NamedChannel, listed, parse_named, read_named
+from workbench.mapping.proposal import ProposedMapping, propose
 from workbench.mapping.reading import (
     COLUMNS,
     Told,
@@ -16,8 +16,8 @@ __all__ = [
     "COLUMNS",
     "TIME",
     "Measured",
-    "Named",
-    "Proposal",
+    "NamedChannel",
+    "ProposedMapping",
     "Told",
     "has_own_names",
     "listed",

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.foreign import Channel, Group
+from workbench.foreign import FileChannel, Group
 from workbench.foreign.spelling import conversion
-from workbench.mapping.names import TIME, Named, is_time, listed
+from workbench.mapping.names import TIME, NamedChannel, is_time, listed
 from workbench.recording import Vector
 from workbench.system import System
 
@@ -40,7 +40,7 @@ class Clock:
 
 
 def read_clock(
-    group: Group, named: Named | None, step: float | None, system: System, where: str
+    group: Group, named: NamedChannel | None, step: float | None, system: System, where: str
 ) -> Clock:
     """Times of a group's samples.
 
@@ -83,7 +83,7 @@ def read_clock(
     )
 
 
-def _named(channel: Channel, named: Named, system: System, where: str) -> Clock:
+def _named(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
     unit = named.unit or channel.unit or _unstated(channel.values, system)
     found = conversion(unit, "s") if unit else None
     if found is None:
@@ -97,7 +97,7 @@ def _named(channel: Channel, named: Named, system: System, where: str) -> Clock:
     return Clock(channel.name, times, channel.start, unit, "named", True)
 
 
-def _candidate(channel: Channel, group: Group, system: System) -> Clock | None:
+def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | None:
     """A channel that may be the time, by its name, its unit and its place."""
     if channel.stamp:
         return Clock(channel.name, channel.values, channel.start, "s", "time stamps", True)

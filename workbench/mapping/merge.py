@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.foreign import Recorded
-from workbench.mapping.proposal import Assigned, Proposal
+from workbench.foreign import RecordedFile
+from workbench.mapping.proposal import Assigned, ProposedMapping
 from workbench.recording import Vector
 from workbench.system import System
 from workbench.system_parts import Signal
@@ -47,7 +47,7 @@ class _Track:
     missing: int
 
 
-def merge(files: Sequence[Recorded], proposal: Proposal, system: System) -> Measured:
+def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: System) -> Measured:
     """Bring the channels of a proposal to common times.
 
     The times are those of the slowest output, where all have samples. Other signals are
@@ -102,7 +102,9 @@ def merge(files: Sequence[Recorded], proposal: Proposal, system: System) -> Meas
     return Measured(time[known], signals, zero, tuple(notes), doubts)
 
 
-def _starts(files: Sequence[Recorded], proposal: Proposal) -> dict[tuple[int, int], float]:
+def _starts(
+    files: Sequence[RecordedFile], proposal: ProposedMapping
+) -> dict[tuple[int, int], float]:
     """What is added to the times of each group, so that they count from one zero [s].
 
     Raises
@@ -126,7 +128,7 @@ def _starts(files: Sequence[Recorded], proposal: Proposal) -> dict[tuple[int, in
     return {key: clock.start - first for key, clock in clocks.items()}
 
 
-def _track(signal: Signal, one: Assigned, proposal: Proposal, start: float) -> _Track:
+def _track(signal: Signal, one: Assigned, proposal: ProposedMapping, start: float) -> _Track:
     times = proposal.clocks[one.file, one.group].times + start
     values = one.values
     held = np.isfinite(times) & np.isfinite(values)

@@ -26,7 +26,7 @@ EXACT, WORDS, WITHIN = 4, 3, 2  # how alike names are
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedChannel:
     """A channel that a user names.
 
     Attributes
@@ -49,7 +49,7 @@ class Named:
         }
 
 
-def read_named(table: Table, system: System) -> dict[str, Named]:
+def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
     """Channels by signal, as a table of TOML has them: a name, or a table.
 
     Raises
@@ -58,21 +58,21 @@ def read_named(table: Table, system: System) -> dict[str, Named]:
         If a signal is none of the system, or an entry is unknown.
     """
     table.refuse_unknown((TIME, *system.signals))
-    found: dict[str, Named] = {}
+    found: dict[str, NamedChannel] = {}
     for signal, entry in table.content.items():
         if isinstance(entry, str):
-            found[signal] = Named(table.take(signal, str))
+            found[signal] = NamedChannel(table.take(signal, str))
             continue
         table.take(signal, dict)
         own = table.table(signal)
         own.refuse_unknown("channel unit reversed")
         unit = spelled(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
-        found[signal] = Named(own.take("channel", str), unit, other)
+        found[signal] = NamedChannel(own.take("channel", str), unit, other)
     return found
 
 
-def parse_named(text: str, where: str, system: System) -> tuple[str, Named]:
+def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChannel]:
     """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
 
     Raises
@@ -90,7 +90,7 @@ def parse_named(text: str, where: str, system: System) -> tuple[str, Named]:
             remedy="write for instance 'time=Zeit [ms]'; a minus before the channel reverses it",
         )
     name, unit = named(channel.removeprefix("-").strip())
-    return signal, Named(name, unit, channel.startswith("-"))
+    return signal, NamedChannel(name, unit, channel.startswith("-"))
 
 
 def words(name: str) -> tuple[str, ...]:
@@ -131,7 +131,7 @@ def alike(channel: str, about: str, signal: Signal) -> int:
     return best
 
 
-def refuse_shared(names: Mapping[str, Named], where: str) -> None:
+def refuse_shared(names: Mapping[str, NamedChannel], where: str) -> None:
     """Refuse one channel for two signals.
 
     Raises

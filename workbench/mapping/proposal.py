@@ -7,10 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.errors import InputError, closest
-from workbench.foreign import Channel, Group, Recorded
+from workbench.foreign import FileChannel, Group, RecordedFile
 from workbench.foreign.spelling import Conversion, conversion, spelled
 from workbench.mapping.clock import Clock, read_clock
-from workbench.mapping.names import EXACT, TIME, WITHIN, WORDS, Named, alike, is_asked, listed
+from workbench.mapping.names import (
+    EXACT,
+    TIME,
+    WITHIN,
+    WORDS,
+    NamedChannel,
+    alike,
+    is_asked,
+    listed,
+)
 from workbench.recording import Vector
 from workbench.system import System
 from workbench.system_parts import Signal
@@ -51,7 +60,7 @@ class Assigned:
 
     file: int
     group: int
-    channel: Channel
+    channel: FileChannel
     label: str
     unit: str
     factor: float
@@ -71,14 +80,14 @@ class Assigned:
             return self.factor * self.channel.values + self.zero
 
     @property
-    def named(self) -> Named:
+    def named(self) -> NamedChannel:
         """As it is stored; what the file says of the unit is left to it."""
         unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
-        return Named(self.label, unit, self.factor < 0.0)
+        return NamedChannel(self.label, unit, self.factor < 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class ProposedMapping:
     """Which channels of some files are which signals of a system.
 
     Attributes
@@ -101,12 +110,14 @@ class Proposal:
         return not self.problems and own and all(one.certain for one in self.clocks.values())
 
     @property
-    def named(self) -> dict[str, Named]:
+    def named(self) -> dict[str, NamedChannel]:
         """As it is stored."""
         found = {name: one.named for name, one in self.assigned.items()}
         for clock in self.clocks.values():
             if clock.channel:
-                found.setdefault(TIME, Named(clock.channel, "" if clock.certain else clock.unit))
+                found.setdefault(
+                    TIME, NamedChannel(clock.channel, "" if clock.certain else clock.unit)
+                )
         return found
 
 
@@ -115,16 +126,16 @@ class _Place:
     file: int
     group: int
     holder: Group
-    channel: Channel
+    channel: FileChannel
     label: str
 
 
 def propose(
-    files: Sequence[Recorded],
+    files: Sequence[RecordedFile],
     system: System,
-    given: Mapping[str, Named],
+    given: Mapping[str, NamedChannel],
     step: float | None = None,
-) -> Proposal:
+) -> ProposedMapping:
     """Propose a channel for each signal.
 
     Parameters
@@ -174,10 +185,10 @@ def propose(
     timed = {clock.channel for clock in clocks.values()}
     left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
     shown = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in left)
-    return Proposal(assigned, clocks, shown, problems)
+    return ProposedMapping(assigned, clocks, shown, problems)
 
 
-def _places(files: Sequence[Recorded]) -> list[_Place]:
+def _places(files: Sequence[RecordedFile]) -> list[_Place]:
     """All channels, each with a name that no other has, if groups have names."""
     found = [
         (i, j, group, channel)
@@ -192,7 +203,7 @@ def _places(files: Sequence[Recorded]) -> list[_Place]:
     ]
 
 
-def _find(one: Named, signal: str, places: Sequence[_Place], where: str) -> _Place:
+def _find(one: NamedChannel, signal: str, places: Sequence[_Place], where: str) -> _Place:
     """The place that a user names."""
     name = one.channel
     found = [place for place in places if place.channel.name == name]
@@ -213,7 +224,7 @@ def _find(one: Named, signal: str, places: Sequence[_Place], where: str) -> _Pla
 
 
 def _as_named(
-    one: Named, signal: Signal, places: Sequence[_Place], system: System, where: str
+    one: NamedChannel, signal: Signal, places: Sequence[_Place], system: System, where: str
 ) -> Assigned:
     """The channel that a user names for a signal."""
     place = _find(one, signal.name, places, where)
@@ -261,7 +272,7 @@ def _way(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | 
     return Conversion(found.factor / slope, found.zero / slope), other.formula.text
 
 
-def _fitting(channel: Channel, signal: Signal, system: System) -> list[str]:
+def _fitting(channel: FileChannel, signal: Signal, system: System) -> list[str]:
     """Usual units in which values without a unit have the signal's typical size."""
     others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
     units = dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others))

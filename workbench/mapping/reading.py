@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.foreign import Recorded, read_foreign
+from workbench.foreign import RecordedFile, read_foreign
 from workbench.mapping.merge import Measured, merge
-from workbench.mapping.names import TIME, Named, read_named
-from workbench.mapping.proposal import Proposal, propose
+from workbench.mapping.names import TIME, NamedChannel, read_named
+from workbench.mapping.proposal import ProposedMapping, propose
 from workbench.recording import header
 from workbench.system import System
 from workbench.tables import read_table
@@ -30,11 +30,11 @@ class Told:
     """
 
     conditions: Mapping[str, Any] = field(default_factory=dict)
-    columns: Mapping[str, Named] = field(default_factory=dict)
+    columns: Mapping[str, NamedChannel] = field(default_factory=dict)
     step: float | None = None
 
 
-def stored_columns(folder: Path, system: System) -> dict[str, Named]:
+def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
     """Channels by signal that were confirmed for a folder; empty where none were.
 
     Raises
@@ -50,7 +50,9 @@ def stored_columns(folder: Path, system: System) -> dict[str, Named]:
     return read_named(table.table("columns"), system)
 
 
-def usable(stored: Mapping[str, Named], files: Sequence[Recorded]) -> dict[str, Named]:
+def usable(
+    stored: Mapping[str, NamedChannel], files: Sequence[RecordedFile]
+) -> dict[str, NamedChannel]:
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
     for group in (group for one in files for group in one.groups):
@@ -75,7 +77,9 @@ def has_own_names(path: Path, system: System) -> bool:
     return {TIME, *(one.name for one in (*system.inputs, *system.outputs))} <= names
 
 
-def read_measured(path: Path, system: System, told: Told, stored: Mapping[str, Named]) -> Measured:
+def read_measured(
+    path: Path, system: System, told: Told, stored: Mapping[str, NamedChannel]
+) -> Measured:
     """Read a file whose channels were confirmed, or are named as the signals are.
 
     Parameters
@@ -95,7 +99,7 @@ def read_measured(path: Path, system: System, told: Told, stored: Mapping[str, N
     return merge([recorded], proposal, system)
 
 
-def _unsure(path: Path, proposal: Proposal) -> InputError:
+def _unsure(path: Path, proposal: ProposedMapping) -> InputError:
     proposed = [
         f"{name} = {one.channel.name} [{one.unit}]"
         for name, one in proposal.assigned.items()

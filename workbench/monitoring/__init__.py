@@ -13,17 +13,17 @@ from typing import Any
 
 from workbench.case import Case, read_case
 from workbench.errors import InputError
-from workbench.monitoring.chart import Change
-from workbench.monitoring.estimate import Appraiser, Estimate, appraising, watched
+from workbench.monitoring.chart import LevelChange
+from workbench.monitoring.estimate import Appraiser, RecordingEstimate, appraising, watched
 from workbench.monitoring.folder import Delivery, deliveries
 from workbench.monitoring.outcome import Monitored, concluded
-from workbench.monitoring.state import State, Told, opened
+from workbench.monitoring.state import Delivered, State, opened
 from workbench.monitoring.watch import Track
 from workbench.pool import Pool
 from workbench.system import OBSERVER, System
 from workbench.systems import open_model
 
-__all__ = ["RATE", "Change", "Estimate", "Monitored", "Track", "monitor", "watched"]
+__all__ = ["RATE", "LevelChange", "Monitored", "RecordingEstimate", "Track", "monitor", "watched"]
 
 RATE = 0.01
 """Alarms per recording of a sound machine, all quantities together: one in a hundred stops."""
@@ -105,7 +105,7 @@ def _estimate(
     return False
 
 
-def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Told:
+def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Delivered:
     """What comes of one delivery, in a worker."""
     date, estimate, refusal = "", None, ""
     try:
@@ -115,4 +115,4 @@ def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Told:
         refusal = str(error)
     except Exception as error:  # one recording must not cost the others; it is listed
         refusal = f"{delivery.path}: found what no reader expects ({error!r})"
-    return Told(delivery.name, delivery.content, date, estimate, refusal)
+    return Delivered(delivery.name, delivery.content, date, estimate, refusal)

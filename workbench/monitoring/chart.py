@@ -118,7 +118,7 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Change:
+class LevelChange:
     """A change of level.
 
     Attributes
@@ -164,7 +164,7 @@ class Chart:
     kept: list[float] = field(default_factory=list)
     up: float = 0.0
     down: float = 0.0
-    changes: list[Change] = field(default_factory=list)
+    changes: list[LevelChange] = field(default_factory=list)
 
     @property
     def level(self) -> tuple[float, float]:
@@ -226,7 +226,7 @@ class Chart:
         """Whether a sum exceeds the threshold."""
         return max(self.up, self.down) > level
 
-    def part(self) -> Change:
+    def part(self) -> LevelChange:
         """Part the past where its level most likely changed; what follows is the past from now on.
 
         By the ratio of likelihoods: D. V. Hinkley (1970), Biometrika 57, 1-17.
@@ -243,7 +243,9 @@ class Chart:
         self.numbers, self.values = self.numbers[first:], self.values[first:]
         self.variances, self.up, self.down = self.variances[first:], 0.0, 0.0
         self.kept = self._settled(before.level[0])
-        change = Change(raised, last, earliest, latest, self._returned(), before.level, self.level)
+        change = LevelChange(
+            raised, last, earliest, latest, self._returned(), before.level, self.level
+        )
         self.changes.append(change)
         return change
 

@@ -21,7 +21,7 @@ from workbench.systems import open_model
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class RecordingEstimate:
     """What one recording says.
 
     Attributes
@@ -77,7 +77,7 @@ class Appraiser:
         self._model = model
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
 
-    def __call__(self, case: Case) -> Estimate:
+    def __call__(self, case: Case) -> RecordingEstimate:
         """Estimate from one recording.
 
         Raises
@@ -102,7 +102,7 @@ class Appraiser:
         estimated = [one.name for one in self._constant.estimated]
         own = [estimated.index(one.name) for one in watched(self._constant)]
         values = {name: float(run.signal(name)[-1]) for name in estimated}
-        return Estimate(
+        return RecordingEstimate(
             values=np.array([values[estimated[column]] for column in own]),
             covariance=estimator.covariance[np.ix_(own, own)],
             work=self._work(clean, values),

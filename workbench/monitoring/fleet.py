@@ -104,7 +104,7 @@ class Watched:
     files: dict[str, bytes] = field(default_factory=dict)
 
 
-class Workers(Protocol):
+class FleetWorkers(Protocol):
     """A pool of this machine, or of a cluster."""
 
     def submit(
@@ -144,7 +144,7 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> Watched:
 
 
 def watch_fleet(
-    fleet: Fleet, out: Path, pool: Workers, step: Callable[[int, int, str], None]
+    fleet: Fleet, out: Path, pool: FleetWorkers, step: Callable[[int, int, str], None]
 ) -> tuple[list[Watched], bool]:
     """Watch all machines, each into a folder of its own.
 

@@ -11,9 +11,9 @@ import pandas as pd
 
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
-from workbench.monitoring.chart import Change
+from workbench.monitoring.chart import LevelChange
 from workbench.monitoring.estimate import watched
-from workbench.monitoring.state import Told
+from workbench.monitoring.state import Delivered
 from workbench.monitoring.watch import Track, watch
 from workbench.system import System
 
@@ -54,7 +54,7 @@ class Monitored:
     interrupted: bool
 
     @property
-    def changes(self) -> list[tuple[Track, Change]]:
+    def changes(self) -> list[tuple[Track, LevelChange]]:
         """All that were told, in their order."""
         found = [(track, change) for track in self.tracks for change in track.changes]
         return sorted(found, key=lambda one: one[1].raised)
@@ -117,7 +117,7 @@ class Monitored:
         rows = [self._alarm(track, change) for track, change in self.changes]
         return pd.DataFrame(rows, columns=columns.split())
 
-    def _alarm(self, track: Track, change: Change) -> dict[str, Any]:
+    def _alarm(self, track: Track, change: LevelChange) -> dict[str, Any]:
         size, known = change.size
         nominal = abs(self.system.values.get(track.name, 0.0))
         return {
@@ -209,7 +209,7 @@ class Monitored:
 
 
 def concluded(
-    system: System, told: Sequence[Told], rate: float, folder: Path, *, interrupted: bool
+    system: System, told: Sequence[Delivered], rate: float, folder: Path, *, interrupted: bool
 ) -> Monitored:
     """Watch all recordings that are known, in the order of their dates.
 

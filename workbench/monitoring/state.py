@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.monitoring.estimate import Estimate
+from workbench.monitoring.estimate import RecordingEstimate
 from workbench.monitoring.folder import Delivery
 
 _TABLES = """
@@ -28,13 +28,13 @@ CREATE TABLE IF NOT EXISTS deliveries (
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Delivered:
     """What came of one delivery: an estimate, or why there is none."""
 
     name: str
     content: str
     date: str
-    estimate: Estimate | None
+    estimate: RecordingEstimate | None
     refusal: str
 
 
@@ -50,7 +50,7 @@ class State:
         known = set(rows)
         return [one for one in found if (one.name, one.content) not in known]
 
-    def add(self, told: Told) -> None:
+    def add(self, told: Delivered) -> None:
         """Keep what came of a delivery; it is on the disk when this returns."""
         estimate = None if told.estimate is None else json.dumps(_plain(told.estimate))
         with self._connection:
@@ -60,13 +60,13 @@ class State:
                 (told.name, told.content, told.date, estimate, told.refusal),
             )
 
-    def all(self) -> list[Told]:
+    def all(self) -> list[Delivered]:
         """All deliveries, as they came."""
         rows = self._connection.execute(
             "SELECT name, content, date, estimate, refusal FROM deliveries ORDER BY number"
         )
         return [
-            Told(name, content, date, _estimate(text) if text else None, refusal)
+            Delivered(name, content, date, _estimate(text) if text else None, refusal)
             for name, content, date, text, refusal in rows
         ]
 
@@ -110,7 +110,7 @@ def opened(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
         ) from None
 
 
-def _plain(estimate: Estimate) -> dict[str, Any]:
+def _plain(estimate: RecordingEstimate) -> dict[str, Any]:
     return {
         "values": estimate.values.tolist(),
         "covariance": estimate.covariance.tolist(),
@@ -119,10 +119,10 @@ def _plain(estimate: Estimate) -> dict[str, Any]:
     }
 
 
-def _estimate(text: str) -> Estimate:
+def _estimate(text: str) -> RecordingEstimate:
     content = json.loads(text)
     q = len(content["values"])
-    return Estimate(
+    return RecordingEstimate(
         np.array(content["values"]),
         np.reshape(content["covariance"], (q, q)),
         np.array(content["work"]),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.fmu import Matrix, Vector
-from workbench.monitoring.chart import LARGEST, Change, Chart, Scatter, threshold
+from workbench.monitoring.chart import LARGEST, Chart, LevelChange, Scatter, threshold
 from workbench.monitoring.estimate import reach
 from workbench.system import Estimated
 
@@ -46,7 +46,7 @@ class Track:
     values: Vector
     deviations: Vector
     surprises: Vector
-    changes: tuple[Change, ...]
+    changes: tuple[LevelChange, ...]
     level: tuple[float, float]
     trend: tuple[float, float]
     scatter: float

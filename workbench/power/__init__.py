@@ -3,7 +3,7 @@
 plan -> sets of recordings by the virtual rig -> verdicts -> statistics
 """
 
-from workbench.power.journal import Diagnosed, Journal, Named
+from workbench.power.journal import Diagnosed, Journal, NamedCause
 from workbench.power.planting import Findable, Plantable, Planting, Repertoire, plan
 from workbench.power.run import diagnose_sets
 from workbench.power.statistics import CLEAR, VISIBLE, share, summarise
@@ -20,7 +20,7 @@ __all__ = [
     "Diagnosed",
     "Findable",
     "Journal",
-    "Named",
+    "NamedCause",
     "Plantable",
     "Planting",
     "RecordedSets",

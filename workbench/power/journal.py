@@ -13,7 +13,7 @@ from workbench.recording import read_text
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedCause:
     """A cause that was named.
 
     Attributes
@@ -48,7 +48,7 @@ class Diagnosed:
 
     planting: Planting
     verdict: str
-    causes: tuple[Named, ...]
+    causes: tuple[NamedCause, ...]
     before: float | None
     after: float | None
     seconds: float
@@ -66,7 +66,7 @@ def diagnosed(
 ) -> Diagnosed:
     """Keep what statistics need of a diagnosis."""
     causes = tuple(
-        Named(
+        NamedCause(
             cause.effect.name,
             {
                 name: (float(one.value), float(one.low), float(one.high))
@@ -169,7 +169,7 @@ class Journal:
 
 def _result(content: dict[str, Any]) -> Diagnosed:
     causes = tuple(
-        Named(
+        NamedCause(
             one["effect"],
             {name: tuple(values) for name, values in one["parameters"].items()},
             tuple(one["confusable_with"]),

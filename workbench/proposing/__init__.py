@@ -27,10 +27,10 @@ from workbench.diagnosis.selection import search
 from workbench.diagnosis.thresholds import thresholds
 from workbench.files import write_whole
 from workbench.modelica import Library
-from workbench.proposing.forms import Candidate, candidates
-from workbench.proposing.free import Estimate, estimated
+from workbench.proposing.forms import WrittenForm, candidates
+from workbench.proposing.free import FittedLaw, estimated
 from workbench.proposing.outcome import Proposal, description_length
-from workbench.proposing.scan import Prospect, Scan
+from workbench.proposing.scan import LawProspect, Scan
 from workbench.proposing.writing import PACKAGE, extended_library, package
 from workbench.system import OBSERVER, System
 
@@ -100,9 +100,9 @@ def propose(
     return proposal
 
 
-def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
+def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     """The best law of each place and of what it depends on, however it is carried."""
-    best: dict[tuple[str, ...], Prospect] = {}
+    best: dict[tuple[str, ...], LawProspect] = {}
     for one in prospects:
         influence = one.law.influence
         if one.smoothness.evidence <= 0.0:
@@ -110,14 +110,14 @@ def _likeliest(prospects: Sequence[Prospect]) -> list[Prospect]:
         factors = () if influence is None else tuple(part.name for part in influence.factors)
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
         best.setdefault((one.law.place.name, kind, *factors), one)
-    of_place: dict[str, list[Prospect]] = {}
+    of_place: dict[str, list[LawProspect]] = {}
     for one in best.values():
         of_place.setdefault(one.law.place.name, []).append(one)
     kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
     return sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
 
 
-def _forms(estimate: Estimate) -> list[Candidate]:
+def _forms(estimate: FittedLaw) -> list[WrittenForm]:
     """Closed forms of a law."""
     prospect = estimate.prospect
     # Of an output that is nominally zero, what it seems to be.
@@ -129,10 +129,10 @@ def _surviving(
     system: System,
     library: Library,
     cases: Sequence[Case],
-    forms: Mapping[str, Candidate],
+    forms: Mapping[str, WrittenForm],
     workers: int,
     report: Reporter,
-) -> dict[str, Candidate]:
+) -> dict[str, WrittenForm]:
     """The closed form with the shortest description, first, and those that are as good.
 
     They are found as causes are, by what they predict of recordings that they were not fitted to.
@@ -159,7 +159,7 @@ def _surviving(
 
 
 def _as_effects(
-    library: Library, base: str, forms: Mapping[str, Candidate], folder: Path
+    library: Library, base: str, forms: Mapping[str, WrittenForm], folder: Path
 ) -> tuple[Library, list[Effect]]:
     """A library with closed forms, and these: the likelier law and the simpler form first."""
     extended = extended_library(library, [one.written for one in forms.values()], folder)
@@ -173,7 +173,7 @@ def _diagnosed(
     cases: Sequence[Case],
     library: Library,
     effects: Sequence[Effect],
-    forms: Mapping[str, Candidate],
+    forms: Mapping[str, WrittenForm],
     out: Path,
     workers: int,
     report: Reporter,

@@ -77,7 +77,7 @@ CONSTANT = Form("Constant", "always alike", "1.0")
 
 
 @dataclass(frozen=True)
-class Candidate:
+class WrittenForm:
     """A closed form of a law."""
 
     law: Law
@@ -90,7 +90,7 @@ class Candidate:
         return f"{self.law.text}: {self.form.text}"
 
 
-def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[Candidate]:
+def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenForm]:
     """Closed forms of a law.
 
     Parameters
@@ -99,13 +99,13 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[Candidat
     scale : of the output, where the law is added to it.
     """
     if knots is None or law.influence is None:
-        yield Candidate(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
+        yield WrittenForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
     signed = (SIDES,) if knots.low < 0.0 < knots.high else ()
     for form in (*FORMS, *signed):
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
-            yield Candidate(law, form, _written(law, form, knots, scale))
+            yield WrittenForm(law, form, _written(law, form, knots, scale))
 
 
 def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:

@@ -21,7 +21,7 @@ from workbench.errors import FMUError, InputError
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
 from workbench.proposing.places import Law
-from workbench.proposing.scan import Prospect, effect_at, eliminated
+from workbench.proposing.scan import LawProspect, effect_at, eliminated
 from workbench.proposing.splines import COEFFICIENTS, smoothest
 from workbench.proposing.writing import Written, clock, extended_library, number, unit_of
 from workbench.system import OBSERVER, System
@@ -56,7 +56,7 @@ class Free(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class FittedLaw:
     """A law, fitted as a free function.
 
     Attributes
@@ -67,7 +67,7 @@ class Estimate:
     coefficients, posterior : of the function, (K,) and their covariance, (K, K).
     """
 
-    prospect: Prospect
+    prospect: LawProspect
     deviance: float
     evidence: float
     coefficients: Vector
@@ -96,7 +96,7 @@ class Estimate:
         return values, basis @ self.coefficients, whole, shape
 
 
-def _written(name: str, prospect: Prospect) -> Written:
+def _written(name: str, prospect: LawProspect) -> Written:
     """The class of a free function."""
     law, knots = prospect.law, prospect.knots
     about = f"Free function: {law.text}"
@@ -137,8 +137,8 @@ def estimated(
     cases: Sequence[Case],
     workers: int,
     report: Reporter,
-    prospects: Sequence[Prospect],
-) -> list[Estimate]:
+    prospects: Sequence[LawProspect],
+) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
     What is large bends what the other quantities do, so that each function is fitted anew about
@@ -162,7 +162,7 @@ def estimated(
     return sorted(found, key=lambda one: -one.evidence)
 
 
-def _effects(library: Library, prospects: Sequence[Prospect]) -> list[Free]:
+def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
     return [
         Free(
             **vars(effect_at(f"Free{k}", library, one.law.place, "c0")),
@@ -173,8 +173,8 @@ def _effects(library: Library, prospects: Sequence[Prospect]) -> list[Free]:
 
 
 def _compiled(
-    system: System, library: Library, prospects: Sequence[Prospect], path: Path
-) -> list[Prospect]:
+    system: System, library: Library, prospects: Sequence[LawProspect], path: Path
+) -> list[LawProspect]:
     """Build the FMU of free functions; returns those that it has.
 
     What a law depends on may depend on it: a loop that is not linear, which no FMU of ours solves.
@@ -197,8 +197,8 @@ def _compiled(
 
 
 def _estimate(
-    simulations: Simulations, nominal: Fitted, item: tuple[Free, Prospect]
-) -> Estimate | None:
+    simulations: Simulations, nominal: Fitted, item: tuple[Free, LawProspect]
+) -> FittedLaw | None:
     """Fit one function; None if it leads where the model has no solution."""
     try:
         return _fitted(simulations, nominal, *item)
@@ -207,8 +207,8 @@ def _estimate(
 
 
 def _fitted(
-    simulations: Simulations, nominal: Fitted, effect: Free, prospect: Prospect
-) -> Estimate:
+    simulations: Simulations, nominal: Fitted, effect: Free, prospect: LawProspect
+) -> FittedLaw:
     smoothness, best = prospect.smoothness, nominal
     keys = [(effect.name, name) for name in effect.sizes]
     for _ in range(_ROUNDS):
@@ -227,7 +227,7 @@ def _fitted(
         smoothness = smoothest(N, g)
     gained = nominal.linearised.deviance - best.linearised.deviance
     spread = np.linalg.slogdet(np.eye(len(keys)) + N @ np.linalg.inv(effect.precision))[1]
-    return Estimate(
+    return FittedLaw(
         prospect,
         best.linearised.deviance,
         0.5 * (gained - float(spread)),

@@ -11,9 +11,9 @@ from scipy.stats import ttest_rel
 
 from workbench.diagnosis import Cause, Outcome
 from workbench.diagnosis.search import Fitted
-from workbench.proposing.forms import MARK, Candidate
-from workbench.proposing.free import Estimate
-from workbench.proposing.scan import Prospect
+from workbench.proposing.forms import MARK, WrittenForm
+from workbench.proposing.free import FittedLaw
+from workbench.proposing.scan import LawProspect
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,10 +39,10 @@ class Proposal:
     """
 
     before: Outcome
-    prospects: tuple[Prospect, ...]
-    estimates: tuple[Estimate, ...]
-    tied: tuple[Estimate, ...]
-    forms: Mapping[str, Candidate]
+    prospects: tuple[LawProspect, ...]
+    estimates: tuple[FittedLaw, ...]
+    tied: tuple[FittedLaw, ...]
+    forms: Mapping[str, WrittenForm]
     outcome: Outcome | None
 
     @property

@@ -67,7 +67,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Influence:
+class LawInfluence:
     """What a law may depend on.
 
     Attributes
@@ -196,7 +196,7 @@ class Law:
 
     place: Place
     carrier: Carrier
-    influence: Influence | None
+    influence: LawInfluence | None
 
     @property
     def short(self) -> str:
@@ -285,20 +285,20 @@ def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Itera
 
 def _influences(
     place: Place, recordings: Sequence[Mapping[str, Vector]], span: float
-) -> Iterator[Influence]:
+) -> Iterator[LawInfluence]:
     for one in place.inputs:
         own = [place.at(watched, one.name) for watched in recordings]
         values = np.concatenate(own)
         both = values.min() < -0.1 * values.max() and values.max() > -0.1 * values.min()
-        yield Influence("value", (one,))
+        yield LawInfluence("value", (one,))
         if both:
-            yield Influence("size", (one,))
+            yield LawInfluence("size", (one,))
         if _varies(own):
-            yield Influence("rate", (one,), span)
-    yield Influence("time")
+            yield LawInfluence("rate", (one,), span)
+    yield LawInfluence("time")
     known = [one for one in place.inputs if one.unit not in ("", "1")]
     for count in (2, 3):
         for group in combinations(known, count):
             product = ".".join(f"({one.unit})" for one in group)
             if quotient(product, "W") in ("1", "rad"):
-                yield Influence("work", group)
+                yield LawInfluence("work", group)

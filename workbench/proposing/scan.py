@@ -32,7 +32,7 @@ _SIZE = "d"  # of a probe
 
 
 @dataclass(frozen=True, eq=False)
-class Prospect:
+class LawProspect:
     """A law, as a free function about the nominal model.
 
     Attributes
@@ -118,9 +118,9 @@ class Scan:
         simulations: Simulations,
         values: Sequence[Mapping[str, float]],
         every: Sequence[Law],
-    ) -> list[Prospect]:
+    ) -> list[LawProspect]:
         lin = self._fit.linearise(self.base.linearised, ())
-        found: list[Prospect] = []
+        found: list[LawProspect] = []
         each = max(1, _AT_ONCE // COEFFICIENTS)
         for first in range(0, len(every), each):
             part = every[first : first + each]
@@ -141,7 +141,7 @@ class Scan:
                 more = [one[:, at : at + count] for one in derivatives]
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
                 smoothness = smoothest(*eliminated(joint, keys))
-                found.append(Prospect(law, knots, smoothness, self._largest(law.place)))
+                found.append(LawProspect(law, knots, smoothness, self._largest(law.place)))
                 at += count
         return found
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from workbench.diagnosis.extension import USED, copied, written
 from workbench.files import write_whole
 from workbench.modelica import Library, read_library
-from workbench.proposing.places import CLOCK, Influence, Place
+from workbench.proposing.places import CLOCK, LawInfluence, Place
 
 PACKAGE = "Proposed"  # of the classes, within the library
 
@@ -59,7 +59,7 @@ class Written:
         return "\n".join([*lines, f"  end {self.name};"])
 
 
-def clock(influence: Influence | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def clock(influence: LawInfluence | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Declarations and equations that an influence needs."""
     if influence is None or not influence.rate:
         return (), ()

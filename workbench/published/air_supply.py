@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 from workbench.recording import Vector, read_columns
 
 _CSV, _FOLDER = "original.csv", "20200201/measured.csv"
@@ -16,7 +16,7 @@ _BEGINS = (0, 337, 539, 743, 946)
 _ROWS, _FITTED = 1000, 3
 
 
-def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[Recording]:
+def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[PublishedRecording]:
     """The record in cycles of the compressor."""
     found = []
     for number, (a, b) in enumerate(pairwise((*_BEGINS, _ROWS)), start=1):
@@ -26,7 +26,7 @@ def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[Reco
             "reservoir [bar]": pressure[a:b],
         }
         found.append(
-            Recording(
+            PublishedRecording(
                 name=f"cycle_{number}",
                 title=f"Cycle {number} of the compressor",
                 columns=columns,
@@ -39,7 +39,7 @@ def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[Reco
     return found
 
 
-def _read_csv(folder: Path) -> list[Recording]:
+def _read_csv(folder: Path) -> list[PublishedRecording]:
     with (folder / _CSV).open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     stamps = [datetime.fromisoformat(row["timestamp"]) for row in rows]
@@ -50,7 +50,7 @@ def _read_csv(folder: Path) -> list[Recording]:
     return _cut(time, intake, np.round(pressure, 3), _CSV)
 
 
-def _read_folders(folder: Path) -> list[Recording]:
+def _read_folders(folder: Path) -> list[PublishedRecording]:
     columns = read_columns(folder / _FOLDER, ("time", "COMP", "reservoir"))
     time, intake, pressure = (columns[name].values for name in ("time", "COMP", "reservoir"))
     return _cut(time, intake, pressure, _FOLDER)
@@ -65,12 +65,12 @@ PUBLISHED = Published(
     "the compressor delivers. They are cut into the five cycles of the compressor. The first three "
     "are to be fitted, the last two are held out.",
     layouts=(
-        Layout(
+        FolderLayout(
             "the first 1000 rows of the publisher's file, as original.csv",
             {_CSV: "717125183bfc0573a6485f9db046461d3ae52775bd56f709c45d8976fe8c650e"},
             _read_csv,
         ),
-        Layout(
+        FolderLayout(
             "one folder, with time in seconds",
             {_FOLDER: "8b4463cb5f1f7af5f1411ccfc570b7a2379fa319d449ce3a178ee18db8a468fb"},
             _read_folders,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 from workbench.recording import Vector, read_columns
 
 _TITLES = {
@@ -14,7 +14,9 @@ _TITLES = {
 _MAT = "dataBenchmark.mat"
 
 
-def _recording(name: str, pump: Vector, level: Vector, step: float, file: str) -> Recording:
+def _recording(
+    name: str, pump: Vector, level: Vector, step: float, file: str
+) -> PublishedRecording:
     columns = {
         "time [s]": step * np.arange(pump.size, dtype=np.float64),
         "pump [V]": pump,
@@ -23,10 +25,10 @@ def _recording(name: str, pump: Vector, level: Vector, step: float, file: str) -
     rows = (0, pump.size - 1)
     changed = ("time is the number of the sample times 4 s",)
     held_out = name == "test"
-    return Recording(name, _TITLES[name], columns, file, rows, changed, held_out=held_out)
+    return PublishedRecording(name, _TITLES[name], columns, file, rows, changed, held_out=held_out)
 
 
-def _read_mat(folder: Path) -> list[Recording]:
+def _read_mat(folder: Path) -> list[PublishedRecording]:
     from scipy.io import loadmat  # takes its time, and nothing else needs it
 
     content = {name: np.ravel(value) for name, value in loadmat(folder / _MAT).items()}
@@ -37,7 +39,7 @@ def _read_mat(folder: Path) -> list[Recording]:
     ]
 
 
-def _read_folders(folder: Path) -> list[Recording]:
+def _read_folders(folder: Path) -> list[PublishedRecording]:
     found = []
     for name in _TITLES:
         file = f"{name}/measured.csv"
@@ -57,12 +59,12 @@ PUBLISHED = Published(
     "The levels at the start are not known, and they are alike in both records. 'estimation' is "
     "to be fitted, 'test' is held out.",
     layouts=(
-        Layout(
+        FolderLayout(
             "the publisher's own file",
             {_MAT: "cb2f88d4388be4d3f2a24c6402fba804976aac5f2e1f26cda59ea0a38d016eab"},
             _read_mat,
         ),
-        Layout(
+        FolderLayout(
             "one folder for each record, five digits",
             {
                 "estimation/measured.csv": (

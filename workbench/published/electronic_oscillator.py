@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 from workbench.recording import Vector
 
 _FILE = "SNLS80mV.csv"
@@ -29,12 +29,12 @@ def sharpened(values: Vector) -> Vector:
     return np.fft.irfft(spectrum, values.size)
 
 
-def _read(folder: Path) -> list[Recording]:
+def _read(folder: Path) -> list[PublishedRecording]:
     u, y = np.loadtxt(folder / _FILE, delimiter=",", skiprows=1, usecols=(0, 1)).T
     force = sharpened(u)
 
-    def part(name: str, title: str, first: int, end: int) -> Recording:
-        return Recording(
+    def part(name: str, title: str, first: int, end: int) -> PublishedRecording:
+        return PublishedRecording(
             name,
             title,
             {
@@ -69,7 +69,7 @@ PUBLISHED = Published(
     "realisations of a multisine, of which three are to be fitted. The arrow is held out; at its "
     "end it is larger than what was fitted.",
     layouts=(
-        Layout(
+        FolderLayout(
             "the publisher's own file",
             {_FILE: "ae62d5a91230c10f76e6dd02c8a4fac3c9d4d8a95fbf50e87cb0c4885003e0f1"},
             _read,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Published, Recording
+from workbench.prepare import Published, PublishedRecording
 from workbench.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
 
 _BETWEEN = 2.0  # bar: what is above is fitted, what is below is held out
@@ -41,7 +41,7 @@ _PUBLISHED = {  # SHA-256: by the publisher, in folders
 }
 
 
-def _recordings(name: str, columns: Columns, file: str) -> list[Recording]:
+def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecording]:
     """What a chamber shows above and, if it falls so far, below the pressure between."""
     time, pressure = columns["time"], columns["pressure"]
     falls = np.flatnonzero(np.diff(pressure) < -_CLOSED)
@@ -53,9 +53,9 @@ def _recordings(name: str, columns: Columns, file: str) -> list[Recording]:
         changed.append(f"left out: {first} samples, until the supply is closed")
     time = time - time[first]
 
-    def until(end: int, part: str, begin: float | None = None) -> Recording:
+    def until(end: int, part: str, begin: float | None = None) -> PublishedRecording:
         kept = slice(first, end)
-        return Recording(
+        return PublishedRecording(
             f"{name}_{part}",
             f"Chamber {name}, {part} {_BETWEEN:g} bar",
             {"time [s]": time[kept], "p [bar]": pressure[kept]},

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from workbench.prepare import Layout, Recording
+from workbench.prepare import FolderLayout, PublishedRecording
 from workbench.recording import Vector, read_columns
 
 SOURCE = (
@@ -20,8 +20,8 @@ def layouts(
     own: tuple[str, Callable[[Path], Columns]],
     folders: tuple[str, str, Sequence[str]],
     files: Mapping[str, tuple[str, str]],
-    recordings: Callable[[str, Columns, str], Sequence[Recording]],
-) -> tuple[Layout, ...]:
+    recordings: Callable[[str, Columns, str], Sequence[PublishedRecording]],
+) -> tuple[FolderLayout, ...]:
     """The publisher's own files, and folders with a `measured.csv` each, in a folder or beside.
 
     Parameters
@@ -34,10 +34,10 @@ def layouts(
     theirs, columns_of = own
     told, folder, names = folders
 
-    def layout(title: str, path: str, which: int, read: Callable[[Path], Columns]) -> Layout:
+    def layout(title: str, path: str, which: int, read: Callable[[Path], Columns]) -> FolderLayout:
         paths = {name: path.format(name) for name in files}
         checksums = {paths[name]: sums[which] for name, sums in files.items()}
-        return Layout(title, checksums, partial(_read, paths, read, recordings))
+        return FolderLayout(title, checksums, partial(_read, paths, read, recordings))
 
     by_name = partial(_columns, names)
     return (
@@ -54,9 +54,9 @@ def _columns(names: Sequence[str], path: Path) -> Columns:
 def _read(
     paths: Mapping[str, str],
     columns_of: Callable[[Path], Columns],
-    recordings: Callable[[str, Columns, str], Sequence[Recording]],
+    recordings: Callable[[str, Columns, str], Sequence[PublishedRecording]],
     folder: Path,
-) -> list[Recording]:
+) -> list[PublishedRecording]:
     return [
         one
         for name, path in paths.items()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 
 _STEP = 1e-3  # [s]
 _FILES = {
@@ -19,13 +19,13 @@ _FILES = {
 }
 
 
-def _recording(folder: Path, file: str) -> Recording:
+def _recording(folder: Path, file: str) -> PublishedRecording:
     from scipy.io import loadmat  # takes its time, and nothing else needs it
 
     content = {name: np.ravel(value) for name, value in loadmat(folder / file).items()}
     goal = content["qg"]
     pulses = content.get("pulses_N")
-    return Recording(
+    return PublishedRecording(
         name="motion" if pulses is None else "motion_with_pulses",
         title="Bang-bang accelerations" + ("" if pulses is None else ", and pulses of the command"),
         columns={
@@ -42,7 +42,7 @@ def _recording(folder: Path, file: str) -> Recording:
     )
 
 
-def _read(folder: Path) -> list[Recording]:
+def _read(folder: Path) -> list[PublishedRecording]:
     return [_recording(folder, file) for file in _FILES]
 
 
@@ -55,5 +55,5 @@ PUBLISHED = Published(
     recordings="Two records of 24841 samples, 1 ms apart, under position control. Bang-bang "
     "accelerations of the reference are to be fitted; in the record that is held out pulses are "
     "added to the command, in volts.",
-    layouts=(Layout("the publisher's own files", _FILES, _read),),
+    layouts=(FolderLayout("the publisher's own files", _FILES, _read),),
 )

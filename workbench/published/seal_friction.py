@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from workbench.prepare import Published, Recording
+from workbench.prepare import Published, PublishedRecording
 from workbench.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
 from workbench.recording import Vector
 
@@ -79,13 +79,13 @@ def _slope(t: Vector, s: Vector) -> Vector:
     return slopes
 
 
-def _recordings(name: str, columns: Columns, file: str) -> list[Recording]:
+def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecording]:
     seal, pressure = name.removesuffix("bar").rsplit("_", 1)
     size = columns["time"].size
     time, stroke, p, force = (
         columns[one][_DROPPED:] for one in ("time", "stroke", "pressure", "force")
     )
-    one = Recording(
+    one = PublishedRecording(
         name,
         f"Ten strokes at {pressure} bar, seal {seal}",
         {

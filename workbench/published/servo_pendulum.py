@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 from workbench.recording import Vector, read_columns
 
 _MOTIONS = {
@@ -117,11 +117,11 @@ _OURS = {
 }
 
 
-def _recording(name: str, columns: Mapping[str, Vector], file: str) -> Recording:
+def _recording(name: str, columns: Mapping[str, Vector], file: str) -> PublishedRecording:
     gain, motion = name.removeprefix("kp").split("_", 1)
     kp = int(gain)
     rows = (0, columns["time [s]"].size - 1)
-    return Recording(
+    return PublishedRecording(
         name,
         f"{_MOTIONS[motion]}, gain {kp}",
         columns,
@@ -133,7 +133,7 @@ def _recording(name: str, columns: Mapping[str, Vector], file: str) -> Recording
     )
 
 
-def _read_theirs(folder: Path) -> list[Recording]:
+def _read_theirs(folder: Path) -> list[PublishedRecording]:
     found = []
     for name, (file, _) in _THEIRS.items():
         path = f"{_FOLDER}/{file}"
@@ -147,7 +147,7 @@ def _read_theirs(folder: Path) -> list[Recording]:
     return found
 
 
-def _read_folders(folder: Path) -> list[Recording]:
+def _read_folders(folder: Path) -> list[PublishedRecording]:
     found = []
     for name in _OURS:
         file = f"{name}/measured.csv"
@@ -168,12 +168,12 @@ PUBLISHED = Published(
     "controller. The motor is driven throughout, but for the last 4 s of 'lift_and_drop'. Those of "
     "gain 200 are held out, all others are to be fitted.",
     layouts=(
-        Layout(
+        FolderLayout(
             "the publisher's own files",
             {f"{_FOLDER}/{file}": sha256 for file, sha256 in _THEIRS.values()},
             _read_theirs,
         ),
-        Layout(
+        FolderLayout(
             "one folder for each record, five digits",
             {f"{name}/measured.csv": sha256 for name, sha256 in _OURS.items()},
             _read_folders,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.experiments import NextStop, Proposal
+from workbench.experiments import NextStop, RankedExperiment
 from workbench.report.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.report.parts import Cell, Column, Part, Table, number, write_parts
 from workbench.report.recordings import placed
@@ -47,7 +47,7 @@ def write_next_stop_page(found: NextStop, summary: Mapping[str, Any], out: Path)
     return path
 
 
-def _figure(found: NextStop, one: Proposal, place: int) -> CaseFigure:
+def _figure(found: NextStop, one: RankedExperiment, place: int) -> CaseFigure:
     """Inputs and what each model leaves by channel, at the blocks."""
     predicted = one.prediction
     time = predicted.block_time

@@ -7,8 +7,7 @@ file has and its schema has not is a mistake in one of the two.
 from workbench.companion import companion_part
 from workbench.diagnosis.sample_errors import Errors
 from workbench.installed import companions
-from workbench.power.planned import Foreseen
-from workbench.power.sensitivity import Changed
+from workbench.schemas.power_summaries import power_summaries
 from workbench.schemas.words import (
     ANY,
     BOTH,
@@ -19,7 +18,6 @@ from workbench.schemas.words import (
     NAMED,
     NUMBER,
     RUN,
-    SHARE,
     TEXT,
     VALUE,
     VERSIONS,
@@ -44,11 +42,7 @@ def summaries() -> dict[str, Schema]:
         "tune": _tune(),
         "diagnose": _diagnose(),
         "observability": _observability(),
-        "power": _power(),
-        "thresholds": _thresholds(),
-        "sheet_error": _sheet_error(),
-        "left_out": _left_out(),
-        "plan": _plan(),
+        **power_summaries(),
         "next": _next(),
         "distance": _distance(),
         "monitor": _monitor(),
@@ -227,59 +221,6 @@ def _observability() -> Schema:
     }
     provenance = closed({"run": RUN, **VERSIONS, "fmus": listed(FMU)})
     return summary("observability", provenance, entries)
-
-
-_SETS = closed(
-    {"run": RUN, "workbench": TEXT, "seed": WHOLE, "stops": listed(TEXT), "interrupted": FLAG}
-)
-
-
-def _power() -> Schema:
-    shares = ("false_alarms", "right_first", "right_first_above_noise", "right_alone")
-    effect = {"rig": TEXT, "size": NUMBER, "unit": TEXT, "hidden": FLAG}
-    outside = {"size": NUMBER, "unit": TEXT, "verdicts": by_name(by_name(WHOLE))}
-    entries = {
-        "sets": WHOLE,
-        "failed": listed(closed({"rig": TEXT, "error": TEXT})),
-        **{name: SHARE for name in (*shares, "unexplained", "coverage")},
-        "pairs": closed({"both": SHARE, "both_seen_alone": SHARE}),
-        "effects": by_name(closed({**effect, "right_first": by_name(SHARE), "coverage": SHARE})),
-        "outside": by_name(closed(outside)),
-        "confusion": by_name(by_name(WHOLE)),
-        "wrong": listed(closed({"rig": TEXT, "said": listed(TEXT)})),
-    }
-    return summary("power", _SETS, entries)
-
-
-def _thresholds() -> Schema:
-    one = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
-    sets = listed(closed({**one, "changed": listed(declared(Changed))}))
-    return summary("power --thresholds", _SETS, {"usual": by_name(NUMBER), "sets": sets})
-
-
-def _sheet_error() -> Schema:
-    one = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
-    one |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
-    return summary("power --sheet-error", _SETS, {"sets": listed(closed(one))})
-
-
-def _left_out() -> Schema:
-    texts = {name: listed(TEXT) for name in ("left_out", "named", "laws", "slots")}
-    ends = {name: or_null(NUMBER) for name in ("before", "after")}
-    one = {
-        "rig": TEXT,
-        "verdict": TEXT,
-        "error": TEXT,
-        **texts,
-        "slot_right": or_null(FLAG),
-        **ends,
-    }
-    return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
-
-
-def _plan() -> Schema:
-    entries = {"sizes": listed(NUMBER), "effects": listed(declared(Foreseen))}
-    return summary("power --plan", _SETS, entries)
 
 
 def _next() -> Schema:

@@ -28,7 +28,7 @@ from workbench.stopping.forecast import (
 from workbench.stopping.outcome import Distance, Forecast, PastStop, Safety
 from workbench.stopping.past import Past, fitted, places
 from workbench.stopping.plain import Plain
-from workbench.stopping.recorded import Recorded, Stop, asked_stop, recorded
+from workbench.stopping.recorded import RecordedStop, Stop, asked_stop, recorded
 from workbench.system import System
 from workbench.system_distance import SPEED, Stopping
 
@@ -112,7 +112,7 @@ class _Forecasts:
         self,
         system: System,
         stopping: Stopping,
-        made: Sequence[Recorded],
+        made: Sequence[RecordedStop],
         past: Past,
         effort: Effort,
         pool: Pool[Forecaster],

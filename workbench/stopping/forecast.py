@@ -18,7 +18,7 @@ from workbench.fmu import FMU, Matrix, Vector
 from workbench.rare_events import Descent, descend
 from workbench.stopping.past import Known, places
 from workbench.stopping.recorded import Stop, beyond
-from workbench.stopping.way import Drive, Halt, Stops
+from workbench.stopping.way import DrivingInputs, Halt, Stops
 from workbench.system import System
 from workbench.system_distance import Difference, Stopping
 from workbench.systems import open_model
@@ -143,7 +143,7 @@ class Forecaster:
     def _usual(self, name: str, values: Mapping[str, float]) -> float:
         return values[name] if name in values else self._fmu.defaults[name]
 
-    def _drive(self, stop: Stop) -> Drive:
+    def _drive(self, stop: Stop) -> DrivingInputs:
         driven = self._stopping.driven
         length = max([2, *(values.size for values in stop.along.values())])
         along = np.zeros((len(driven), length))
@@ -155,9 +155,11 @@ class Forecaster:
             else:
                 to[j] = one.formula(stop.asked)
         delays, lags = np.array([[one.delay, one.lag] for one in driven]).T
-        return Drive(to, np.ascontiguousarray(delays), np.ascontiguousarray(lags), along)
+        return DrivingInputs(to, np.ascontiguousarray(delays), np.ascontiguousarray(lags), along)
 
-    def _move(self, one: Difference, u: float, values: dict[str, float], drive: Drive) -> None:
+    def _move(
+        self, one: Difference, u: float, values: dict[str, float], drive: DrivingInputs
+    ) -> None:
         """Let what differs be u standard deviations off."""
         inputs = [driven.name for driven in self._stopping.driven]
         for name in one.of:

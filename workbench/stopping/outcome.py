@@ -12,9 +12,9 @@ from workbench.fmu import Vector
 from workbench.rare_events import Tail, plain_runs
 from workbench.stopping.forecast import stopping_of
 from workbench.stopping.plain import Plain
-from workbench.stopping.recorded import Recorded, Stop
+from workbench.stopping.recorded import RecordedStop, Stop
 from workbench.stopping.standard import (
-    Conditions,
+    StopConditions,
     equivalent_rate,
     nominal_rate,
     percentage,
@@ -89,7 +89,7 @@ class PastStop:
     forecast : by the other stops.
     """
 
-    recorded: Recorded
+    recorded: RecordedStop
     model: float
     forecast: Forecast
 
@@ -206,7 +206,7 @@ class Distance:
         """Equivalent deceleration by which the stop has a distance [m/s2]."""
         return equivalent_rate(self.stop.asked[SPEED], self.response, distance)
 
-    def corrected(self, one: Recorded) -> Corrected | None:
+    def corrected(self, one: RecordedStop) -> Corrected | None:
         """A past stop under nominal conditions; None where no nominal speed is near."""
         stopping = stopping_of(self.system)
         nominal, asked = stopping.nominal, one.stop.asked
@@ -215,7 +215,7 @@ class Distance:
         speed = min(nominal.speeds, key=lambda v: abs(v - asked[SPEED]))
         if abs(speed - asked[SPEED]) > nominal.within * speed:
             return None
-        made = Conditions(
+        made = StopConditions(
             mass=float(nominal.mass(asked)),
             rotating=float(nominal.rotating(self.system.values)),
             resistance=one.resistance,

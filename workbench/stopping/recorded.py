@@ -41,7 +41,7 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RecordedStop:
     """A stop that was made.
 
     Attributes
@@ -59,7 +59,7 @@ class Recorded:
     outside: tuple[str, ...]
 
 
-def recorded(case: Case, system: System, stopping: Stopping) -> Recorded:
+def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
     """Read the stop out of a recording.
 
     Raises
@@ -88,7 +88,7 @@ def recorded(case: Case, system: System, stopping: Stopping) -> Recorded:
         for one in stopping.driven
         if one.along
     }
-    return Recorded(
+    return RecordedStop(
         stop=Stop(case.name, asked, case.conditions, along),
         command=command,
         distance=distance,

@@ -39,7 +39,7 @@ def equivalent_rate(speed: float, response: float, distance: float, end: float =
 
 
 @dataclass(frozen=True)
-class Conditions:
+class StopConditions:
     """Under which a stop was made.
 
     Attributes
@@ -53,7 +53,7 @@ class Conditions:
     resistance: float
 
 
-def nominal_rate(rate: float, made: Conditions, mass: float) -> float:
+def nominal_rate(rate: float, made: StopConditions, mass: float) -> float:
     """Equivalent deceleration on a level, straight way with a nominal mass [m/s2].
 
     The force follows the weighed load: it is taken as that of the mass that was stopped.

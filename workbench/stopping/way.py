@@ -22,7 +22,7 @@ _MOVING = 3  # status: not at rest when the time was over
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class DrivingInputs:
     """What drives a model in a stop: each input rises in time to a value, or goes along the way.
 
     Attributes
@@ -126,7 +126,7 @@ class Stops:
         # All states: how stiff one is changes on the way to standstill.
         self._work = steps(fmu, np.arange(len(fmu.states)), len(inputs))
 
-    def halt(self, drive: Drive, values: Mapping[str, float]) -> Halt:
+    def halt(self, drive: DrivingInputs, values: Mapping[str, float]) -> Halt:
         """Stop once.
 
         Parameters

@@ -15,7 +15,7 @@ from workbench.wheelset.rig import (
     CONSTANT_PADS,
     Effects,
     Scenario,
-    Stop,
+    StopTruth,
     plant,
     select,
     simulate,
@@ -121,12 +121,14 @@ class PlantedStops:
             "rig": hashlib.sha256(b"".join(file.read_bytes() for file in code)).hexdigest(),
         }
 
-    def simulate(self, seed: int, gains: Mapping[str, float]) -> list[Stop]:
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> list[StopTruth]:
         """What happens in the stops."""
         effects = _effects(gains)
         return [simulate(scenario, seed, effects, self.reference) for scenario in self.scenarios]
 
-    def write(self, simulated: Sequence[Stop], gains: Mapping[str, float], folder: Path) -> None:
+    def write(
+        self, simulated: Sequence[StopTruth], gains: Mapping[str, float], folder: Path
+    ) -> None:
         """Write what the sensors make of them."""
         for stop in simulated:
             write_recording(stop, _effects(gains), _RATE, folder / stop.scenario.name)

@@ -46,6 +46,23 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="what the stop is asked for, or a condition, by the names of the system file; the "
         "rest is usual; may be repeated",
     )
+    _add_counts(parser)
+    parser.add_argument(
+        "--fmu",
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="observer model, or an extension of it (default: the system's)",
+    )
+    add_seed(parser, "all that is drawn")
+    add_workers(parser)
+    add_pdf(parser)
+    add_isolated(parser)
+    return parser
+
+
+def _add_counts(parser: argparse.ArgumentParser) -> None:
+    """How many stops are drawn, for what."""
     parser.add_argument(
         "--safety",
         type=count,
@@ -68,15 +85,3 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="check the safety level by so many stops, each drawn by itself; 1e5 take minutes, 1e7 "
         "hours, and Ctrl-C keeps those that are drawn (default: %(default)s)",
     )
-    parser.add_argument(
-        "--fmu",
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="observer model, or an extension of it (default: the system's)",
-    )
-    add_seed(parser, "all that is drawn")
-    add_workers(parser)
-    add_pdf(parser)
-    add_isolated(parser)
-    return parser

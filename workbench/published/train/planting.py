@@ -13,7 +13,7 @@ import numpy as np
 from workbench.errors import InputError, closest
 from workbench.power.planting import Plantable, SheetError
 from workbench.prepare import write_cases
-from workbench.published.train.rig import AXLES, BOGIES, Stop
+from workbench.published.train.rig import AXLES, BOGIES, AskedStop
 from workbench.published.train.stops import USUAL, Faults, Made, draw_train, make, write_stop
 
 # A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
@@ -47,7 +47,7 @@ class PlantedTrain:
     stops : of a set.
     """
 
-    stops: tuple[Stop, ...]
+    stops: tuple[AskedStop, ...]
 
     @property
     def plantables(self) -> tuple[Plantable, ...]:

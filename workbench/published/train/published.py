@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 from workbench.recording import Matrix, Vector, read_columns
 from workbench.tables import read_table
 from workbench.units import si_factor
@@ -23,7 +23,7 @@ _MIDDLES = (10.75, 37.15)  # of the vehicles, behind the first axle [m]
 _CURVE = 0.6  # resistance over weight, times the radius [m]
 
 
-def _read(folder: Path) -> list[Recording]:
+def _read(folder: Path) -> list[PublishedRecording]:
     found = [_recording(path.parent) for path in sorted(folder.glob(f"*/{_CASE}"))]
     if not found:
         raise InputError(
@@ -35,7 +35,7 @@ def _read(folder: Path) -> list[Recording]:
     return found
 
 
-def _recording(folder: Path) -> Recording:
+def _recording(folder: Path) -> PublishedRecording:
     document = read_table(folder / _CASE, "describe the stop", 'title = "..."')
     conditions = document.table("conditions")
     measured = folder / document.table("measurement").take("file", str)
@@ -59,7 +59,7 @@ def _recording(folder: Path) -> Recording:
         columns[f"mass{k} [kg]"] = np.full(slope.size, mass)
         columns[f"slope{k} [1]"] = slope
     columns["curve [1]"] = masses @ curves / masses.sum()
-    return Recording(
+    return PublishedRecording(
         folder.name,
         document.take("title", str),
         columns,
@@ -108,5 +108,5 @@ PUBLISHED = Published(
     licence="that of the train's owner",
     recordings="Each stop begins with 20 to 30 s of coasting and ends after standstill. A folder "
     "holds stops of one train.",
-    layouts=(Layout("one folder for each stop", {}, _read, pattern="*/*", one=_recording),),
+    layouts=(FolderLayout("one folder for each stop", {}, _read, pattern="*/*", one=_recording),),
 )

@@ -29,7 +29,7 @@ _STANDSTILL = 0.05  # [m/s]
 
 
 @dataclass(frozen=True)
-class Stop:
+class AskedStop:
     """What is asked of a stop.
 
     Attributes
@@ -292,7 +292,9 @@ def points() -> Vector:
     return np.arange(-_LEAD, _END, _GRID)
 
 
-def ride(train: Train, way: Way, stop: Stop, speed: float, command: float, T: Matrix) -> Ridden:
+def ride(
+    train: Train, way: Way, stop: AskedStop, speed: float, command: float, T: Matrix
+) -> Ridden:
     """Let a train stop.
 
     Parameters

@@ -11,8 +11,8 @@ from workbench.published.train.rig import (
     BOGIES,
     DISCS,
     STEP,
+    AskedStop,
     Ridden,
-    Stop,
     Train,
     Way,
     points,
@@ -26,10 +26,10 @@ _START = 10_000.0  # kilometrage of the first axle at the start [m]
 _PERIOD = 0.02  # of the computer's samples [s]
 
 USUAL = (
-    Stop("01_120_service_dry", 120 / 3.6, 2.7e5, "dry"),
-    Stop("02_160_service_dry", 160 / 3.6, 2.7e5, "dry"),
-    Stop("03_80_emergency_dry", 80 / 3.6, 4.2e5, "dry"),
-    Stop("04_120_service_wet", 120 / 3.6, 2.7e5, "wet"),
+    AskedStop("01_120_service_dry", 120 / 3.6, 2.7e5, "dry"),
+    AskedStop("02_160_service_dry", 160 / 3.6, 2.7e5, "dry"),
+    AskedStop("03_80_emergency_dry", 80 / 3.6, 4.2e5, "dry"),
+    AskedStop("04_120_service_wet", 120 / 3.6, 2.7e5, "wet"),
 )
 
 
@@ -114,7 +114,7 @@ class Made:
     fixed : of the train.
     """
 
-    stop: Stop
+    stop: AskedStop
     ridden: Ridden
     command: float
     weighed: Vector
@@ -144,7 +144,7 @@ def draw_train(seed: int, tolerances: float) -> Fixed:
     )
 
 
-def make(stop: Stop, seed: int, fixed: Fixed, faults: Faults) -> Made:
+def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
     """Make one stop.
 
     Parameters
@@ -258,7 +258,7 @@ def _table(columns: dict[str, Vector], form: str) -> str:
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 
-def _case(stop: Stop, made: Made) -> str:
+def _case(stop: AskedStop, made: Made) -> str:
     brake = "emergency" if stop.pressure > 3e5 else "service"
     return f"""\
 title = "{stop.speed * 3.6:.0f} km/h, {brake} brake, rail {stop.rail}"

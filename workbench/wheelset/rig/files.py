@@ -11,7 +11,7 @@ from workbench.errors import InputError
 from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
 from workbench.wheelset.rig.effects import Effects
-from workbench.wheelset.rig.run import RATE, TRUTH, Stop
+from workbench.wheelset.rig.run import RATE, TRUTH, StopTruth
 from workbench.wheelset.rig.scenarios import Scenario
 from workbench.wheelset.rig.sensors import received, sample
 
@@ -55,7 +55,9 @@ def check_files(folders: Iterable[Path], rate: int) -> None:
             )
 
 
-def write_recording(stop: Stop, effects: Effects, rate: int, folder: Path, every: int = 1) -> None:
+def write_recording(
+    stop: StopTruth, effects: Effects, rate: int, folder: Path, every: int = 1
+) -> None:
     """Write a case for estimators and the truth for judges.
 
     Parameters

@@ -93,7 +93,7 @@ class Phases:
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class StopTruth:
     """The truth of one stop.
 
     Attributes
@@ -121,7 +121,7 @@ class Stop:
         return np.interp(time, self.time, self.truth[name])
 
 
-def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) -> Stop:
+def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) -> StopTruth:
     """Make one stop.
 
     Parameters
@@ -142,7 +142,7 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
         model = fmu.sha256
     time = np.arange(len(rows)) / RATE - _RUN_IN
     truth = dict(zip(TRUTH, np.array(rows).T.copy(), strict=True))
-    return Stop(scenario, seed, drawn, phases, time, truth, standstill, model)
+    return StopTruth(scenario, seed, drawn, phases, time, truth, standstill, model)
 
 
 def _draw(rng: np.random.Generator, effects: Effects) -> Drawn:
@@ -209,6 +209,15 @@ def _parts(
     return drive, brake, pads, wheel, contact, protection
 
 
+def _endless(scenario: Scenario, speed: float) -> InputError:
+    return InputError(
+        where=scenario.name,
+        found=f"{speed:.1f} m/s after {_LONGEST:g} s",
+        expected="a brake that stops the train",
+        remedy="plant smaller effects",
+    )
+
+
 def _brake_to_standstill(
     fmu: CoSimulation, scenario: Scenario, drawn: Drawn, phases: Phases, effects: Effects
 ) -> tuple[list[tuple[float, ...]], float]:
@@ -264,9 +273,4 @@ def _brake_to_standstill(
         contact.rub(0.5 * abs(Fx * slip))
         rim, omegaR, phiW = fmu.step(dt)[states].tolist()
         omegaW = wheel.speed(rim, phiW)
-    raise InputError(
-        where=scenario.name,
-        found=f"{abs(omegaR) * rR:.1f} m/s after {_LONGEST:g} s",
-        expected="a brake that stops the train",
-        remedy="plant smaller effects",
-    )
+    raise _endless(scenario, abs(omegaR) * rR)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from workbench.fmu import Vector
 from workbench.wheelset.rig.effects import Effects
-from workbench.wheelset.rig.run import Stop
+from workbench.wheelset.rig.run import StopTruth
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ _BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
 _NOISE, _SPIKES, _DROPOUTS = 1, 7, 12
 
 
-def sample(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
+def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vector]:
     """Take samples of all channels.
 
     Channels have noise of their own, so that what happens to one leaves the others alone. The
@@ -84,7 +84,7 @@ def sample(stop: Stop, effects: Effects, time: Vector) -> Mapping[str, Vector]:
     return readings
 
 
-def received(stop: Stop, effects: Effects, time: Vector) -> NDArray[np.bool_]:
+def received(stop: StopTruth, effects: Effects, time: Vector) -> NDArray[np.bool_]:
     """Which samples reach the file, (n,).
 
     Parameters
@@ -94,7 +94,7 @@ def received(stop: Stop, effects: Effects, time: Vector) -> NDArray[np.bool_]:
     return ~_struck(effects.dropouts, time, _rng(stop, _DROPOUTS))
 
 
-def _rng(stop: Stop, stream: int) -> np.random.Generator:
+def _rng(stop: StopTruth, stream: int) -> np.random.Generator:
     return np.random.default_rng([stop.seed, stop.scenario.number, stream])
 
 
