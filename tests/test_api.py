@@ -26,6 +26,10 @@ tuned = wb.tune(system, "disturbance_observer", cases, generations=1, population
 again = wb.observe(system, cases[0], "disturbance_observer", tuned.gains); again.summary()
 found = wb.diagnose(system, cases, workers=2)
 print(found.summary()); found.plot()
+try:
+    wb.propose(found, workers=2)
+except wb.InputError as error:
+    print(f"no law: {error}")
 """
 
 
@@ -62,6 +66,7 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root: Path, folder: Path
     assert run.stdout.count("[  1/1] z ") == 1
     said = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
     assert run.stdout.count(said) == 1
+    assert "no law: the diagnosis: found the verdict 'found'" in run.stdout
 
 
 def test_a_table_is_the_recording_that_a_file_holds(system: wb.System, case: wb.Case) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
     from workbench.api import prepare_cases as prepare_cases
+    from workbench.api import propose as propose
     from workbench.api import read_cases as read_cases
     from workbench.api import tune as tune
     from workbench.case import Case as Case
@@ -27,6 +28,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.fmu import FMU as FMU
     from workbench.monitoring import Monitored as Monitored
     from workbench.observers import Gains as Gains
+    from workbench.proposing import Proposal as Proposal
     from workbench.stopping import Distance as Distance
     from workbench.stopping import Effort as Effort
     from workbench.system import System as System

@@ -9,7 +9,6 @@ wb.observe(system, cases[0], "ekf").plot()
 
 import os
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ from workbench.case import Case, check_recording, read_only
 from workbench.case import read_cases as read_folders
 from workbench.conditions import read_conditions
 from workbench.cosim import Run, replay
-from workbench.diagnosis import Outcome, choose, read_effects
+from workbench.diagnosis import Effect, Outcome, choose, read_effects
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
 from workbench.experiments import NextStop
@@ -29,7 +28,7 @@ from workbench.experiments import next_stop as next_experiment
 from workbench.files import claimed
 from workbench.installed import usual_system
 from workbench.mapping import Told, parse_named
-from workbench.modelica import read_library
+from workbench.modelica import Library, read_library
 from workbench.monitoring import RATE, Monitored
 from workbench.monitoring import monitor as watch_machine
 from workbench.observers import Gains
@@ -37,12 +36,14 @@ from workbench.observers import choose as choose_estimators
 from workbench.observers.gains_file import usual_gains
 from workbench.plausibility import Origin, doubts
 from workbench.prepare import read_recorded, write_cases
+from workbench.proposing import Proposal, needs_law
+from workbench.proposing import propose as propose_law
 from workbench.recording import header
 from workbench.stopping import Distance, Effort, distance_of_stop
 from workbench.system import OBSERVER, System
 from workbench.systems import load_system, open_model
 from workbench.tables import Table
-from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, pose
+from workbench.tuning import Lines, Plan, Tuned, evaluators, pose
 from workbench.tuning import tune as tune_problem
 from workbench.units import quantity, si_factor
 
@@ -220,26 +221,9 @@ def tune(
     plan = Plan(generations, population, seed)
     with (
         tempfile.TemporaryDirectory(prefix="tune-") as scratch,
-        evaluators(problem.job, workers or os.cpu_count() or 1) as pool,
+        evaluators(problem.job, _number(workers)) as pool,
     ):
-        return tune_problem(pool, problem, plan, Path(scratch), progress=_Lines(plan, report))
-
-
-class _Lines(Progress):
-    """A line on each generation, with the time left."""
-
-    def __init__(self, plan: Plan, report: Callable[[str], None]) -> None:
-        self._plan, self._report, self._begin = plan, report, time.perf_counter()
-
-    def evolved(self, history: Sequence[Generation]) -> None:
-        """See Progress."""
-        done, most = len(history), self._plan.generations
-        left = (time.perf_counter() - self._begin) / done * (most + 1 - done)
-        self._report(f"[{done - 1:>3}/{most}] z {history[-1].z:.5f}, at most {left:.0f} s left")
-
-    def warn(self, message: str) -> None:
-        """See Progress."""
-        self._report(f"warning: {message}")
+        return tune_problem(pool, problem, plan, Path(scratch), progress=Lines(plan, report))
 
 
 def diagnose(
@@ -267,13 +251,55 @@ def diagnose(
     InputError
         If recordings or library cannot be used.
     """
+    library, chosen = _catalogue(system, effects)
+    rest = (_folder(out, "diagnosis"), _number(workers), report)
+    return diagnose_system(system, cases, library, chosen, *rest, held_out=held_out)
+
+
+def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:
     library = read_library(system.library)
-    chosen = choose(effects, read_effects(library, system.models[OBSERVER].name))
-    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="diagnosis-"))
-    number = workers or os.cpu_count() or 1
-    return diagnose_system(
-        *(system, cases, library, chosen, folder, number, report), held_out=held_out
-    )
+    return library, choose(effects, read_effects(library, system.models[OBSERVER].name))
+
+
+def _folder(out: str | Path | None, kind: str) -> Path:
+    return Path(out) if out is not None else Path(tempfile.mkdtemp(prefix=f"{kind}-"))
+
+
+def _number(workers: int | None) -> int:
+    return workers or os.cpu_count() or 1
+
+
+def propose(
+    found: Outcome,
+    *,
+    held_out: Sequence[Case] = (),
+    effects: Sequence[str] = (),
+    out: str | Path | None = None,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+) -> Proposal:
+    """Infer a law for what no effect explains; see `workbench.proposing.propose`.
+
+    Parameters
+    ----------
+    found : a diagnosis that left something unexplained, or that needed several effects.
+    held_out, effects, out, workers, report : as of `diagnose`.
+
+    Raises
+    ------
+    InputError
+        If nothing is missing, or one effect explains it.
+    """
+    if not needs_law(found):
+        raise InputError(
+            where="the diagnosis",
+            found=f"the verdict '{found.diagnosis.verdict}'",
+            expected="'unexplained', or several causes",
+            remedy="ask for no law: nothing is missing, or one effect explains it",
+        )
+    library, chosen = _catalogue(found.system, effects)
+    rest = (_folder(out, "proposal"), _number(workers), report)
+    return propose_law(found, library, chosen, *rest, held_out=held_out)
 
 
 def monitor(
@@ -299,14 +325,13 @@ def monitor(
     InputError
         If no recording can be used, or the state is of another model.
     """
-    number = workers or os.cpu_count() or 1
     with tempfile.TemporaryDirectory(prefix="monitor-") as scratch:
         folder = Path(out) if out is not None else Path(scratch)
         with claimed(folder):
             return watch_machine(
                 *(system, Path(history), folder),
                 rate=false_alarms,
-                workers=number,
+                workers=_number(workers),
                 read=read_recorded,
             )
 
@@ -336,7 +361,7 @@ def next_stop(
             expected="a cause that was found, whose rivals or size are to be told better",
             remedy="diagnose more recordings first",
         )
-    return next_experiment(found.system, found.rivals, workers or os.cpu_count() or 1, report)
+    return next_experiment(found.system, found.rivals, _number(workers), report)
 
 
 def distance(
@@ -363,5 +388,5 @@ def distance(
     InputError
         If the system does not say how it stops, or a recording holds no stop.
     """
-    number = workers or os.cpu_count() or 1
-    return distance_of_stop(system, stops, asked or {}, effort or Effort(), number, report)
+    rest = (effort or Effort(), _number(workers), report)
+    return distance_of_stop(system, stops, asked or {}, *rest)

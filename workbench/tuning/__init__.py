@@ -6,7 +6,7 @@ Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential e
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
-from workbench.tuning.recipe import Problem, Progress, Tuned, pose, tunable, tune
+from workbench.tuning.recipe import Lines, Problem, Progress, Tuned, pose, tunable, tune
 from workbench.tuning.search import Plan, Search, search
 from workbench.tuning.summary import summarise_tuning, tuned_gains
 from workbench.tuning.validation import (
@@ -27,6 +27,7 @@ __all__ = [
     "Fold",
     "Generation",
     "Job",
+    "Lines",
     "NoWorkersError",
     "Plan",
     "Problem",

@@ -1,7 +1,8 @@
 """A tuning from a model and recorded cases to gains, and to what they are worth."""
 
 import platform
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -130,6 +131,23 @@ class Progress:
 
     def warn(self, message: str) -> None:
         """Something went wrong that the search survives."""
+
+
+class Lines(Progress):
+    """A line on each generation, with the time left."""
+
+    def __init__(self, plan: Plan, report: Callable[[str], None]) -> None:
+        self._plan, self._report, self._begin = plan, report, time.perf_counter()
+
+    def evolved(self, history: Sequence[Generation]) -> None:
+        """See Progress."""
+        done, most = len(history), self._plan.generations
+        left = (time.perf_counter() - self._begin) / done * (most + 1 - done)
+        self._report(f"[{done - 1:>3}/{most}] z {history[-1].z:.5f}, at most {left:.0f} s left")
+
+    def warn(self, message: str) -> None:
+        """See Progress."""
+        self._report(f"warning: {message}")
 
 
 def pose(
