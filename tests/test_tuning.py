@@ -15,6 +15,7 @@ from workbench.fmu import FMU
 from workbench.objective import score
 from workbench.observers import estimators
 from workbench.observers.disturbance import DisturbanceObserver
+from workbench.observers.gains_file import usual_gains
 from workbench.pool import Pool
 from workbench.system import System
 from workbench.systems import open_model
@@ -28,6 +29,7 @@ from workbench.tuning import (
     cross_validate,
     evaluate_all,
     evaluate_gains,
+    pose,
     recording,
     search,
     sensitivities,
@@ -204,3 +206,35 @@ def test_a_gain_without_effect_does_not_matter(
     matters = {e.gain: e.matters for e in sensitivities(pool, job, space, found)}
     assert matters["L42"]
     assert not matters["T_muWR"]
+
+
+# --- what gains are judged by ---
+
+
+def test_without_a_load_cell_gains_are_judged_as_with_one(
+    system: System,
+    stop_beginnings: list[Case],
+    inline: Callable[[Job], Pool[Evaluator]],
+) -> None:
+    """What a sensor and the smoother differ by is added to every z: what gains change is alike.
+
+    3e-3 is a mean of 3 N, of forces of 10 kN; the observer gains up to 42 N by being tuned.
+    """
+    name = "disturbance_observer"
+    measured = pose(system, name, stop_beginnings, {}).job
+    blind = [case.without(["Fx"]) for case in stop_beginnings]
+    estimated = pose(system, name, blind, {}, "smoother").job
+    with open_model(system) as fmu:
+        tuned = usual_gains(estimators(system)[name], fmu, system).values
+    candidates = [measured.gains.values, tuned]
+    z = [evaluate_gains(inline(job), job, candidates) for job in (measured, estimated)]
+    by_cell, by_smoother = (after - before for before, after in z)
+    assert_allclose(by_smoother, by_cell, rtol=0.0, atol=3e-3)
+    assert by_cell.min() < -0.03
+
+
+def test_what_is_judged_by_must_know_the_whole_recording(
+    system: System, stop_beginnings: list[Case]
+) -> None:
+    with pytest.raises(InputError, match=r"knows whole recordings.* expected one of smoother"):
+        pose(system, "disturbance_observer", stop_beginnings, {}, "ekf")

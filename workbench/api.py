@@ -202,6 +202,7 @@ def tune(
     generations: int = 100,
     population: int = 15,
     seed: int = 1,
+    reference: str | None = None,
     workers: int | None = None,
     report: Callable[[str], None] = print,
 ) -> Tuned | None:
@@ -210,6 +211,7 @@ def tune(
     Parameters
     ----------
     population : candidates per gain.
+    reference : estimator to judge by where no sensor does, "smoother"; by what is measured if None.
     workers : processes, one per processor unless another number is given.
     report : takes a line on each generation.
 
@@ -217,7 +219,7 @@ def tune(
     -------
     Tuned, or None if it was interrupted before there was anything to return.
     """
-    problem = pose(system, estimator, cases)
+    problem = pose(system, estimator, cases, reference=reference)
     plan = Plan(generations, population, seed)
     with (
         tempfile.TemporaryDirectory(prefix="tune-") as scratch,

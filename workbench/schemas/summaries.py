@@ -93,6 +93,7 @@ def _tune() -> Schema:
             "cases": listed(TEXT),
             "scale_errors": by_name(NUMBER),
             "weights": by_name(NUMBER),
+            "reference": TEXT,
             "seed": WHOLE,
             "population": WHOLE,
         }

@@ -1,0 +1,51 @@
+"""What recordings are judged by where no sensor measures it: an estimate that knows all of them."""
+
+from collections.abc import Sequence
+
+from workbench.case import Case
+from workbench.cosim import Ending, replay
+from workbench.errors import InputError, closest
+from workbench.observers import estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.system import System
+from workbench.systems import open_model
+
+
+def with_reference(cases: Sequence[Case], system: System, estimator: str) -> list[Case]:
+    """Recordings with the estimate of what is judged in the place of its measurement.
+
+    Machines in service lack sensors that a rig has. Measured outputs of the model stay.
+
+    Parameters
+    ----------
+    estimator : name of one that knows whole recordings; any other would be judged by its like.
+
+    Raises
+    ------
+    InputError
+        If there is no such estimator, or it fails.
+    """
+    known = {name: kind for name, kind in estimators(system).items() if kind.offline}
+    if estimator not in known:
+        raise InputError(
+            where=f"reference '{estimator}'",
+            found=f"no estimator of this name that knows whole recordings"
+            f"{closest(estimator, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    kind = known[estimator]
+    found = []
+    with open_model(system, kind.role) as fmu:
+        for case in cases:
+            run = replay(case, kind(fmu, system, usual_gains(kind, fmu, system)))
+            if run.ending is not Ending.OK:
+                raise InputError(
+                    where=str(case.source),
+                    found=f"{estimator}: {run.ending.value} {run.message}".strip(),
+                    expected="an estimate to judge by",
+                    remedy="leave this case out of the tuning with --cases",
+                )
+            judged = [name for name in system.objective.weights if name not in case.outputs]
+            found.append(case.with_signals({name: run.signal(name) for name in judged}))
+    return found
