@@ -51,10 +51,10 @@ PUBLISHED = Published(
     source="P. Bacher, H. Madsen, Identifying suitable models for the heat dynamics of buildings, "
     "Energy and Buildings 43 (2011), 1511-1522; record of the examples of CTSM-R, "
     "https://ctsm.info; also in https://github.com/Nilavro/BSSPy, data",
-    licence="none stated; free for teaching",
-    recordings="One record of 1691 samples, 5 minutes apart, February 2009: temperatures inside and "
-    "outside, irradiance, power of the heaters. The first 96 hours are to be fitted, the 45 hours "
-    "that follow are held out.",
+    licence="none stated; an example for teaching",
+    recordings="One record of 1691 samples, 5 minutes apart, February 2009: temperatures inside "
+    "and outside, irradiance, power of the heaters. The first 96 hours are to be fitted, the 45 "
+    "hours that follow are held out.",
     layouts=(
         Layout(
             "as in BSSPy",
