@@ -17,7 +17,7 @@ from workbench.recording import Vector
 from workbench.systems import load_system
 
 SETTLED, FITTED = 144, 1152  # samples, 12 and 96 hours
-# Ci, Ce, Ch, Cs [kWh/K], Rie, Rea, Rih, Ris [K/kW], Aw, Ae [m2] of model TiTeThTsAe, table 2.
+# Ci, Ce, Ch, Cs [kWh/K], Rie, Rea, Rih, Ris [K/kW], Aw, Ae [m2] of model TiTeThTsAe, as published.
 PARAMETERS = (0.0928, 3.32, 0.889, 0.0549, 0.897, 4.38, 0.146, 1.89, 5.75, 3.87)
 
 

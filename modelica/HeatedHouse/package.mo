@@ -4,7 +4,7 @@ package HeatedHouse "An office of light wood whose heaters are switched at rando
     version="1.0",
     uses(Effects(version="1.0")),
     Documentation(info="<html>
-<p>FlexHouse, an office of 120 m2 at Risoe in Denmark, empty for six days of February while electric heaters
+<p>FlexHouse, an office of light wood at Risoe in Denmark, empty for six days of February while electric heaters
 were switched at random: P. Bacher, H. Madsen, <em>Identifying suitable models for the heat dynamics of
 buildings</em>, Energy and Buildings 43 (2011), 1511-1522.</p>
 <h4>Published causes</h4>
