@@ -1,0 +1,3 @@
+within HeatedHouse;
+package Interfaces "Partial models by which slots are constrained"
+end Interfaces;
