@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 
 _FILE = "inputPRBS1.csv"
 _FITTED = 1152  # samples of 5 minutes, 96 hours
 _ZERO = 273.15  # [K], of the scale of Celsius
 
 
-def _read(folder: Path) -> list[Recording]:
+def _read(folder: Path) -> list[PublishedRecording]:
     hours, outside, sun, heating, inside = np.loadtxt(
         folder / _FILE, delimiter=",", skiprows=1, usecols=range(5)
     ).T
     time = 300.0 * np.round(12.0 * hours)
 
-    def until(name: str, title: str, end: int, counts_from: float | None) -> Recording:
-        return Recording(
+    def until(name: str, title: str, end: int, counts_from: float | None) -> PublishedRecording:
+        return PublishedRecording(
             name,
             title,
             {
@@ -56,7 +56,7 @@ PUBLISHED = Published(
     "and outside, irradiance, power of the heaters. The first 96 hours are to be fitted, the 45 "
     "hours that follow are held out.",
     layouts=(
-        Layout(
+        FolderLayout(
             "as in BSSPy",
             {_FILE: "291c04d42b5ef234606c17d39aea6153704af7e12ef0698e8e4bda9fab6bf2eb"},
             _read,
