@@ -21,7 +21,7 @@ from workbench.case import Case, check_recording, read_only
 from workbench.case import read_cases as read_folders
 from workbench.conditions import read_conditions
 from workbench.cosim import Run, replay
-from workbench.diagnosis import Outcome, choose, read_effects
+from workbench.diagnosis import Outcome, catalogue, choose
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
 from workbench.experiments import NextStop
@@ -39,7 +39,7 @@ from workbench.plausibility import Origin, doubts
 from workbench.prepare import read_recorded, write_cases
 from workbench.recording import header
 from workbench.stopping import Distance, Effort, distance_of_stop
-from workbench.system import OBSERVER, System
+from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.tables import Table
 from workbench.tuning import Generation, Plan, Progress, Tuned, evaluators, pose
@@ -268,7 +268,7 @@ def diagnose(
         If recordings or library cannot be used.
     """
     library = read_library(system.library)
-    chosen = choose(effects, read_effects(library, system.models[OBSERVER].name))
+    chosen = choose(effects, catalogue(system, library))
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="diagnosis-"))
     number = workers or os.cpu_count() or 1
     return diagnose_system(
