@@ -64,7 +64,9 @@ def read_loggers(table: Table, signals: Sequence[str]) -> dict[str, tuple[str, .
         if not logger.isidentifier() or not own:
             raise InputError(
                 where=f"{table.where} {logger}",
-                found="no signal" if logger.isidentifier() else f"'{logger}', a name of no one word",
+                found="no signal"
+                if logger.isidentifier()
+                else f"'{logger}', a name of no one word",
                 expected="a name of letters and digits, and the measured signals of this logger",
                 remedy=f'write for instance second = ["{signals[0]}"]',
             )

@@ -168,7 +168,9 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         settles=file.table("points").number("settles", "s", 10.0),
         sample_time=file.number("sample_time", "s"),
         sampling=read_sampling(file.table("sampling")),
-        loggers=read_loggers(file.table("loggers"), [n.name for own in groups.values() for n in own]),
+        loggers=read_loggers(
+            file.table("loggers"), [n.name for own in groups.values() for n in own]
+        ),
     )
 
 

@@ -310,7 +310,10 @@ def _observers(
     counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
     sizes = diagnosis.best.point.sizes
     late = lateness(system, {f"{name}.{of}": size for (name, of), size in sizes.items()})
-    after = (with_model(system, OBSERVER, extension.fmu), [case_in_time(one, late) for one in cases])
+    after = (
+        with_model(system, OBSERVER, extension.fmu),
+        [case_in_time(one, late) for one in cases],
+    )
     for one, recorded in ((system, cases), after):
         with open_model(one) as fmu:
             for kind in (kind for kind in _TRIED if kind.name in gains):

@@ -1,8 +1,8 @@
 """Clocks of loggers: signals that one logger records are late together, against all others.
 
-A clock is no matter of the model. Inputs drive it as of the time when they acted, what it says of an
-output is read as late as the logger reads it, and a motion that is led follows what was measured
-when it was.
+A clock is no matter of the model. Inputs drive it as of the time when they acted, what it says of
+an output is read as late as its logger reads it, and a motion that is led follows what was measured
+at that time.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
 from workbench.system import OBSERVER, System
 
-KIND, SKEW = "LoggerTimeSkew", "skew"
+KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
 # Of a sample time: a logger that scans five channels one after another has them as far apart.
 _MATTERS = 0.2
 
@@ -35,25 +35,32 @@ def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
 
 
 def clocks(system: System) -> tuple[Effect, ...]:
-    """Clocks that may be late against that of the other signals."""
-    return tuple(
-        Effect(
-            name=f"{KIND}[{logger}]",
-            model=KIND,
-            slots=(),
-            size=SKEW,
-            matters=_MATTERS * system.sample_time,
-            text=f"a logger of {_listed(signals)} whose clock is late",
-            separation="one signal that both loggers record",
-            late=signals,
-        )
-        for logger, signals in system.clocks.items()
+    """Clocks of loggers that may be late against that of the other signals."""
+    return tuple(_clock(system, KIND, *one) for one in system.clocks.items())
+
+
+def own_clocks(system: System) -> tuple[Effect, ...]:
+    """A clock of each signal, against that of the first output, whatever the loggers."""
+    others = [name for name in system.signals if name != system.outputs[0].name]
+    return tuple(_clock(system, OWN, name, (name,)) for name in others)
+
+
+def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
+    return Effect(
+        name=f"{kind}[{name}]",
+        model=kind,
+        slots=(),
+        size=SKEW,
+        matters=_MATTERS * system.sample_time,
+        text=f"a logger of {listed(signals)} whose clock is late",
+        separation="one signal that both loggers record",
+        late=signals,
     )
 
 
 def late_signals(system: System) -> dict[str, tuple[str, ...]]:
     """Signals that are late together, by the name of what says by how much [s]."""
-    return {variables(one, SKEW)[0]: one.late for one in clocks(system)}
+    return {variables(one, SKEW)[0]: one.late for one in (*clocks(system), *own_clocks(system))}
 
 
 def lateness(system: System, values: Mapping[str, float]) -> dict[str, float]:
@@ -63,12 +70,11 @@ def lateness(system: System, values: Mapping[str, float]) -> dict[str, float]:
     ----------
     values : by name, see `late_signals`; others are zero.
     """
-    return {
-        signal: values[name]
-        for name, signals in late_signals(system).items()
-        for signal in signals
-        if values.get(name, 0.0) != 0.0
-    }
+    late: dict[str, float] = {}
+    for name, signals in late_signals(system).items():
+        for signal in signals if values.get(name, 0.0) != 0.0 else ():
+            late[signal] = late.get(signal, 0.0) + values[name]
+    return late
 
 
 def moved(time: Vector, values: Matrix, late: float) -> Matrix:
@@ -105,10 +111,10 @@ def case_in_time(case: Case, late: Mapping[str, float]) -> Case:
     )
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def listed(names: tuple[str, ...]) -> str:
     """Names in a sentence.
 
-    >>> _listed(("a", "b", "c")), _listed(("a",))
+    >>> listed(("a", "b", "c")), listed(("a",))
     ('a, b and c', 'a')
     """
     return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)

@@ -81,7 +81,7 @@ class Simulations:
             self._motion = motion(fmu, system)
         for name in late_signals(system):
             self.units[name] = "s"
-            # Beyond, it would be no small change: a block is short against all that the machine does.
+            # A small change: a block is short against all that the machine does.
             self.bounds[name] = (-system.comparison.block, system.comparison.block)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         self._sound, self._workers = sound, min(workers, len(cases))
