@@ -16,7 +16,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import Diagnosis, Outcome, diagnose, read_effects
+from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
@@ -32,7 +32,7 @@ from .recordings import record
 ROOT = Path(__file__).parent.parent
 SYSTEM = load_system("wheelset")
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
-EFFECTS = read_effects(LIBRARY, "MinimalObserver")
+EFFECTS = catalogue(SYSTEM, LIBRARY)
 LABELLED = ROOT.parent / "shared" / "recordings" / "labelled"
 
 # Three stops: two directions, two pressures, three speeds of order one.
@@ -63,7 +63,7 @@ PLANTED = {
     "apex_offset": ("ApexOffset", "offset", 1e-3),
     "speed_delay": ("SpeedSignalDelay", "delay", 0.008),
     "pole_ring": ("PoleRingEccentricity", "amplitude", 1e-3),
-    "time_skew": ("LoggerTimeSkew", "skew", 0.025),
+    "time_skew": ("LoggerTimeSkew[speeds]", "skew", 0.025),
     "roller_radius": ("RollerRadius", "delta", -5e-4),
 }
 # One each of pads, cylinders, contact, losses, sensors and what turns; all of them take minutes.
@@ -90,10 +90,11 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
-    def run(cases: Sequence[Case]) -> Diagnosis:
+    def run(cases: Sequence[Case], system: System = SYSTEM) -> Diagnosis:
+        effects = catalogue(system, LIBRARY)
         # Alone: the tests themselves run side by side.
-        with Simulations(everything, SYSTEM, {}, cases, 1) as simulations:
-            return conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
+        with Simulations(everything, system, {}, cases, 1) as simulations:
+            return conclude(Fit(simulations, effects), effects, lambda _: None)
 
     return run
 
@@ -191,6 +192,44 @@ def test_fade_is_found_without_a_measured_force(
     cases = recorded(tmp_path, Effects(fade=5e-4), 12)
     found = diagnosed([case.without(["Fx"]) for case in cases])
     assert [cause.effect.name for cause in found.causes] == ["BrakeFade"]
+
+
+# Signals that the rig's loggers may have late, by the name that the rig gives that.
+LATE = {"pB": "late_pB", "tauR": "late_tauR", "omegaR": "late_omegaR", "Fx": "late_Fx"}
+
+
+@pytest.mark.parametrize(
+    "signals", [("pB", "Fx"), pytest.param(("pB",), marks=pytest.mark.long)], ids="-".join
+)
+def test_a_late_logger_is_named_whatever_it_records(
+    signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
+) -> None:
+    cases = recorded(tmp_path, Effects(**{LATE[name]: 0.025 for name in signals}), 700)
+    found = diagnosed(cases, replace(SYSTEM, loggers={"second": signals}))
+    assert [cause.effect.name for cause in found.causes] == ["LoggerTimeSkew[second]"]
+    skew = found.causes[0].parameters["skew"]
+    assert skew.low <= 0.025 <= skew.high
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        ("pB", "Fx"),
+        *(pytest.param((name,), marks=pytest.mark.long) for name in LATE),
+    ],
+    ids="-".join,
+)
+def test_a_late_logger_that_nobody_declared_is_no_other_cause(
+    signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
+) -> None:
+    """The clock of the speeds that the system file has would be 49 ms early, and explains less."""
+    cases = recorded(tmp_path, Effects(**{LATE[name]: 0.012 for name in signals}), 700)
+    found = diagnosed(cases)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert found.late is not None
+    assert found.late.signals == signals
+    # What the multibody model has besides is as large as a half of what matters, 1 ms.
+    assert abs(found.late.skew - 0.012) < 1.96 * found.late.sigma + 5e-4
 
 
 @pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"friction_ripple", "drive_beat"}))

@@ -21,7 +21,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import Outcome, diagnose, read_effects
+from workbench.diagnosis import Outcome, catalogue, diagnose
 from workbench.errors import InputError
 from workbench.fmu import FMU
 from workbench.modelica import read_library
@@ -251,7 +251,7 @@ def diagnosed(
 
 def diagnosis(system: System, cases: list[Case], out: Path) -> Outcome:
     library = read_library(system.library)
-    effects = read_effects(library, "Observer")
+    effects = catalogue(system, library)
     return diagnose(system, cases, library, effects, out, 1, lambda _: None)
 
 
@@ -281,6 +281,32 @@ def test_wind_that_the_library_lacks_is_unexplained(diagnosed: Diagnosed) -> Non
     outcome, _ = diagnosed(gusts)
     assert outcome.diagnosis.verdict == "unexplained"
     assert outcome.diagnosis.causes == ()
+
+
+def test_a_logger_of_the_system_file_that_is_late_is_named(fan: System, tmp_path: Path) -> None:
+    """Without a line of Python or Modelica, and neither recording nor model has that clock."""
+    (tmp_path / "package.mo").write_text(LIBRARY)
+    (tmp_path / "system.toml").write_text(f'{SYSTEM}\n[loggers]\nsupply = ["u"]\n')
+    late = 3  # samples
+    cases = [
+        one.with_signals({"u": np.concatenate([np.full(late, one["u"][0]), one["u"][:-late]])})
+        for one in recorded(tmp_path / "recordings", fan, nothing)
+    ]
+    outcome = diagnosis(load_system(tmp_path), cases, tmp_path / "results")
+    (cause,) = outcome.diagnosis.causes
+    assert (cause.effect.name, cause.effect.text) == (
+        "LoggerTimeSkew[supply]",
+        "a logger of u whose clock is late",
+    )
+    skew = cause.parameters["skew"]
+    assert skew.low <= late * STEP <= skew.high
+    assert skew.high - skew.low < STEP
+    assert outcome.extension is not None
+    assert outcome.extension.difference < 1e-3
+    # Nobody declared it: it is said, and no other cause is made of it.
+    undeclared = diagnosis(fan, cases, tmp_path / "undeclared")
+    assert undeclared.diagnosis.verdict == "unexplained"
+    assert "late by" in undeclared.sentence
 
 
 def test_drag_that_differs_by_nature_is_a_level_and_no_cause(diagnosed: Diagnosed) -> None:

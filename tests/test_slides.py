@@ -10,7 +10,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import Diagnosis, read_effects
+from workbench.diagnosis import Diagnosis, catalogue
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
@@ -32,7 +32,7 @@ ROOT = Path(__file__).parent.parent
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
 SYSTEM = load_system("wheelset")
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
-EFFECTS = read_effects(LIBRARY, "MinimalObserver")
+EFFECTS = catalogue(SYSTEM, LIBRARY)
 WET = {"muWR": 0.2, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
 SLIDES = ("18_slide_160_4.8", "20_slide_120_4.6_rev", "21_slide_120_4.9")
 

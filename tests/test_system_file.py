@@ -76,6 +76,30 @@ MISTAKES = {
         ('is = "rR*omegaR", unit', 'is = "rR*", unit'),
         r"\[derived\] speed is: found 'rR\*'; expected numbers, names",
     ),
+    "logger of a signal that there is none of": (
+        ('speeds = ["omegaW", "omegaR"]', 'speeds = ["omegaW", "omegar"]'),
+        r"\[loggers\] speeds: found 'omegar' \(closest: 'omegaR'\); expected measured signals",
+    ),
+    "signal of two loggers": (
+        ('speeds = ["omegaW", "omegaR"]', 'speeds = ["omegaW", "omegaR"]\nrest = ["pB", "omegaW"]'),
+        r"\[loggers\] rest: found 'omegaW' a second time, after that of speeds; .* name it once",
+    ),
+    "signal twice of one logger": (
+        ('speeds = ["omegaW", "omegaR"]', 'speeds = ["omegaW", "omegaW"]'),
+        r"\[loggers\] speeds: found 'omegaW' a second time, after that of speeds",
+    ),
+    "logger of nothing": (
+        ('speeds = ["omegaW", "omegaR"]', "speeds = []"),
+        r"\[loggers\] speeds: found no signal; expected .* To do: write for instance second",
+    ),
+    "logger that is no list": (
+        ('speeds = ["omegaW", "omegaR"]', 'speeds = "omegaW"'),
+        r"\[loggers\] speeds: found 'omegaW'; expected a list",
+    ),
+    "logger without a name": (
+        ("speeds = [", '"both speeds" = ['),
+        r"\[loggers\] both speeds: found 'both speeds', a name of no one word",
+    ),
     "parameters of a choice that there is none of": (
         ("\nwet = { muWR = 0.28", "\nicy = { muWR = 0.28"),
         r"parameters icy: .* expected one of dry, wet",
@@ -284,3 +308,19 @@ def test_every_key_that_is_read_stands_in_the_documentation() -> None:
     spans = re.findall(r"`([^`]+)`", prose)
     documented = {word for span in spans for word in re.findall(r"[a-z_]+", span)}
     assert read <= documented, read - documented
+
+
+@pytest.mark.parametrize(
+    ("loggers", "late"),
+    [
+        ('first = ["pB", "Fx"]', {"first"}),  # against that of all others
+        ('a = ["pB", "Fx"]\nb = ["tauR"]', {"a", "b"}),
+        ('a = ["pB", "Fx"]\nb = ["tauR", "omegaR", "omegaW"]', {"b"}),  # against that of a
+        ('a = ["pB", "tauR", "omegaW", "omegaR", "Fx"]', set()),
+    ],
+)
+def test_clocks_of_all_loggers_but_one_may_be_late(
+    loggers: str, late: set[str], tmp_path: Path
+) -> None:
+    path = changed(tmp_path, ('speeds = ["omegaW", "omegaR"]', loggers))
+    assert set(read_system(path).clocks) == late

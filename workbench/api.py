@@ -20,7 +20,7 @@ from workbench.case import Case, check_recording, read_only
 from workbench.case import read_cases as read_folders
 from workbench.conditions import read_conditions
 from workbench.cosim import Run, replay
-from workbench.diagnosis import Effect, Outcome, choose, read_effects
+from workbench.diagnosis import Effect, Outcome, catalogue, choose
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
 from workbench.experiments import NextStop
@@ -40,7 +40,7 @@ from workbench.proposing import Proposal, needs_law
 from workbench.proposing import propose as propose_law
 from workbench.recording import header
 from workbench.stopping import Distance, Effort, distance_of_stop
-from workbench.system import OBSERVER, System
+from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.tables import Table
 from workbench.tuning import Lines, Plan, Tuned, evaluators, pose
@@ -260,7 +260,7 @@ def diagnose(
 
 def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:
     library = read_library(system.library)
-    return library, choose(effects, read_effects(library, system.models[OBSERVER].name))
+    return library, choose(effects, catalogue(system, library))
 
 
 def _folder(out: str | Path | None, kind: str) -> Path:

@@ -1,7 +1,9 @@
 """Tables of `system.toml` on what a recording may be, one reader each."""
 
 import math
+from collections.abc import Sequence
 
+from workbench.errors import InputError, closest
 from workbench.expression import Expression
 from workbench.system import System
 from workbench.system_parts import Cutting, Redundancy, Sampling, Store
@@ -52,3 +54,35 @@ def read_sampling(table: Table) -> Sampling:
     if likely > possible:
         raise table.wrong("gaps", "the longest likely time before the longest possible one")
     return Sampling(table.number("slowest", "s", math.inf), likely, possible)
+
+
+def read_loggers(table: Table, signals: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Measured signals by the logger that records them."""
+    found: dict[str, tuple[str, ...]] = {}
+    for logger in table.content:
+        own = table.texts(logger)
+        if not logger.isidentifier() or not own:
+            raise InputError(
+                where=f"{table.where} {logger}",
+                found="no signal"
+                if logger.isidentifier()
+                else f"'{logger}', a name of no one word",
+                expected="a name of letters and digits, and the measured signals of this logger",
+                remedy=f'write for instance second = ["{signals[0]}"]',
+            )
+        for k, name in enumerate(own):
+            taken = next((other for other, names in found.items() if name in names), "")
+            if name not in signals:
+                problem = f"'{name}'{closest(name, signals)}"
+            elif taken or name in own[:k]:
+                problem = f"'{name}' a second time, after that of {taken or logger}"
+            else:
+                continue
+            raise InputError(
+                where=f"{table.where} {logger}",
+                found=problem,
+                expected=f"measured signals, each of one logger: {', '.join(signals)}",
+                remedy="correct the name" if name not in signals else "name it once",
+            )
+        found[logger] = own
+    return found

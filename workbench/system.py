@@ -113,6 +113,7 @@ class System:
     cases : folder of recordings that come with the system, or None.
     experiments : what may be run next, or None where nobody said so.
     work : powers of friction by what they wear, in measured signals and parameters [W].
+    loggers : measured signals by the logger that records them; others share one more.
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -158,6 +159,17 @@ class System:
     cutting: Cutting | None = None
     stopping: Stopping | None = None
     work: tuple[Derived, ...] = ()
+    loggers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def clocks(self) -> dict[str, tuple[str, ...]]:
+        """Loggers but one, against whose clock theirs may be late: that of all other signals.
+
+        Where there are no others, it is the first logger's.
+        """
+        named = [name for own in self.loggers.values() for name in own]
+        first = 0 if set(self.signals) - set(named) else 1
+        return dict(list(self.loggers.items())[first:])
 
     @property
     def signals(self) -> dict[str, Signal]:

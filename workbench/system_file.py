@@ -9,7 +9,7 @@ from workbench.description import Description, read_description
 from workbench.distance_tables import read_stopping
 from workbench.errors import InputError
 from workbench.experiment_tables import read_experiments
-from workbench.recording_tables import read_cutting, read_redundancy, read_sampling
+from workbench.recording_tables import read_cutting, read_loggers, read_redundancy, read_sampling
 from workbench.system import OBSERVER, System
 from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
@@ -46,7 +46,8 @@ def read_system(path: Path) -> System:
     file.refuse_unknown(
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
-        "export shortest fewest sample_time cases sampling redundancies next cutting distance work"
+        "export shortest fewest sample_time cases sampling redundancies next cutting distance work "
+        "loggers"
     )
     return _read(file, path, _models(file, path))
 
@@ -167,6 +168,9 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         settles=file.table("points").number("settles", "s", 10.0),
         sample_time=file.number("sample_time", "s"),
         sampling=read_sampling(file.table("sampling")),
+        loggers=read_loggers(
+            file.table("loggers"), [n.name for own in groups.values() for n in own]
+        ),
     )
 
 

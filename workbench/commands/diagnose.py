@@ -11,7 +11,7 @@ from workbench.case import Case
 from workbench.commands.extras import require_compiler
 from workbench.commands.inputs import given_cases
 from workbench.commands.output import Done, Output, read_result
-from workbench.diagnosis import Effect, Outcome, choose, diagnose, read_effects
+from workbench.diagnosis import Effect, Outcome, catalogue, choose, diagnose
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import Library, read_library
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     if options.fmu is not None:
         system = with_model(system, OBSERVER, options.fmu)
     library = read_library(system.library)
-    effects = choose(options.effects, read_effects(library, system.models[OBSERVER].name))
+    effects = choose(options.effects, catalogue(system, library))
     if options.list:
         output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return Done({"effects": [{"name": one.name, "text": one.text} for one in effects]})

@@ -9,7 +9,7 @@ from typing import Any
 from workbench.commands.extras import require_compiler
 from workbench.commands.monitor_fleet import provenance_of, run_fleet
 from workbench.commands.output import Done, Output, read_result
-from workbench.diagnosis import diagnose, read_effects
+from workbench.diagnosis import catalogue, diagnose
 from workbench.errors import InputError
 from workbench.files import claimed
 from workbench.modelica import read_library
@@ -18,7 +18,6 @@ from workbench.monitoring.cause import known_from_before, recordings_after
 from workbench.prepare import read_recorded
 from workbench.report.diagnosis import write_diagnosis
 from workbench.report.monitoring import write_monitored
-from workbench.system import OBSERVER
 from workbench.systems import load_system
 
 
@@ -65,7 +64,7 @@ def _cause(
     """Diagnose what has changed; returns the summary of the diagnosis."""
     system, out = known_from_before(found), options.out / "cause"
     library = read_library(system.library)
-    effects = read_effects(library, system.models[OBSERVER].name)
+    effects = catalogue(system, library)
     names = recordings_after(found)
     output.stage(f"cause of the change, from {', '.join(names)}")
     cases = [read_recorded(Path(options.history) / name, system) for name in names]

@@ -16,6 +16,7 @@ import numpy as np
 from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
+from workbench.diagnosis.clocks import case_in_time, catalogue, late_signals, lateness
 from workbench.diagnosis.counting import refuse_too_few
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, parameter_of, source
@@ -50,6 +51,7 @@ __all__ = [
     "Interval",
     "Outcome",
     "Residuals",
+    "catalogue",
     "choose",
     "diagnose",
     "given_values",
@@ -225,13 +227,14 @@ def _extend(
     report("compiling the extended model")
     system, base = simulations.system, simulations.system.models[OBSERVER].name
     values = _values(simulations, diagnosis, effects)
-    present = [effect for effect in effects if effect.name in values]
+    present = [effect for effect in effects if effect.name in values and not effect.late]
     own = {name: value for name, value in simulations.given.items() if "." not in name}
     own |= _usual_levels(simulations, diagnosis)
     arrays = {name.partition("[")[0] for name in own if "[" in name}
     every = {n: v for n, v in simulations.nominal.items() if n.partition("[")[0] in arrays}
     own = {**every, **own}
-    about = f"{base} with {', '.join(effect.name for effect in present)}"
+    added = ", ".join(effect.name for effect in present) or "calibrated levels"
+    about = f"{base} with {added}"
     text = source(library, base, EXTENDED, present, values, own, about)
     folder = out / "model"
     folder.mkdir(parents=True, exist_ok=True)
@@ -239,13 +242,13 @@ def _extend(
     write_whole(modelica, text)
     build(library, EXTENDED, text, path, every_platform=every_platform)
     point, difference = diagnosis.best.point, 0.0
-    delays = {delay(name) for name in system.signals}
+    read = {*(delay(name) for name in system.signals), *late_signals(system)}
     with simulating(simulations.simulated._replace(path=path, system=system)) as extended:
         for k, evidence in enumerate(diagnosis.best.linearised.evidence):
             known = {
                 name: value
                 for name, value in fit.unknowns.values(point)[k].items()
-                if name in extended.parameters or name in delays
+                if name in extended.parameters or name in read
             }
             errors = extended.at(k, known).errors
             difference = max(difference, float(np.abs(errors - evidence.errors).max()))
@@ -305,12 +308,18 @@ def _observers(
                 report(f"no {kind.label}: {refused.found}")
     errors: dict[str, dict[str, list[float]]] = {}
     counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
-    for one in (system, with_model(system, OBSERVER, extension.fmu)):
+    sizes = diagnosis.best.point.sizes
+    late = lateness(system, {f"{name}.{of}": size for (name, of), size in sizes.items()})
+    after = (
+        with_model(system, OBSERVER, extension.fmu),
+        [case_in_time(one, late) for one in cases],
+    )
+    for one, recorded in ((system, cases), after):
         with open_model(one) as fmu:
             for kind in (kind for kind in _TRIED if kind.name in gains):
                 estimator = kind(fmu, one, gains[kind.name])
                 by_case = errors.setdefault(kind.name, {})
-                for case in cases:
+                for case in recorded:
                     error = score(case, replay(case, estimator), one).nrmse
                     by_case.setdefault(case.name, []).append(np.nan if error is None else error)
                     counted(case)

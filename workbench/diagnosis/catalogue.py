@@ -87,6 +87,7 @@ class Effect:
     where, unless, falling : which stops can show it; None if all can.
     restarted : why stops in which no state is restarted cannot show it; empty if they can.
     place, places : which of how many elements of `size`, from 1; 0 where it is no array.
+    late : measured signals of the logger that is late; the effect is then none of a model.
     """
 
     name: str
@@ -104,6 +105,7 @@ class Effect:
     restarted: str = ""
     place: int = 0
     places: int = 0
+    late: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:

@@ -14,6 +14,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from workbench.case import Case
+from workbench.diagnosis.clocks import late_signals
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.prediction import Variation
@@ -78,6 +79,10 @@ class Simulations:
                 for v in fmu.description.variables
             }
             self._motion = motion(fmu, system)
+        for name in late_signals(system):
+            self.units[name] = "s"
+            # A small change: a block is short against all that the machine does.
+            self.bounds[name] = (-system.comparison.block, system.comparison.block)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         self._sound, self._workers = sound, min(workers, len(cases))
         self.recordings = [self._ready(one, restarting=restarting) for one in cases]

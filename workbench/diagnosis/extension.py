@@ -29,7 +29,12 @@ def component(name: str) -> str:
 
 
 def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
-    """Names in the FMU of one parameter of an effect, one for each of its slots."""
+    """Names in the FMU of one parameter of an effect, one for each of its slots.
+
+    Of a logger's clock, which no FMU has, its own name.
+    """
+    if effect.late:
+        return (f"{effect.name}.{parameter}",)
     element = f"[{effect.place}]" if effect.place else ""
     return tuple(f"{slot}.{component(effect.kind)}.{parameter}{element}" for slot in effect.slots)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
+from workbench.diagnosis.clocks import own_clocks
 from workbench.diagnosis.evidence import Item, Result, Simulations
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.linearised import Linearised, Point, between, lasting, slowness
@@ -73,6 +74,25 @@ class Fit:
         """The same without one part of a single recording."""
         other = copy(self)
         other._hidden = self.blocks_of(part)
+        return other
+
+    @property
+    def reference(self) -> str:
+        """The signal against which clocks of others are late."""
+        return self._simulations.recordings[0].signals[0]
+
+    @property
+    def own_clocks(self) -> tuple[Effect, ...]:
+        """A clock of each recorded signal but the reference, whatever the loggers."""
+        one = self._simulations.recordings[0]
+        every = own_clocks(self._simulations.system)
+        return tuple(clock for clock in every if {*clock.late} <= {*one.inputs, *one.signals})
+
+    def beside(self, effects: Sequence[Effect]) -> "Fit":
+        """The same with more effects that may be asked for."""
+        other = copy(self)
+        other.unknowns = copy(self.unknowns)
+        other.unknowns.effects = {**self.unknowns.effects, **{one.name: one for one in effects}}
         return other
 
     def blocks_of(self, part: int) -> slice:

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
+from workbench.diagnosis.clocks import listed
 from workbench.diagnosis.counting import FAULTY, MISSING
 from workbench.diagnosis.residuals import Dependence, Residuals
 from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.sample_errors import Errors
 from workbench.diagnosis.search import Step
+from workbench.diagnosis.timing import Late
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
@@ -122,7 +124,9 @@ class Outcome:
         )
 
     def _unexplained(self) -> str:
-        partial = self.diagnosis.partial
+        partial, late = self.diagnosis.partial, self.diagnosis.late
+        if late is not None:
+            return f"Something is missing that clocks explain: {_late(late)}."
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
         strongest = max(self.dependences, key=lambda one: one.after)
         goes = f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
@@ -193,6 +197,7 @@ class Outcome:
             "gain": None if found.gain is None else self._gain(found.gain),
             "model": _model(self.extension),
             "partial": list(found.partial),
+            "late": None if found.late is None else asdict(found.late),
             "lasting_errors": self._lasting_errors(),
             "dependences": [
                 {
@@ -301,6 +306,18 @@ class Outcome:
             channel.name: {"before": float(b), "after": float(a)}
             for channel, b, a in zip(self.channels, before, after, strict=True)
         }
+
+
+def _late(late: Late) -> str:
+    """Signals that are late, and what to do, for people."""
+    if not late.signals:
+        return "several signals are late by different times; say in [loggers] which share a logger"
+    reach = 1.96 * late.sigma
+    size = with_interval(late.skew, late.skew - reach, late.skew + reach, "s")
+    signals = listed(late.signals)
+    return (
+        f"{signals} late by {size} against the others, which no logger of the system file has alone"
+    )
 
 
 def duration(seconds: float) -> str:

@@ -1,6 +1,6 @@
 """A model along recordings, in one process: whitened prediction errors and their derivatives."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from workbench.diagnosis.clocks import in_time, late_signals, lateness, moved
 from workbench.diagnosis.prediction import Predictor, Variation
 from workbench.diagnosis.samples import Samples
 from workbench.diagnosis.thresholds import Thresholds
@@ -69,6 +70,7 @@ class Simulator:
         }
         rest = given.system.comparison.rest
         self._rest = self._fmu.variables([rest.output]) if rest else None
+        self._clocks = late_signals(given.system)
 
     @property
     def parameters(self) -> set[str]:
@@ -83,7 +85,7 @@ class Simulator:
 
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""
-        one = self._recordings[number]
+        one = self._in_time(number, values)
         predictor = Predictor(self._fmu, self._system, one.signals, self._parts, watched)
         return predictor.along(one, self._known(values))
 
@@ -128,9 +130,12 @@ class Simulator:
         courses : (n, p) factors by which the columns act at each sample, if they change in time;
             what is read at rest does not change then.
         """
-        one, fmu = self._recordings[number], self._fmu
+        one, fmu = self._in_time(number, values), self._fmu
         jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
-        for part in _compatible(columns):
+        clocks = [j for j, column in enumerate(columns) if column.variables[0] in self._clocks]
+        if clocks:
+            jacobian[:-1, clocks] = self._by_clocks(number, values, [columns[j] for j in clocks])
+        for part in _compatible(columns, clocks):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             _, found = self._predictor.derivatives(one, self._known(values), varied, shares)
@@ -144,6 +149,24 @@ class Simulator:
                     slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
                 jacobian[-1, part] = -slopes / one.rest_noise
         return jacobian
+
+    def _by_clocks(
+        self, number: int, values: Mapping[str, float], columns: Sequence[Variation]
+    ) -> Matrix:
+        """Derivatives of the errors by the lateness of loggers, (b*c, p).
+
+        By differences over a sample: within one, a signal that is moved is a straight line.
+        """
+        step = float(np.median(np.diff(self._recordings[number].time)))
+
+        def errors(values: Mapping[str, float]) -> Matrix:
+            simulated, _ = self._simulated(number, values)
+            return self._whitened(number, self._read(number, simulated, values)).ravel()
+
+        now = errors(values)
+        names = [column.variables[0] for column in columns]
+        later = [errors({**values, name: values.get(name, 0.0) + step}) for name in names]
+        return np.column_stack([(one - now) / step for one in later])
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on each restart.
@@ -177,16 +200,20 @@ class Simulator:
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
         """Prediction errors of all samples, and the whitened error of the input at rest."""
-        one = self._recordings[number]
-        errors = self._predictor.errors(one, self._known(values))
+        one, in_time = self._recordings[number], self._in_time(number, values)
+        errors = self._predictor.errors(in_time, self._known(values)) + (one.y - in_time.y)
         if self._rest is None:
             return errors, 0.0
         return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
 
+    def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
+        """A recording as by one clock."""
+        return in_time(self._recordings[number], lateness(self._system, values))
+
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the FMU's variables."""
-        delays = {name for name, _ in self._delays.values()}
-        return {name: value for name, value in values.items() if name not in delays}
+        others = {*(name for name, _ in self._delays.values()), *self._clocks}
+        return {name: value for name, value in values.items() if name not in others}
 
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
@@ -195,12 +222,15 @@ class Simulator:
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
         """What sensors read of signals (n, c, ...), behind structures and late."""
-        one = self._recordings[number]
-        if self._delays:
+        one, late = self._recordings[number], lateness(self._system, values)
+        if self._delays or late:
             signals = signals.copy()
         for j, (name, _) in self._delays.items():
             behind = one.behind_structure(j, signals[:, j])
             signals[:, j] = behind - values[name] * np.gradient(behind, one.time, axis=0)
+        for j, name in enumerate(one.signals):
+            if name in late:
+                signals[:, j] = moved(one.time, signals[:, j], late[name])
         return signals
 
     def _whitened(self, number: int, errors: Matrix) -> Matrix:
@@ -210,10 +240,15 @@ class Simulator:
         return whitened
 
 
-def _compatible(columns: Sequence[Variation]) -> list[list[int]]:
-    """Numbers of columns that may be varied in one run: none sets what another sets otherwise."""
+def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[list[int]]:
+    """Numbers of columns that may be varied in one run: none sets what another sets otherwise.
+
+    Parameters
+    ----------
+    left : numbers of columns that are left out.
+    """
     parts: list[tuple[list[int], dict[str, float]]] = []
-    for j, column in enumerate(columns):
+    for j, column in ((j, one) for j, one in enumerate(columns) if j not in left):
         wanted = column.setting.items()
         able = (
             one for one in parts if all(one[1].get(name, value) == value for name, value in wanted)

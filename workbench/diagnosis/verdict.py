@@ -12,6 +12,7 @@ from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.search import BEGUN, Fitted, Reporter, Step, extended, misfits
 from workbench.diagnosis.selection import Selection, search, select
+from workbench.diagnosis.timing import Late, by_themselves
 from workbench.diagnosis.trial import Prospect
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
@@ -84,6 +85,8 @@ class Diagnosis:
     causes : that which alone explains most first, of equals the usual one; empty unless found.
     gain : None when nothing was extended.
     partial : effects that explain a part of what remains unexplained.
+    late : signals that are late by themselves, as the system file does not say of any logger, and
+        that explain clearly more; it is then unexplained.
     base, best : the nominal model and the last one, fitted.
     rivals : `best`, and fits that these data do not tell from it; empty unless found.
     steps : how the causes were found.
@@ -97,6 +100,7 @@ class Diagnosis:
     causes: tuple[Cause, ...]
     gain: Gain | None
     partial: tuple[str, ...]
+    late: Late | None
     base: Fitted
     best: Fitted
     rivals: tuple[Fitted, ...]
@@ -116,6 +120,11 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     explained = _share(base, best) > 1.0 - fit.decides.left
     if astray or (not clean and not (best.active and (chosen.interrupted or explained))):
         verdict = "unexplained"
+    late = None
+    if verdict != "nothing" and not astray and not chosen.interrupted:
+        report("clocks of signals by themselves")
+        late = by_themselves(fit, base, best, clean=clean)
+        verdict = verdict if late is None else "unexplained"
     causes: list[Cause] = []
     rivals: tuple[Fitted, ...] = ()
     gain = None
@@ -134,6 +143,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         causes=tuple(causes),
         gain=gain,
         partial=tuple(effect.name for effect in best.active) if not causes else (),
+        late=late,
         base=base,
         best=best,
         rivals=rivals,

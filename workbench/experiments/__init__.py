@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from workbench.case import Case
-from workbench.diagnosis import Effect, build_everything, choose, read_effects
+from workbench.diagnosis import Effect, build_everything, catalogue, choose
 from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
@@ -20,7 +20,7 @@ from workbench.experiments.outcome import NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import Prediction, predicted_cases, predictions
 from workbench.expression import Expression
 from workbench.modelica import read_library
-from workbench.system import OBSERVER, Channel, System
+from workbench.system import Channel, System
 from workbench.system_experiments import Experiments
 from workbench.system_parts import Signal
 
@@ -55,7 +55,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
             remedy="write it, see docs/next-stop.md",
         )
     library = read_library(system.library)
-    every = read_effects(library, system.models[OBSERVER].name)
+    every = catalogue(system, library)
     effects = {one.name: one for one in choose(rivals.effects, every)}
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / "AllEffects.fmu"

@@ -153,6 +153,8 @@ def _values(
             values[name] = level
     for (name, parameter), size in first.sizes.items():
         part = "cosine" if parameter == "amplitude" else parameter
+        if effects[name].late:
+            continue  # a matter of its recording, not of the model
         for variable in variables(effects[name], part):
             start = rivals.given.get(variable, 0.0) if part in effects[name].sizes else 0.0
             values[variable] = start + size

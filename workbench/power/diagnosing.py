@@ -5,12 +5,12 @@ from pathlib import Path
 
 from workbench import diagnosis
 from workbench.case import Case
-from workbench.diagnosis import Diagnosis, Effect, read_effects
+from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
-from workbench.system import OBSERVER, System
+from workbench.system import System
 
 
 def library_effects(system: System) -> tuple[Effect, ...]:
@@ -21,7 +21,7 @@ def library_effects(system: System) -> tuple[Effect, ...]:
     InputError
         If the library cannot be read.
     """
-    return read_effects(read_library(system.library), system.model(OBSERVER).name)
+    return catalogue(system, read_library(system.library))
 
 
 def build_everything(system: System, effects: Sequence[Effect], path: Path) -> None:

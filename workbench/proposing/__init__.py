@@ -42,9 +42,9 @@ _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 
 def needs_law(before: Outcome) -> bool:
-    """Whether a diagnosis leaves something to propose: unexplained, or explained by several."""
+    """Whether a diagnosis leaves a law to propose: unexplained, or explained by several."""
     found = before.diagnosis
-    return found.verdict == "unexplained" or len(found.causes) > 1
+    return found.late is None and (found.verdict == "unexplained" or len(found.causes) > 1)
 
 
 def propose(

@@ -132,6 +132,7 @@ def system_schema() -> Schema:
         "cases": NAMED,
         "sampling": closed({"slowest": QUANTITY, "gaps": PAIR}, optional="*"),
         "redundancies": listed(_redundancy(formula, level, below)),
+        "loggers": by_name(listed(TEXT)),
         "next": _experiments(formula, made, measured),
         "cutting": closed(cutting, optional="released before after"),
         "work": by_name(closed({"is": formula, "label": TEXT}, optional="label")),

@@ -65,7 +65,7 @@ PLANTABLE = (
     _one("apex_offset", "ApexOffset", sensed=True),
     _one("speed_delay", "SpeedSignalDelay", sensed=True),
     _one("pole_ring", "PoleRingEccentricity", signed=False, sensed=True),
-    _one("time_skew", "LoggerTimeSkew", sensed=True),
+    _one("time_skew", "LoggerTimeSkew[speeds]", sensed=True),
     # Sizes that disturb the balances about as much as those above.
     _one("friction_step", unit_size=0.01),
     _one("friction_ripple", unit_size=0.01),

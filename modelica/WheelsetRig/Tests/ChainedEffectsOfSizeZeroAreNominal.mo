@@ -44,9 +44,8 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
     extends Sensors.PartialSpeedSensor;
     Sensors.PoleRingEccentricity ring(u=u);
     Sensors.SpeedSignalDelay late(u=ring.y);
-    Sensors.LoggerTimeSkew logger(u=late.y);
   equation
-    y = logger.y;
+    y = late.y;
   end SpeedSensor;
 
   model ForceSensor "Chain of all errors of the load cells"
@@ -68,7 +67,7 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
       redeclare Effects.RollerInertia rollerInertia, redeclare Effects.DriveTorqueGain driveTorque,
       redeclare Adhesion adhesion, redeclare Effects.WheelsetLosses wheelsetLoss,
       redeclare Effects.RollerLosses rollerLoss, redeclare SpeedSensor speedSensorW,
-      redeclare Sensors.LoggerTimeSkew speedSensorR, redeclare ForceSensor forceSensor);
+      redeclare ForceSensor forceSensor);
   end AllEffects;
 
   constant Real tolerance(unit="1") = 1e-10 "Of the solver, as in the experiment";

@@ -13,8 +13,8 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
     wheelLoad(gain=0.1),
     creepStiffness(gain=-0.3), wheelInertia(gain=0.1), rollerInertia(gain=0.05), driveTorque(gain=0.03),
     adhesion(cleaned(gain=0.5, Er=5e4), falling(gain=-0.3)), wheelsetLoss(gain=1.0), rollerLoss(gain=1.0),
-    speedSensorW(ring(cosine=0.002), late(delay=0.01), logger(skew=0.01)),
-    speedSensorR(skew=0.01), forceSensor(gain(gain=0.01)),
+    speedSensorW(ring(cosine=0.002), late(delay=0.01)),
+    forceSensor(gain(gain=0.01)),
     pB=p, tauR=500.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
     omegaW(start=20.0*0.70/0.46), omegaR(start=20.0));
   ChainedEffectsOfSizeZeroAreNominal.AllEffects reverse(
@@ -26,8 +26,8 @@ model EffectsMirrorInReverse "Effects of usual size do the same in both directio
     wheelLoad(gain=0.1),
     creepStiffness(gain=-0.3), wheelInertia(gain=0.1), rollerInertia(gain=0.05), driveTorque(gain=0.03),
     adhesion(cleaned(gain=0.5, Er=5e4), falling(gain=-0.3)), wheelsetLoss(gain=1.0), rollerLoss(gain=1.0),
-    speedSensorW(ring(cosine=0.002), late(delay=0.01), logger(skew=0.01)),
-    speedSensorR(skew=0.01), forceSensor(gain(gain=0.01)),
+    speedSensorW(ring(cosine=0.002), late(delay=0.01)),
+    forceSensor(gain(gain=0.01)),
     pB=p, tauR=-500.0, dmuWR=0.0, dmuDC=0.0, correctionW=0.0, correctionR=0.0,
     omegaW(start=-20.0*0.70/0.46), omegaR(start=-20.0));
   output Units.Force dFx = forward.Fx + reverse.Fx "Difference of the creep forces";

@@ -56,6 +56,10 @@ class Effects:
     speed_delay: float = _gain("s", "delay of the measured wheel speed")
     pole_ring: float = _gain("1", "measured wheel speed times 1 + gain*cos(phiW + phase)")
     time_skew: float = _gain("s", "delay of both measured speeds, of a second logger")
+    late_pB: float = _gain("s", "delay of the measured pressure, of its logger")
+    late_tauR: float = _gain("s", "delay of the measured torque, of its logger")
+    late_omegaR: float = _gain("s", "delay of the measured roller speed, of its logger")
+    late_Fx: float = _gain("s", "delay of the load cell, of its logger")
     pressure_offset: float = _gain("Pa", "added to the measured pressure")
     # Outside the catalogue: a diagnosis should find no name for these.
     friction_step: float = _gain(

@@ -65,11 +65,11 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
     # The wheel load presses against the slope: in the same direction, wherever the wheel turns.
     crest = _CREST * e.apex_offset * drawn.Fz * (1.0 + e.wheel_load)
     ideal = {
-        "pB": stop.at(time, "pB") + e.pressure_offset,
-        "tauR": stop.at(time, "tauR") * (1.0 + e.torque_gain) * beat,
+        "pB": stop.at(time - e.late_pB, "pB") + e.pressure_offset,
+        "tauR": stop.at(time - e.late_tauR, "tauR") * (1.0 + e.torque_gain) * beat,
         "omegaW": stop.at(wheel, "omegaW") * ring,
-        "omegaR": stop.at(time - e.time_skew, "omegaR"),
-        "Fx": (stop.at(time, "Fcell") + crest) * (1.0 + e.fx_gain)
+        "omegaR": stop.at(time - e.time_skew - e.late_omegaR, "omegaR"),
+        "Fx": (stop.at(time - e.late_Fx, "Fcell") + crest) * (1.0 + e.fx_gain)
         + (e.fx_offset + e.force_drift * time),
     }
     readings = {

@@ -1,0 +1,120 @@
+"""Clocks of loggers: signals that one logger records are late together, against all others.
+
+A clock is no matter of the model. Inputs drive it as of the time when they acted, what it says of
+an output is read as late as its logger reads it, and a motion that is led follows what was measured
+at that time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.case import Case
+from workbench.diagnosis.catalogue import Effect, read_effects
+from workbench.diagnosis.extension import variables
+from workbench.diagnosis.samples import Samples
+from workbench.fmu import Matrix, Vector
+from workbench.modelica import Library
+from workbench.system import OBSERVER, System
+
+KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
+# Of a sample time: a logger that scans five channels one after another has them as far apart.
+_MATTERS = 0.2
+
+
+def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
+    """All that a diagnosis may find: effects of the library, then clocks of the system's loggers.
+
+    Raises
+    ------
+    InputError
+        See `read_effects`.
+    """
+    return (*read_effects(library, system.models[OBSERVER].name), *clocks(system))
+
+
+def clocks(system: System) -> tuple[Effect, ...]:
+    """Clocks of loggers that may be late against that of the other signals."""
+    return tuple(_clock(system, KIND, *one) for one in system.clocks.items())
+
+
+def own_clocks(system: System) -> tuple[Effect, ...]:
+    """A clock of each signal, against that of the first output, whatever the loggers."""
+    others = [name for name in system.signals if name != system.outputs[0].name]
+    return tuple(_clock(system, OWN, name, (name,)) for name in others)
+
+
+def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
+    return Effect(
+        name=f"{kind}[{name}]",
+        model=kind,
+        slots=(),
+        size=SKEW,
+        matters=_MATTERS * system.sample_time,
+        text=f"a logger of {listed(signals)} whose clock is late",
+        separation="one signal that both loggers record",
+        late=signals,
+    )
+
+
+def late_signals(system: System) -> dict[str, tuple[str, ...]]:
+    """Signals that are late together, by the name of what says by how much [s]."""
+    return {variables(one, SKEW)[0]: one.late for one in (*clocks(system), *own_clocks(system))}
+
+
+def lateness(system: System, values: Mapping[str, float]) -> dict[str, float]:
+    """By how much signals are late [s], of those that are.
+
+    Parameters
+    ----------
+    values : by name, see `late_signals`; others are zero.
+    """
+    late: dict[str, float] = {}
+    for name, signals in late_signals(system).items():
+        for signal in signals if values.get(name, 0.0) != 0.0 else ():
+            late[signal] = late.get(signal, 0.0) + values[name]
+    return late
+
+
+def moved(time: Vector, values: Matrix, late: float) -> Matrix:
+    """Values (n, ...) of a time `late` [s] before each sample; before the first they rest."""
+    at = np.clip(time - late, time[0], time[-1])
+    right = np.clip(np.searchsorted(time, at), 1, time.size - 1)
+    share = (at - time[right - 1]) / (time[right] - time[right - 1])
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    found: Matrix = values[right - 1] + share * (values[right] - values[right - 1])
+    return found
+
+
+def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:
+    """A recording whose late signals are moved to when they were measured.
+
+    Parameters
+    ----------
+    late : by signal [s].
+    """
+    if not late:
+        return samples
+    time, u, y = samples.time, samples.u.copy(), samples.y.copy()
+    for names, columns in ((samples.inputs, u), (samples.signals, y)):
+        for j, name in enumerate(names):
+            if name in late:
+                columns[:, j] = moved(time, columns[:, j], -late[name])
+    return replace(samples, u=u, y=y)
+
+
+def case_in_time(case: Case, late: Mapping[str, float]) -> Case:
+    """As `in_time`, of all that was recorded."""
+    return case.with_signals(
+        {n: moved(case.time, case[n], -by) for n, by in late.items() if n in case}
+    )
+
+
+def listed(names: tuple[str, ...]) -> str:
+    """Names in a sentence.
+
+    >>> listed(("a", "b", "c")), listed(("a",))
+    ('a, b and c', 'a')
+    """
+    return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)
