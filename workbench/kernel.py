@@ -28,7 +28,7 @@ def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(error_model="numpy", _nrt=False, inline=inline)(function)
+        dispatcher = njit(error_model="numpy", _nrt=False, inline=inline, no_cfunc_wrapper=True)(function)
         with suppress(RuntimeError):  # a function without a file is compiled in each process
             dispatcher._cache = CodeCache(function)
         return dispatcher
