@@ -113,6 +113,34 @@ def test_a_cluster_finds_the_same_gains(
     assert_array_equal(found.best, alone.best)
 
 
+LATE = """
+import pickle, time
+from types import SimpleNamespace
+from workbench.tuning import cluster
+
+
+def refuse(given):
+    raise ValueError(given)
+
+
+cluster._PREPARATION = 0.5
+worker = SimpleNamespace(periodic_callbacks={})
+try:
+    cluster._make_ready(pickle.dumps((refuse, "no model", 1.0)), worker)
+except ValueError:
+    time.sleep(1.5)
+    print("alive")
+"""
+
+
+def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later() -> None:
+    """It may belong to somebody else's process, and may be of use to the next who asks."""
+    pytest.importorskip("distributed")
+    command = [sys.executable, "-c", LATE]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout) == (0, "alive\n"), run.stderr
+
+
 BLOCK = """import sys
 class Block:
     def find_spec(self, name, path=None, target=None):
