@@ -103,7 +103,13 @@ def test_a_cluster_finds_the_same_gains(
 
     job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
-    options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
+    # Dask pauses workers whose process is large, as this one is after hundreds of tests: no limit.
+    options = {
+        "n_workers": 1,
+        "threads_per_worker": 2,
+        "dashboard_address": ":0",
+        "memory_limit": 0,
+    }
     with distributed.LocalCluster(processes=False, **options) as cluster:
         remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
         try:
