@@ -1,9 +1,10 @@
 """Tables of `accuracy.md`, written from what the commands found: `make figures`.
 
-    python docs/figures.py [--long] [--kept] [NAME ...]
+    python docs/figures.py [--long] [--kept] [--recordings FOLDER] [NAME ...]
 
 A table stands between `<!-- figures: NAME -->` and `<!-- figures end -->`, the command that made
-it below it. All other numbers of the page are typed, from the command that stands beside them.
+it below it. All other numbers of the page are typed, from the command that stands beside them. Some
+tables are of recordings that are not part of the repository: without them they stay as they are.
 """
 
 import argparse
@@ -45,6 +46,17 @@ PLANTED = {
     "BrakeFade": "fade 4.0 % per 100 K",
     "PressureDependentPadFriction": "exponent 4.0 %",
 }
+# What an independent simulator planted in six dry stops each, by the name of the set.
+LABELLED = {
+    "clean": "nothing",
+    "speed_friction": "slope 22 %",
+    "fade": "fade 7.0 % per 100 K",
+    "cylinder_lag": "80 ms",
+    "radius": "-1.5 mm",
+    "pole_ring": "amplitude 0.20 %",
+}
+
+TUNED = ("disturbance_observer", "parameter_estimator")
 
 Table = list[Sequence[str]]  # the first row is the header
 
@@ -55,16 +67,21 @@ class Figure:
 
     Attributes
     ----------
-    commands : of the workbench; the last one writes the summary.
-    summary : file, below the folder of results.
-    table : of the summary.
+    commands : of the workbench; they read and write below `{out}`, and may ask for `{recordings}`.
+    summaries : files that the commands write, below the folder of results.
+    table : of the summaries, in their order.
     long : whether they take hours.
     """
 
     commands: tuple[str, ...]
-    summary: Path
-    table: Callable[[Mapping[str, Any]], Table]
+    summaries: tuple[Path, ...]
+    table: Callable[..., Table]
     long: bool = False
+
+    @property
+    def recorded(self) -> bool:
+        """Whether recordings are needed that are not part of the repository."""
+        return any("{recordings}" in one for one in self.commands)
 
 
 # --- tables ---
@@ -117,19 +134,59 @@ def covered(summary: Mapping[str, Any]) -> Table:
     return rows
 
 
+def sizes(cause: Mapping[str, Any]) -> str:
+    """Parameters of a cause with their intervals, as a laboratory says them."""
+    texts = []
+    for name, one in cause["parameters"].items():
+        ends = [one[key] for key in ("value", "low", "high")]
+        # Four digits: three may hide that an interval misses.
+        (value, low, high), unit = said(ends, one["unit"])
+        texts.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
+    return "; ".join(texts)
+
+
 def causes(summary: Mapping[str, Any]) -> Table:
     """Causes in the order in which they were named, with their sizes."""
     rows: Table = [["cause", "planted", "estimate, 95 % interval"]]
     for cause in summary["causes"]:
-        sizes = []
-        for name, one in cause["parameters"].items():
-            ends = [one[key] for key in ("value", "low", "high")]
-            # Four digits: three may hide that an interval misses.
-            (value, low, high), unit = said(ends, one["unit"])
-            sizes.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
-        planted = PLANTED.get(cause["effect"], "nothing")
-        rows.append([cause["effect"], planted, "; ".join(sizes)])
+        rows.append([cause["effect"], PLANTED.get(cause["effect"], "nothing"), sizes(cause)])
     return rows
+
+
+def singles(*summaries: Mapping[str, Any]) -> Table:
+    """What is said of each labelled set, and what it is worth on recordings that were held out."""
+    error = "error on held-out stops, times the noise"
+    rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
+    for (name, planted), summary in zip(LABELLED.items(), summaries, strict=True):
+        found, gain = summary["causes"], summary["gain"]
+        named = ", ".join(" or ".join([c["effect"], *c["confusable_with"]]) for c in found)
+        change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
+        estimate = "; ".join(map(sizes, found))
+        rows.append([f"`{name}`", named or summary["verdict"], planted, estimate, change])
+    return rows
+
+
+def folds(*summaries: Mapping[str, Any]) -> Table:
+    """What tuning gains on stops that it had not seen, by estimator."""
+
+    def change(form: str, *ends: float | None) -> str:
+        return " → ".join("n/a" if one is None else form.format(one) for one in ends)
+
+    header = ["left out"]
+    rows: dict[str, list[str]] = {}
+    for summary in summaries:
+        name = titled(summary["estimator"])
+        header += [f"{name}: z, untuned to tuned", f"error of {summary['judged']}"]
+        for fold in summary["folds"]:
+            numbers = ", ".join(case.partition("_")[0] for case in fold["cases"])
+            errors = (one and 100.0 * one for one in (fold["error_reasoned"], fold["error"]))
+            rows.setdefault(numbers, []).extend(
+                [
+                    change("{:.3f}", fold["reasoned"], fold["tuned"]),
+                    change("{:.2f} %", *errors),
+                ]
+            )
+    return [header, *([numbers, *cells] for numbers, cells in rows.items())]
 
 
 def shares(summary: Mapping[str, Any]) -> Table:
@@ -188,34 +245,49 @@ def said_of_errors(summary: Mapping[str, Any]) -> Table:
 _RIG = ("rig --seed 1 --out {out}/rig", "accuracy {out}/rig --out {out}/accuracy")
 _BENCH = ("bench --out {out}/bench",)
 FIGURES = {
-    "simulate": Figure(("simulate --out {out}/simulate",), Path("simulate/summary.json"), errors),
-    "accuracy": Figure(_RIG, Path("accuracy/accuracy.json"), worst),
-    "coverage": Figure(_RIG, Path("accuracy/accuracy.json"), covered),
-    "diagnose": Figure(("diagnose --out {out}/diagnose",), Path("diagnose/summary.json"), causes),
-    "models": Figure(_BENCH, Path("bench/bench.json"), timed_models),
-    "observers": Figure(_BENCH, Path("bench/bench.json"), timed_observers),
+    "simulate": Figure(
+        ("simulate --out {out}/simulate",), (Path("simulate/summary.json"),), errors
+    ),
+    "accuracy": Figure(_RIG, (Path("accuracy/accuracy.json"),), worst),
+    "coverage": Figure(_RIG, (Path("accuracy/accuracy.json"),), covered),
+    "diagnose": Figure(
+        ("diagnose --out {out}/diagnose",), (Path("diagnose/summary.json"),), causes
+    ),
+    "models": Figure(_BENCH, (Path("bench/bench.json"),), timed_models),
+    "observers": Figure(_BENCH, (Path("bench/bench.json"),), timed_observers),
+    "singles": Figure(
+        tuple(f"diagnose {{recordings}}/labelled/{n} --out {{out}}/singles/{n}" for n in LABELLED),
+        tuple(Path("singles", name, "summary.json") for name in LABELLED),
+        singles,
+    ),
+    "folds": Figure(
+        tuple(f"tune {name} --folds 5 --out {{out}}/tune/{name}" for name in TUNED),
+        tuple(Path("tune", name, "summary.json") for name in TUNED),
+        folds,
+        long=True,
+    ),
     "sheet": Figure(
         ("power --sheet-error --repeats 1 --out {out}/power",),
-        Path("power/sheet_error/sheet_error.json"),
+        (Path("power/sheet_error/sheet_error.json"),),
         said_of_errors,
         long=True,
     ),
     "power": Figure(
         ("power --clean 50 --sizes 2 4 8 --repeats 1 --pairs 20 --resume --out {out}/power",),
-        Path("power/power.json"),
+        (Path("power/power.json"),),
         shares,
         long=True,
     ),
 }
 
 
-def written(name: str, summary: Mapping[str, Any]) -> str:
+def written(name: str, *summaries: Mapping[str, Any]) -> str:
     """A table with the command that made it, as it stands on the page."""
-    header, *rows = FIGURES[name].table(summary)
+    header, *rows = FIGURES[name].table(*summaries)
     lines = [header, ["---"] * len(header), *rows]
     text = "\n".join("| " + " | ".join(line).strip() + " |" for line in lines)
     made = ", then ".join(f"`workbench {one}`" for one in FIGURES[name].commands)
-    made = made.format(out=RESULTS.as_posix())
+    made = made.format(out=RESULTS.as_posix(), recordings="FOLDER")
     return f"{text}\n\n*Written by `make figures` from {made}.*"
 
 
@@ -226,9 +298,9 @@ def block(name: str) -> re.Pattern[str]:
     )
 
 
-def placed(page: str, name: str, summary: Mapping[str, Any]) -> str:
+def placed(page: str, name: str, *summaries: Mapping[str, Any]) -> str:
     """The page with a table written anew."""
-    found, count = block(name).subn(lambda _: written(name, summary), page)
+    found, count = block(name).subn(lambda _: written(name, *summaries), page)
     if count != 1:
         raise SystemExit(f"{PAGE}: found {count} places for {name}, expected one")
     return found
@@ -240,17 +312,30 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
     parser.add_argument("--long", action="store_true", help="also what takes hours")
     parser.add_argument("--kept", action="store_true", help="from results that are there")
+    parser.add_argument(
+        "--recordings",
+        type=Path,
+        metavar="FOLDER",
+        help="of recordings that are not part of the repository; without it their tables stay",
+    )
     options = parser.parse_args()
     if unknown := [name for name in options.names if name not in FIGURES]:
         parser.error(f"{', '.join(unknown)}: expected some of {', '.join(FIGURES)}")
-    names = options.names or [n for n, one in FIGURES.items() if options.long or not one.long]
+    usual = [n for n, one in FIGURES.items() if options.long or not one.long]
+    names = list(options.names) or usual
+    if options.recordings is None and not options.kept:
+        for name in [one for one in names if FIGURES[one].recorded]:
+            print(f"{name}: stays as it is, for it needs --recordings")
+            names.remove(name)
     if not options.kept:
         for command in dict.fromkeys(one for name in names for one in FIGURES[name].commands):
-            words = shlex.split(command.format(out=RESULTS.as_posix()))
+            places = {"out": RESULTS.as_posix(), "recordings": options.recordings}
+            words = shlex.split(command.format_map(places))
             subprocess.run([sys.executable, "-m", "workbench", *words], cwd=ROOT, check=True)
     for name in names:
-        summary = json.loads((ROOT / RESULTS / FIGURES[name].summary).read_text())
-        PAGE.write_text(placed(PAGE.read_text(), name, summary))
+        files = [ROOT / RESULTS / one for one in FIGURES[name].summaries]
+        summaries = [json.loads(file.read_text()) for file in files]
+        PAGE.write_text(placed(PAGE.read_text(), name, *summaries))
         print(f"{PAGE.relative_to(ROOT)}: {name}")
 
 

@@ -41,8 +41,8 @@ def test_what_is_said_to_be_written_is_of_its_command(name: str) -> None:
     (text,) = figures.block(name).findall(figures.PAGE.read_text())
     if said := re.search(r"\*Written by `make figures` from (.*)\.\*$", text):
         commands = re.findall(r"`workbench ([^`]+)`", said[1])
-        out = figures.RESULTS.as_posix()
-        assert commands == [one.format(out=out) for one in figures.FIGURES[name].commands]
+        places = {"out": figures.RESULTS.as_posix(), "recordings": "FOLDER"}
+        assert commands == [one.format_map(places) for one in figures.FIGURES[name].commands]
 
 
 def test_tables_say_what_was_found() -> None:
@@ -60,6 +60,38 @@ def test_tables_say_what_was_found() -> None:
         ["both of a pair", "80 %", "95 %", "75.1 to 99.9 %"],
         ["right cause and no other", "", "n/a", ""],
     ]
+
+
+def test_sets_that_are_labelled_have_a_row_each() -> None:
+    cause = {"effect": "BrakeFade", "confusable_with": ["WaterFilm"], "parameters": FADE}
+    named = {"verdict": "found", "causes": [cause], "gain": {"before": 55.2, "after": 1.12}}
+    nothing = {"verdict": "nothing", "causes": [], "gain": None}
+    sets = [named if name == "fade" else nothing for name in figures.LABELLED]
+    _, clean, _, fade, *_ = figures.singles(*sets)
+    assert clean == ["`clean`", "nothing", "nothing", "", ""]
+    estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
+    planted = "fade 7.0 % per 100 K"
+    assert fade == ["`fade`", "BrakeFade or WaterFilm", planted, estimate, "55.2 → 1.1"]
+
+
+def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out() -> None:
+    fold = {"cases": ["04_dry_160_4.2", "09_wet"], "reasoned": 0.158, "tuned": None}
+    fold |= {"error_reasoned": 0.0046, "error": 0.0172}
+    first = {"estimator": "disturbance_observer", "judged": "Fx", "folds": [fold]}
+    header, row = figures.folds(first, {**first, "estimator": "ekf"})
+    assert header[1:3] == ["disturbance observer: z, untuned to tuned", "error of Fx"]
+    assert header[3] == "EKF: z, untuned to tuned"
+    assert row == ["04, 09", *2 * ["0.158 → n/a", "0.46 % → 1.72 %"]]
+
+
+def test_without_their_recordings_tables_stay(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = figures.PAGE.read_text()
+    monkeypatch.setattr("sys.argv", ["figures.py", "singles"])
+    figures.main()
+    assert "singles: stays as it is, for it needs --recordings" in capsys.readouterr().out
+    assert figures.PAGE.read_text() == before
 
 
 def test_a_table_is_written_in_its_place_and_nothing_else_is_touched() -> None:

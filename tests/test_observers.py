@@ -1,6 +1,7 @@
 """Estimators: what they recover, what they leave alone, and what they must not do."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -49,23 +50,16 @@ def matrices(gains: Gains) -> tuple[np.ndarray, np.ndarray]:
 BLANK = Gains("", (), np.zeros(0), {}, "")
 
 
-def recorded_stop(
-    fmu: FMU,
-    *,
-    muDC: Callable[[float], float],
-    muWR: float = 0.30,
-    direction: float = 1.0,
-    seed: int | None = 7,
-) -> tuple[Case, np.ndarray]:
+def recorded_stop(fmu: FMU, muDC: Callable[[float], float], muWR: float = 0.30) -> Case:
     """A stop from 80 km/h at 2.7 bar, simulated at 1 kHz with other friction than nominal.
 
-    Returns the recording at 200 Hz, with the data sheet's sensor noise, and the true slip [m/s].
+    Recorded at 200 Hz, with the data sheet's sensor noise.
     """
-    rng = np.random.default_rng(seed)
-    omegaR = direction * 80 / 3.6 / RR
+    rng = np.random.default_rng(7)
+    omegaR = 80 / 3.6 / RR
     fmu.start({"omegaR": omegaR, "omegaW": omegaR * RR / 0.46}, {"muWR": muWR})
     inputs = fmu.variables(["pB", "tauR", "dmuDC"])
-    outputs = fmu.variables(["omegaW", "omegaR", "Fx", "slip"])
+    outputs = fmu.variables(["omegaW", "omegaR", "Fx"])
     rows = []
     for k in range(round(SECONDS / 0.001)):
         t = k * 0.001
@@ -77,8 +71,8 @@ def recorded_stop(
         fmu.step(0.001)
         if k % 5 == 0:
             rows.append([t, pB, tauR, *fmu.get(outputs)])
-    t, pB, tauR, omegaW, omegaR_, Fx, slip = np.array(rows).T
-    noise = rng.standard_normal((4, t.size)) if seed is not None else np.zeros((4, t.size))
+    t, pB, tauR, omegaW, omegaR_, Fx = np.array(rows).T
+    noise = rng.standard_normal((4, t.size))
     signals = {
         "pB": pB + 500.0 * noise[0],
         "tauR": tauR + 40.0 * noise[1],
@@ -86,23 +80,35 @@ def recorded_stop(
         "omegaR": omegaR_ + 0.003 * noise[3],
         "Fx": Fx,
     }
-    conditions = {"wheel_rail": "dry", "direction": 1 if direction > 0 else -1}
-    case = Case(
+    return Case(
         name="synthetic",
         title="synthetic",
-        conditions=conditions,
+        conditions={"wheel_rail": "dry", "direction": 1},
         time=t,
         signals=signals,
         inputs=("pB", "tauR"),
         outputs=("omegaW", "omegaR"),
         source=Path("synthetic"),
     )
-    return case, slip
 
 
 def drying(t: float) -> float:
     """Friction of pads that dry: 0.18 to 0.36 within a stop."""
     return 0.36 - 0.18 * float(np.exp(-max(0.0, t - 3.0) / 4.0))
+
+
+def wetted(t: float) -> float:
+    """Friction of pads that jumps by a quarter at 12 s, as when one disc gets wet."""
+    return 0.30 if t < 12.0 else 0.225
+
+
+Stop = Callable[..., Case]
+
+
+@pytest.fixture(scope="module")
+def stop(fmu: FMU) -> Stop:
+    """Simulates a stop, each once."""
+    return cache(partial(recorded_stop, fmu))
 
 
 WHEELSET = load_system("wheelset")
@@ -162,10 +168,10 @@ def test_a_wrong_radius_does_not_lead_the_smoother_astray(
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_every_observer_recovers_friction_and_force(
-    fmu: FMU, made: dict[str, Estimator], name: str
+    stop: Stop, made: dict[str, Estimator], name: str
 ) -> None:
     """Recovery: muDC within 0.01 and Fx within 2 % on a stop whose pads dry."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     run = replay(case, made[name])
     window = judged_window(case, WHEELSET)
     settled = slice(window.start + 200, window.stop)
@@ -180,10 +186,9 @@ def test_every_observer_recovers_friction_and_force(
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(
-    fmu: FMU, made: dict[str, Estimator], name: str
+    stop: Stop, made: dict[str, Estimator], name: str
 ) -> None:
-    """The pads' friction jumps by a quarter at 12 s, as when one disc gets wet."""
-    case, _ = recorded_stop(fmu, muDC=lambda t: 0.30 if t < 12.0 else 0.225)
+    case = stop(wetted)
     force = low_pass(case.time, replay(case, made[name]).signal("Fx"), 5.0)
     before, after = (force[np.searchsorted(case.time, t)] for t in (11.5, 13.5))
     reached = force[np.searchsorted(case.time, 12.5)]
@@ -193,10 +198,10 @@ def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(
 @pytest.mark.parametrize("muWR", [0.15, 0.18])
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_claimed_friction_of_the_rail_is_right_where_the_contact_is_the_models(
-    fmu: FMU, made: dict[str, Estimator], name: str, muWR: float
+    stop: Stop, made: dict[str, Estimator], name: str, muWR: float
 ) -> None:
     """Within 10 % at 99 of 100 samples, which is what noise of the speeds makes of slip."""
-    case, _ = recorded_stop(fmu, muDC=drying, muWR=muWR)
+    case = stop(drying, muWR)
     run = replay(case, made[name])
     claimed = run.signal("muWR")[run.claimed["muWR"]]
     assert claimed.size > 0.5 * case.time.size
@@ -205,10 +210,10 @@ def test_claimed_friction_of_the_rail_is_right_where_the_contact_is_the_models(
 
 @pytest.mark.parametrize("method", [ExtendedKalmanFilter, UnscentedKalmanFilter])
 def test_kalman_filters_know_how_much_they_know(
-    fmu: FMU, method: type[ExtendedKalmanFilter]
+    fmu: FMU, stop: Stop, method: type[ExtendedKalmanFilter]
 ) -> None:
     """Consistency on a recording with exactly the assumed sensor noise (Bar-Shalom et al. 2001)."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     assumed = method.reasoned(fmu, WHEELSET)
     values = assumed.values.copy()
     values[assumed.names.index("omegaW_relative")] = 3e-4
@@ -226,10 +231,10 @@ def test_kalman_filters_know_how_much_they_know(
 
 
 def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(
-    fmu: FMU, made: dict[str, Estimator]
+    stop: Stop, made: dict[str, Estimator]
 ) -> None:
     """Reference: both are the Kalman filter of a linear model; a dry stop is close to one."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     runs = [replay(case, made[name]) for name in ("ekf", "ukf")]
     settled = slice(judged_window(case, WHEELSET).start + 200, judged_window(case, WHEELSET).stop)
     difference = (runs[0].signal("muDC") - runs[1].signal("muDC"))[settled]
@@ -239,9 +244,9 @@ def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "ekf", "ukf"])
-def test_observers_run_on_the_full_model_too(fmu: FMU, root: Path, name: str) -> None:
+def test_observers_run_on_the_full_model_too(fmu: FMU, stop: Stop, root: Path, name: str) -> None:
     """Whose suspension and rocker swing without being measured."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         kind = estimators(WHEELSET)[name]
         estimator = kind(full, WHEELSET, kind.reasoned(full, WHEELSET))
@@ -283,10 +288,10 @@ def test_parameter_estimator_has_the_poles_it_was_given(fmu: FMU) -> None:
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_forward_and_reverse_are_mirror_images(
-    fmu: FMU, made: dict[str, Estimator], name: str
+    fmu: FMU, stop: Stop, made: dict[str, Estimator], name: str
 ) -> None:
     """Property: speeds, torque and force change sign, friction does not."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     turned = {name: -case[name] for name in ("tauR", "omegaW", "omegaR", "Fx")}
     mirrored = case.with_signals(turned)
     # On the minimal model: the full one has its pads on one side, which is not symmetric.
@@ -300,8 +305,10 @@ def test_forward_and_reverse_are_mirror_images(
     assert_allclose(reverse.estimate, signs * forward.estimate, rtol=1e-6, atol=1e-3)
 
 
-def test_without_gains_the_observer_is_the_open_loop_model(fmu: FMU, gains: Gains) -> None:
-    case, _ = recorded_stop(fmu, muDC=drying)
+def test_without_gains_the_observer_is_the_open_loop_model(
+    fmu: FMU, stop: Stop, gains: Gains
+) -> None:
+    case = stop(drying)
     zero = gains.with_values(np.array([0.0] * 16 + [-1.0, -1.0]))
     free = replay(case, DisturbanceObserver(fmu, WHEELSET, zero))
     open_loop = replay(case, OpenLoop(fmu, WHEELSET, BLANK))
@@ -309,11 +316,11 @@ def test_without_gains_the_observer_is_the_open_loop_model(fmu: FMU, gains: Gain
     assert_allclose(free.estimate, open_loop.estimate, rtol=1e-6, atol=1e-3)
 
 
-def test_friction_deviations_decay_without_measurement(fmu: FMU, gains: Gains) -> None:
+def test_friction_deviations_decay_without_measurement(fmu: FMU, stop: Stop, gains: Gains) -> None:
     """Reference: dmu(t) = dmu(0) exp(T t), equation (10), by implicit Euler."""
     forgetting = gains.with_values(np.append(gains.values[:16], [-0.5, -2.0]))
     observer = DisturbanceObserver(fmu, WHEELSET, forgetting)
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     for k in range(case.time.size):
         step = observer.init if k == 0 else observer.step
         learned = step(case.time[k], case.u[k], case.y[k]).values[2:4]
@@ -325,15 +332,25 @@ def test_friction_deviations_decay_without_measurement(fmu: FMU, gains: Gains) -
     assert_allclose(estimate, learned * np.exp([-1.0, -4.0]), rtol=0.05)
 
 
-def test_nothing_is_learned_about_pads_that_do_not_touch(fmu: FMU, gains: Gains) -> None:
+def test_nothing_is_learned_about_pads_that_do_not_touch(
+    fmu: FMU, stop: Stop, gains: Gains
+) -> None:
     """Without pressure muDC has no effect (Schwarz et al. 2018): it stays where it is."""
-    case, _ = recorded_stop(fmu, muDC=drying)
+    case = stop(drying)
     coasting = case.time < 2.9
     run = replay(case, DisturbanceObserver(fmu, WHEELSET, gains))
     assert_array_equal(np.abs(run.signal("muDC")[coasting] - 0.30).max(), 0.0)
 
 
-def chattering(estimator: Estimator, cases: list[Case]) -> list[str]:
+@pytest.fixture(scope="module")
+def ends(root: Path) -> dict[str, Case]:
+    """The last 6 s of all recorded stops, in which the wheelset comes to rest."""
+    return {
+        case.name: case.part(slice(-1200, None)) for case in read_cases([root / "cases"], WHEELSET)
+    }
+
+
+def chattering(estimator: Estimator, cases: Iterable[Case]) -> list[str]:
     """Cases at whose end the noise of two speed sensors appears as creep force."""
     found = []
     for case in cases:
@@ -350,11 +367,9 @@ SPRINGING_BACK = ("08_wet_120_3.6", "09_wet_160_4.2_wsp")
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_a_standing_wheelset_has_no_chattering_force(
-    made: dict[str, Estimator], root: Path, name: str
+    made: dict[str, Estimator], ends: dict[str, Case], name: str
 ) -> None:
-    cases = [
-        case for case in read_cases([root / "cases"], WHEELSET) if case.name not in SPRINGING_BACK
-    ]
+    cases = [case for case in ends.values() if case.name not in SPRINGING_BACK]
     assert len(cases) == 12
     assert chattering(made[name], cases) == []
 
@@ -362,10 +377,10 @@ def test_a_standing_wheelset_has_no_chattering_force(
 @pytest.mark.parametrize("name", OBSERVERS)
 @pytest.mark.parametrize("case", SPRINGING_BACK)
 def test_a_wheelset_that_springs_back_has_no_chattering_force(
-    made: dict[str, Estimator], root: Path, name: str, case: str
+    made: dict[str, Estimator], ends: dict[str, Case], name: str, case: str
 ) -> None:
     """The suspension turns the stopped wheelset back by 0.2 m/s, which no observer model knows."""
-    assert chattering(made[name], read_cases([root / "cases" / case], WHEELSET)) == []
+    assert chattering(made[name], [ends[case]]) == []
 
 
 def test_stationary_gains_stabilise_the_linearised_model(fmu: FMU, gains: Gains) -> None:

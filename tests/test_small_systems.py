@@ -298,8 +298,7 @@ def test_states_of_an_extension_are_not_corrected(balance: Path, tmp_path: Path)
     library = BALANCE.replace("replaceable Pivot pivot(v=v)", "replaceable Grease pivot(v=v)")
     extended = written(tmp_path / "Balance", library, BALANCE_FILE)
     file = tmp_path / "Grease.fmu"
-    build = ["fmu", "build", str(extended / "package.mo"), "Balance.Observer"]
-    assert main([*build, "--out", str(file)]) == 0
+    build_here(extended / "package.mo", "Balance.Observer", file)
     with FMU(file) as fmu:
         assert fmu.states == ("pivot.late",)
         assert corrected_states(fmu, loaded(balance)) == ()

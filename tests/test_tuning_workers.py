@@ -103,7 +103,13 @@ def test_a_cluster_finds_the_same_gains(
 
     job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
-    options = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
+    # Dask pauses workers whose process is large, as this one is after hundreds of tests: no limit.
+    options = {
+        "n_workers": 1,
+        "threads_per_worker": 2,
+        "dashboard_address": ":0",
+        "memory_limit": 0,
+    }
     with distributed.LocalCluster(processes=False, **options) as cluster:
         remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
         try:
@@ -111,6 +117,34 @@ def test_a_cluster_finds_the_same_gains(
         finally:
             remote.close()
     assert_array_equal(found.best, alone.best)
+
+
+LATE = """
+import pickle, time
+from types import SimpleNamespace
+from workbench.tuning import cluster
+
+
+def refuse(given):
+    raise ValueError(given)
+
+
+cluster._PREPARATION = 0.5
+worker = SimpleNamespace(periodic_callbacks={})
+try:
+    cluster._make_ready(pickle.dumps((refuse, "no model", 1.0)), worker)
+except ValueError:
+    time.sleep(1.5)
+    print("alive")
+"""
+
+
+def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later() -> None:
+    """It may belong to somebody else's process, and may be of use to the next who asks."""
+    pytest.importorskip("distributed")
+    command = [sys.executable, "-c", LATE]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout) == (0, "alive\n"), run.stderr
 
 
 BLOCK = """import sys

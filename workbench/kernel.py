@@ -24,11 +24,13 @@ def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
     """Make a decorator of laws and loops, whose compiled code is kept between runs.
 
     Their arrays belong to the caller and they allocate none, so that references need not be
-    counted (`_nrt`), which took two thirds of a step.
+    counted (`_nrt`), which took two thirds of a step. A wrapper for callers in C is compiled for
+    nobody.
     """
+    options = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "inline": inline}
 
     def compile_(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(error_model="numpy", _nrt=False, inline=inline)(function)
+        dispatcher = njit(**options)(function)
         with suppress(RuntimeError):  # a function without a file is compiled in each process
             dispatcher._cache = CodeCache(function)
         return dispatcher

@@ -320,12 +320,13 @@ def _make_ready(content: bytes, dask_worker: Worker) -> str:
         with before.turn:  # what it works on for another client needs the model
             before.stack.close()
     begin, given, limit = pickle.loads(content)
-    faulthandler.dump_traceback_later(_PREPARATION, exit=True)
     stack = ExitStack()
-    dask_worker.workbench = _Ready(
-        stack, stack.enter_context(begin(given)), limit, threading.Lock()
-    )
-    faulthandler.cancel_dump_traceback_later()
+    faulthandler.dump_traceback_later(_PREPARATION, exit=True)
+    try:
+        state = stack.enter_context(begin(given))
+    finally:  # or one that could not be prepared would end its process later, whatever it does then
+        faulthandler.cancel_dump_traceback_later()
+    dask_worker.workbench = _Ready(stack, state, limit, threading.Lock())
     return hashlib.sha256(content).hexdigest()
 
 
