@@ -1,6 +1,8 @@
 """The engine is of no machine: words of wheelset and train stand in their own folders alone."""
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -50,3 +52,19 @@ def test_no_source_names_what_one_machine_has(source: Path, system: System) -> N
     words = re.compile(rf"\b({'|'.join(map(re.escape, names(system)))}|{PROSE})\b")
     lines = enumerate(source.read_text().splitlines(), 1)
     assert [(number, line.strip()) for number, line in lines if words.search(line)] == []
+
+
+def classes() -> Iterator[tuple[str, str]]:
+    """Public classes of the package: name and file."""
+    for path in sorted((ROOT / "workbench").rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                yield node.name, str(path.relative_to(ROOT))
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    """Whoever reads of an Estimate knows which."""
+    files: dict[str, list[str]] = {}
+    for name, file in classes():
+        files.setdefault(name, []).append(file)
+    assert {name: places for name, places in files.items() if len(places) > 1} == {}

@@ -74,9 +74,7 @@ class Assigned:
     @property
     def values(self) -> Vector:
         """(n,) SI, not finite in gaps."""
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # what no machine reads is none of its readings
+        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
             return self.factor * self.channel.values + self.zero
 
     @property
@@ -275,18 +273,16 @@ def _way(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | 
 def _fitting(channel: FileChannel, signal: Signal, system: System) -> list[str]:
     """Usual units in which values without a unit have the signal's typical size."""
     others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
-    units = dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others))
     fitting: list[str] = []
-    for unit in units:
+    for unit in dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others)):
         way = _way(unit, signal, system)
         if way is None:
             continue
         values = way[0].factor * channel.values + way[0].zero
         size = float(np.nanmax(np.abs(values), initial=0.0))
         low, high = signal.plausible
-        if not signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL:
-            continue
-        if np.nanmin(values) >= low and np.nanmax(values) <= high:
+        typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL
+        if typical and np.nanmin(values) >= low and np.nanmax(values) <= high:
             fitting.append(unit)
     return fitting
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from workbench.report.figures import CaseFigure, Curve, Panel
-from workbench.report.parts import Cell, Column, Dot, Dots, Part, Table, number, write_parts
+from workbench.report.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 from workbench.report.recordings import placed
 from workbench.stopping import Distance
 from workbench.stopping.outcome import PastStop
@@ -99,12 +99,12 @@ def _distribution(found: Distance) -> CaseFigure:
     )
 
 
-def _quantiles(found: Distance) -> Table:
+def _quantiles(found: Distance) -> Rows:
     frame = found.quantiles()
     columns = (
-        Column(_LESS, number=False),
-        Column("distance [m]"),
-        Column("deceleration [m/s2]", meaning="equivalent, after the response"),
+        Heading(_LESS, number=False),
+        Heading("distance [m]"),
+        Heading("deceleration [m/s2]", meaning="equivalent, after the response"),
     )
     rows = tuple(
         (
@@ -113,20 +113,20 @@ def _quantiles(found: Distance) -> Table:
         )
         for share, distance, rate in frame.to_numpy()
     )
-    return Table("quantile-table", "The stop that was asked for.", columns, rows)
+    return Rows("quantile-table", "The stop that was asked for.", columns, rows)
 
 
-def _stops(found: Distance) -> Table:
+def _stops(found: Distance) -> Rows:
     columns = (
-        Column("stop", number=False),
-        Column("speed [km/h]"),
-        Column("measured [m]"),
-        Column("predicted [m]", meaning="middle of what the other stops say"),
-        Column("95 % from [m]"),
-        Column("to [m]"),
-        Column("deceleration [m/s2]", meaning="equivalent, after the response"),
-        Column("corrected [m]", meaning="to nominal speed, mass and a level, straight way"),
-        Column("remark", number=False),
+        Heading("stop", number=False),
+        Heading("speed [km/h]"),
+        Heading("measured [m]"),
+        Heading("predicted [m]", meaning="middle of what the other stops say"),
+        Heading("95 % from [m]"),
+        Heading("to [m]"),
+        Heading("deceleration [m/s2]", meaning="equivalent, after the response"),
+        Heading("corrected [m]", meaning="to nominal speed, mass and a level, straight way"),
+        Heading("remark", number=False),
     )
     rows = []
     for one in found.to_frame().to_dict("records"):
@@ -141,7 +141,7 @@ def _stops(found: Distance) -> Table:
         ]
         rows.append((str(one["stop"]), tuple(cells)))
     caption = "Past stops, each as it was measured and as the others predict it."
-    return Table("stop-table", caption, columns, tuple(rows))
+    return Rows("stop-table", caption, columns, tuple(rows))
 
 
 _OF_A_STOP = ("distance", "predicted", "low", "high")
@@ -163,14 +163,14 @@ def _levels(summary: Mapping[str, Any]) -> Dots:
     return Dots(finding, axis, rows, None, min(ends) - room, max(ends) + room)
 
 
-def _safety(summary: Mapping[str, Any]) -> Table:
+def _safety(summary: Mapping[str, Any]) -> Rows:
     columns = (
-        Column("one stop in", number=False),
-        Column("ratio"),
-        Column("95 % from"),
-        Column("to"),
-        Column("variation [%]", meaning="of the probability, from run to run"),
-        Column("by plain sampling [stops]", meaning="that would tell as much"),
+        Heading("one stop in", number=False),
+        Heading("ratio"),
+        Heading("95 % from"),
+        Heading("to"),
+        Heading("variation [%]", meaning="of the probability, from run to run"),
+        Heading("by plain sampling [stops]", meaning="that would tell as much"),
     )
     rows = tuple(
         (
@@ -184,7 +184,7 @@ def _safety(summary: Mapping[str, Any]) -> Table:
         for one in summary["safety"]
     )
     caption = "Deceleration over the nominal one that all but one stop in so many reach."
-    return Table("safety-table", caption, columns, rows)
+    return Rows("safety-table", caption, columns, rows)
 
 
 _TERMS = {

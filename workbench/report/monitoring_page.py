@@ -10,7 +10,7 @@ import numpy as np
 from workbench.fmu import Vector
 from workbench.monitoring import Monitored, Track
 from workbench.report.figures import CaseFigure, Curve, Panel
-from workbench.report.parts import Cell, Column, Part, Strip, Table, number, write_parts
+from workbench.report.parts import Cell, Heading, Part, Rows, Strip, number, write_parts
 from workbench.report.recordings import placed
 from workbench.report.views import capital
 
@@ -159,17 +159,17 @@ def _said(track: Track, found: Monitored) -> str:
     )
 
 
-def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
+def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Rows:
     columns = (
-        Column("told at", number=False),
-        Column("quantity", number=False),
-        Column("changed after", number=False),
-        Column("with 95 %, after", number=False),
-        Column("change"),
-        Column("95 % from"),
-        Column("to"),
-        Column("of nominal [%]"),
-        Column("unit", number=False),
+        Heading("told at", number=False),
+        Heading("quantity", number=False),
+        Heading("changed after", number=False),
+        Heading("with 95 %, after", number=False),
+        Heading("change"),
+        Heading("95 % from"),
+        Heading("to"),
+        Heading("of nominal [%]"),
+        Heading("unit", number=False),
     )
     rows = []
     for one in alarms:
@@ -187,18 +187,18 @@ def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
         )
         rows.append((str(one["told_at"]), cells))
     caption = "All alarms in their order: the recording at which each was told."
-    return Table("alarm-table", caption, columns, tuple(rows))
+    return Rows("alarm-table", caption, columns, tuple(rows))
 
 
-def _quantities(summary: Mapping[str, Any]) -> Table:
+def _quantities(summary: Mapping[str, Any]) -> Rows:
     columns = (
-        Column("quantity", number=False),
-        Column("what it is", number=False),
-        Column("level"),
-        Column("standard error"),
-        Column("trend", meaning="by recording, since the last change"),
-        Column("unit", number=False),
-        Column("told in", meaning="recordings that tell it"),
+        Heading("quantity", number=False),
+        Heading("what it is", number=False),
+        Heading("level"),
+        Heading("standard error"),
+        Heading("trend", meaning="by recording, since the last change"),
+        Heading("unit", number=False),
+        Heading("told in", meaning="recordings that tell it"),
     )
     rows = []
     for name, one in summary["quantities"].items():
@@ -211,15 +211,15 @@ def _quantities(summary: Mapping[str, Any]) -> Table:
         )
         rows.append((name, cells))
     caption = "Mean level of each quantity since its last change."
-    return Table("quantity-table", caption, columns, tuple(rows))
+    return Rows("quantity-table", caption, columns, tuple(rows))
 
 
-def _work(work: Mapping[str, Any]) -> Table:
+def _work(work: Mapping[str, Any]) -> Rows:
     columns = (
-        Column("where", number=False),
-        Column("what it is", number=False),
-        Column("work [MJ]"),
-        Column("over the mean", meaning="wear relative to the others, of one material"),
+        Heading("where", number=False),
+        Heading("what it is", number=False),
+        Heading("work [MJ]"),
+        Heading("over the mean", meaning="wear relative to the others, of one material"),
     )
     rows = tuple(
         (
@@ -232,7 +232,7 @@ def _work(work: Mapping[str, Any]) -> Table:
         )
         for name, one in work.items()
     )
-    return Table("work-table", "Friction work in all recordings together.", columns, rows)
+    return Rows("work-table", "Friction work in all recordings together.", columns, rows)
 
 
 _TERMS = {

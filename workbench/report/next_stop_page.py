@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.experiments import NextStop, RankedExperiment
 from workbench.report.figures import ESTIMATORS, CaseFigure, Curve, Panel
-from workbench.report.parts import Cell, Column, Part, Table, number, write_parts
+from workbench.report.parts import Cell, Heading, Part, Rows, number, write_parts
 from workbench.report.recordings import placed
 from workbench.report.views import capital
 from workbench.units import si_factor
@@ -83,13 +83,13 @@ def _figure(found: NextStop, one: RankedExperiment, place: int) -> CaseFigure:
     )
 
 
-def _tried(summary: Mapping[str, Any]) -> Table:
+def _tried(summary: Mapping[str, Any]) -> Rows:
     single = len(summary["rivals"]) == 1
     unit = summary["tried"][0]["cost"]["unit"]
     told = (
-        [Column("times as sure", meaning="standard deviation of its size before over after")]
+        [Heading("times as sure", meaning="standard deviation of its size before over after")]
         if single
-        else [Column("separation [standard deviations]"), Column("chance [%]")]
+        else [Heading("separation [standard deviations]"), Heading("chance [%]")]
     )
     rows = []
     for k, one in enumerate(summary["tried"], 1):
@@ -105,12 +105,12 @@ def _tried(summary: Mapping[str, Any]) -> Table:
         cost = number(one["cost"]["value"], "{:.3g}".format)
         rows.append((str(k), (Cell(one["experiment"]), *cells, cost)))
     columns = (
-        Column("place", number=False),
-        Column("experiment", number=False),
+        Heading("place", number=False),
+        Heading("experiment", number=False),
         *told,
-        Column(f"cost [{unit}]"),
+        Heading(f"cost [{unit}]"),
     )
-    return Table("tried-table", "What each experiment would tell.", columns, tuple(rows))
+    return Rows("tried-table", "What each experiment would tell.", columns, tuple(rows))
 
 
 _TERMS = {

@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.observability import WINDOW, CaseObservability
 from workbench.report.figures import CaseFigure, Curve, Panel
-from workbench.report.parts import Cell, Column, Part, Table, number, write_parts
+from workbench.report.parts import Cell, Heading, Part, Rows, number, write_parts
 from workbench.report.recordings import placed
 from workbench.report.views import called, capital, named, per_shown, shown_unit
 from workbench.system import System
@@ -108,16 +108,16 @@ def _figure(one: CaseObservability) -> CaseFigure:
     )
 
 
-def _cases(system: System, summary: Mapping[str, Any]) -> Table:
-    columns = [Column("recording", number=False), Column("conditions", number=False)]
+def _cases(system: System, summary: Mapping[str, Any]) -> Rows:
+    columns = [Heading("recording", number=False), Heading("conditions", number=False)]
     for one in system.estimated:
         unit = "" if one.unit == "1" else f" [{one.unit}]"
         columns += [
-            Column(f"{one.name}, median{unit}"),
-            Column(
+            Heading(f"{one.name}, median{unit}"),
+            Heading(
                 f"{one.name} can be told [%]", meaning=f"time with a bound below {one.useful:g}"
             ),
-            Column(f"bound of {one.name}, median{unit}"),
+            Heading(f"bound of {one.name}, median{unit}"),
         ]
     rows = []
     for name, case in summary["cases"].items():
@@ -136,10 +136,10 @@ def _cases(system: System, summary: Mapping[str, Any]) -> Table:
         f"How well windows of {summary['window_s']:g} s know each quantity, over the judged time "
         "of each recording, by the first model."
     )
-    return Table("case-table", caption, tuple(columns), tuple(rows))
+    return Rows("case-table", caption, tuple(columns), tuple(rows))
 
 
-def _states(summary: Mapping[str, Any]) -> list[Table]:
+def _states(summary: Mapping[str, Any]) -> list[Rows]:
     tables = []
     for model, test in summary["linear"].items():
         rows = tuple(
@@ -154,14 +154,14 @@ def _states(summary: Mapping[str, Any]) -> list[Table]:
             for name, one in test["states"].items()
         )
         columns = (
-            Column("state", number=False),
-            Column("left after a second [%]"),
-            Column("scale [unit of the state]"),
-            Column("verdict", number=False),
+            Heading("state", number=False),
+            Heading("left after a second [%]"),
+            Heading("scale [unit of the state]"),
+            Heading("verdict", number=False),
         )
         seen = "observable" if test["observable"] else "not observable"
         caption = f"{model}: rank {test['rank']} of {len(test['states'])}, {seen}."
-        tables.append(Table(f"linear-{model}", caption, columns, rows))
+        tables.append(Rows(f"linear-{model}", caption, columns, rows))
     return tables
 
 

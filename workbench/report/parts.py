@@ -32,7 +32,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Column:
+class Heading:
     """Heading of a column; `meaning` is told where the heading stands."""
 
     title: str
@@ -41,12 +41,12 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class Rows:
     """Rows of cells; the first column holds what a row is of."""
 
     id: str
     caption: str
-    columns: tuple[Column, ...]
+    columns: tuple[Heading, ...]
     rows: tuple[tuple[str, tuple[Cell, ...]], ...]
 
 
@@ -159,7 +159,7 @@ class Part:
     strips: tuple[Strip, ...] = ()
     dots: tuple[Dots, ...] = ()
     recordings: tuple[Mapping[str, Any], ...] = ()
-    tables: tuple[Table, ...] = ()
+    tables: tuple[Rows, ...] = ()
     terms: Mapping[str, str] = field(default_factory=dict)
     printed: bool = False
 

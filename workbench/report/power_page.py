@@ -6,7 +6,7 @@ from typing import Any
 
 from workbench.lab import said
 from workbench.power import VISIBLE
-from workbench.report.parts import Cell, Column, Dot, Dots, Part, Table, number, write_parts
+from workbench.report.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 
 _STYLE = "2"
 _INTERVAL = (
@@ -59,16 +59,16 @@ def _shares(summary: Mapping[str, Any]) -> Dots:
     return Dots(finding, "share of sets [%]", tuple(rows), high=100.0)
 
 
-def _effects(summary: Mapping[str, Any]) -> Table:
+def _effects(summary: Mapping[str, Any]) -> Rows:
     """Effects by sizes, a cell for each share."""
     effects = summary["effects"]
     sizes = sorted({size for one in effects.values() for size in one["right_first"]}, key=float)
     columns = [
-        Column("effect", number=False),
-        Column("1 is", number=False, meaning="least size that is worth a finding"),
-        *(Column(f"x {size} [%]") for size in sizes),
-        Column("intervals hold [%]"),
-        Column("remark", number=False),
+        Heading("effect", number=False),
+        Heading("1 is", number=False, meaning="least size that is worth a finding"),
+        *(Heading(f"x {size} [%]") for size in sizes),
+        Heading("intervals hold [%]"),
+        Heading("remark", number=False),
     ]
     rows = []
     for name, one in effects.items():
@@ -81,7 +81,7 @@ def _effects(summary: Mapping[str, Any]) -> Table:
         "Share of sets in which the planted effect, or a group that it is in, is named first, by "
         "its size over the least that is worth a finding; hits and sets in brackets."
     )
-    return Table("effect-table", caption, tuple(columns), tuple(rows))
+    return Rows("effect-table", caption, tuple(columns), tuple(rows))
 
 
 def _share(one: Mapping[str, Any] | None) -> Cell:
@@ -93,7 +93,7 @@ def _share(one: Mapping[str, Any] | None) -> Cell:
     )
 
 
-def _confusion(summary: Mapping[str, Any]) -> Table:
+def _confusion(summary: Mapping[str, Any]) -> Rows:
     """Planted by named."""
     said = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
     rows = []
@@ -105,8 +105,8 @@ def _confusion(summary: Mapping[str, Any]) -> Table:
         )
         rows.append((planted, cells))
     caption = f"Sets by what was planted (rows, from size {VISIBLE:g} on) and what was named first."
-    columns = (Column("planted", number=False), *(Column(name) for name in said))
-    return Table("confusion-table", caption, columns, tuple(rows))
+    columns = (Heading("planted", number=False), *(Heading(name) for name in said))
+    return Rows("confusion-table", caption, columns, tuple(rows))
 
 
 _TERMS = {

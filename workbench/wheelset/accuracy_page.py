@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.report.figures import ESTIMATORS
-from workbench.report.parts import Cell, Column, Dot, Dots, Part, Table, number, write_parts
+from workbench.report.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 from workbench.report.views import label
 from workbench.system import System
 from workbench.wheelset.accuracy import COVERED, ROWS, StopAccuracy, worst
@@ -68,7 +68,7 @@ def _forces(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Dots:
     return Dots(finding, "error of the force [%], logarithmic", tuple(rows), logarithmic=True)
 
 
-def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
+def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
     rows = tuple(
         (
             row.text,
@@ -80,14 +80,14 @@ def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
         for row in ROWS
     )
     columns = (
-        Column("quantity", number=False),
-        *(Column(text, number=False) for text in names.values()),
+        Heading("quantity", number=False),
+        *(Heading(text, number=False) for text in names.values()),
     )
     caption = "The worst of the stops that a row concerns, below 5 Hz; the stop in brackets."
-    return Table("worst-table", caption, columns, rows)
+    return Rows("worst-table", caption, columns, rows)
 
 
-def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
+def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
     rows = []
     for quantity in COVERED:
         shares = [covered(stops, name, quantity) for name in names]
@@ -95,12 +95,15 @@ def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
             number(None if one is None else 100.0 * one, "{:.1f}".format, one) for one in shares
         )
         rows.append((quantity, tuple(cells)))
-    columns = (Column("quantity", number=False), *(Column(f"{one} [%]") for one in names.values()))
+    columns = (
+        Heading("quantity", number=False),
+        *(Heading(f"{one} [%]") for one in names.values()),
+    )
     caption = "Share of samples in which a 95 % band holds the truth, mean of all stops."
-    return Table("band-table", caption, columns, tuple(rows))
+    return Rows("band-table", caption, columns, tuple(rows))
 
 
-def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
+def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
     rows = []
     for stop in stops:
         forces = (stop.estimators[name].force for name in names)
@@ -110,9 +113,9 @@ def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
         )
         rows.append((stop.name, (Cell(stop.title), *cells)))
     columns = (
-        Column("stop", number=False),
-        Column("conditions", number=False),
-        *(Column(f"{text} [%]") for text in names.values()),
+        Heading("stop", number=False),
+        Heading("conditions", number=False),
+        *(Heading(f"{text} [%]") for text in names.values()),
     )
     caption = "Error of the force in each stop; all quantities are in accuracy.csv."
-    return Table("stop-table", caption, columns, tuple(rows))
+    return Rows("stop-table", caption, columns, tuple(rows))
