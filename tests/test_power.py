@@ -14,6 +14,7 @@ import pytest
 from scipy.stats import binom
 
 from workbench.__main__ import main
+from workbench.diagnosis.clocks import late_signals
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
@@ -97,7 +98,8 @@ def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside
     )
     faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
     rig = {field.name for field in dataclasses.fields(Effects)} - faults_of_the_acquisition
-    assert {one.name for one in (*PLANTABLE, *SHEET_ERRORS)} == rig
+    clocks = {name for name in rig if name.startswith("late_")}  # of loggers that are not declared
+    assert {one.name for one in (*PLANTABLE, *SHEET_ERRORS)} == rig - clocks
 
 
 def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:
@@ -117,6 +119,8 @@ def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Pa
     """Beyond them no fit could find it. A size that cannot be negative is never planted so."""
     with FMU(all_effects) as fmu:
         bounds = {v.name: (v.minimum, v.maximum) for v in fmu.description.variables}
+    block = SYSTEM.comparison.block
+    bounds |= {name: (-block, block) for name in late_signals(SYSTEM)}
     for effect in REPERTOIRE.effects:
         one = next(one for one in PLANTABLE if one.effect == effect.name)
         low, high = bounds[variables(effect, effect.size)[0]]

@@ -17,19 +17,19 @@ PUMPS = """
 import hashlib
 from pathlib import Path
 import numpy as np
-from workbench.prepare import Layout, Published, Recording
+from workbench.prepare import FolderLayout, Published, PublishedRecording
 
 def read(folder):
     names = (folder / "pumps.txt").read_text().split()
     columns = {"time [s]": np.arange(3.0), "p [bar]": np.ones(3)}
-    made = lambda name: Recording(
+    made = lambda name: PublishedRecording(
         name, name, columns, "pumps.txt", (0, 2), held_out="test" in name, machine=name[0]
     )
     return [made(name) for name in names]
 
 def layout(names):
     checksum = hashlib.sha256(" ".join(names).encode()).hexdigest()
-    return Layout("a list", {"pumps.txt": checksum}, read)
+    return FolderLayout("a list", {"pumps.txt": checksum}, read)
 
 PUBLISHED = Published("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
 """

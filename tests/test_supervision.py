@@ -79,6 +79,8 @@ IN_A_CLASS = """\
 import os, signal, sys, time
 from workbench.supervision import supervised
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs in the background ignores it
+
 
 class Named:
     def __set_name__(self, owner, name):

@@ -202,7 +202,7 @@ def tune(
     generations: int = 100,
     population: int = 15,
     seed: int = 1,
-    reference: str | None = None,
+    judge_by: str | None = None,
     workers: int | None = None,
     report: Callable[[str], None] = print,
 ) -> Tuned | None:
@@ -211,7 +211,7 @@ def tune(
     Parameters
     ----------
     population : candidates per gain.
-    reference : estimator to judge by where no sensor does, "smoother"; by what is measured if None.
+    judge_by : estimator to judge by where no sensor does, "smoother"; by what is measured if None.
     workers : processes, one per processor unless another number is given.
     report : takes a line on each generation.
 
@@ -219,7 +219,7 @@ def tune(
     -------
     Tuned, or None if it was interrupted before there was anything to return.
     """
-    problem = pose(system, estimator, cases, reference=reference)
+    problem = pose(system, estimator, cases, judge_by=judge_by)
     plan = Plan(generations, population, seed)
     with (
         tempfile.TemporaryDirectory(prefix="tune-") as scratch,

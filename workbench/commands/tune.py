@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     if options.scale_error is not None:
         share = options.scale_error / 100.0
         errors = {one.name: share for one in system.outputs if one.scale_error and share}
-    problem = pose(system, options.estimator, cases, errors, options.reference)
+    problem = pose(system, options.estimator, cases, errors, options.judge_by)
     with claimed(out):
         return _run(options, output, problem, len(cases), out)
 

@@ -25,7 +25,7 @@ enum { LAW_OK, LAW_REFUSED, LAW_SINGULAR };
 
 /* Each counterpart of a function of workbench/kernel.py refuses what an FMU refuses there. */
 
-static inline int plant_set_inputs(LawModel *model, int first, int count) {
+static inline int plant_set_inputs(LawModelView *model, int first, int count) {
     for (int k = first; k < first + count; k++) {
         if (!isfinite(model->u[k])) {
             return LAW_REFUSED;
@@ -37,7 +37,7 @@ static inline int plant_set_inputs(LawModel *model, int first, int count) {
     return LAW_OK;
 }
 
-static inline int plant_set_states(LawModel *model) {
+static inline int plant_set_states(LawModelView *model) {
     for (int k = 0; k < PLANT_NX; k++) {
         if (!isfinite(model->x[k])) {
             return LAW_REFUSED;
@@ -47,12 +47,12 @@ static inline int plant_set_states(LawModel *model) {
     return LAW_OK;
 }
 
-static inline int plant_place(LawModel *model) {
+static inline int plant_place(LawModelView *model) {
     const int status = plant_set_inputs(model, 0, LAW_SET);
     return status != LAW_OK ? status : plant_set_states(model);
 }
 
-static inline int plant_evaluate(LawModel *model) {
+static inline int plant_evaluate(LawModelView *model) {
     const double *const p = plant_parameter[model->number];
     int status = plant_derivatives(0.0, model->at_x, model->at_u, p, model->dx);
     for (int k = 0; k < PLANT_NX; k++) {
@@ -61,7 +61,7 @@ static inline int plant_evaluate(LawModel *model) {
     return status != 0 ? LAW_REFUSED : LAW_OK;
 }
 
-static inline int plant_read(LawModel *model) {
+static inline int plant_read(LawModelView *model) {
     const double *const p = plant_parameter[model->number];
     double w[PLANT_NW + 1];
     int status = plant_algebraics(0.0, model->at_x, model->at_u, p, w);
@@ -74,7 +74,7 @@ static inline int plant_read(LawModel *model) {
 }
 
 /* Row `row` of the Jacobian from its nonzeros, those of column `column` of the model's. */
-static inline int plant_scatter(LawModel *model, const double *nonzero, int row, int column, int count) {
+static inline int plant_scatter(LawModelView *model, const double *nonzero, int row, int column, int count) {
     double *const out = model->jacobian + row * LAW_UNKNOWNS;
     int status = LAW_OK;
     for (int k = 0; k < count; k++) {
@@ -91,7 +91,7 @@ static inline int plant_scatter(LawModel *model, const double *nonzero, int row,
     return status;
 }
 
-static inline int plant_differentiate(LawModel *model, int row, int count) {
+static inline int plant_differentiate(LawModelView *model, int row, int count) {
     const double *const p = plant_parameter[model->number];
     const int column = row < PLANT_NX ? row : PLANT_NX + plant_input[LAW_INPUTS + row - PLANT_NX];
     double nonzero[PLANT_NNZ_XU + 1];
@@ -101,7 +101,7 @@ static inline int plant_differentiate(LawModel *model, int row, int count) {
     return plant_scatter(model, nonzero, row, column, count);
 }
 
-static inline int plant_linearise(LawModel *model, int count) {
+static inline int plant_linearise(LawModelView *model, int count) {
     const double *const p = plant_parameter[model->number];
     double nonzero[PLANT_NNZ_XU + 1];
     if (plant_jacobian_xu(0.0, model->at_x, model->at_u, p, nonzero) != 0) {

@@ -5,13 +5,13 @@
 
 /* Numbers of models, LAW_MODELS, of measured inputs and outputs, LAW_INPUTS and LAW_OUTPUTS, of
  * entries of an estimate, LAW_ROW, of inputs that the law sets and outputs that it reads, LAW_SET and
- * LAW_READ, of rows and columns of its Jacobian, LAW_KNOWNS and LAW_UNKNOWNS. LawModel, and the
+ * LAW_READ, of rows and columns of its Jacobian, LAW_KNOWNS and LAW_UNKNOWNS. LawModelView, and the
  * structs of settings and memory, LawSettings_ and LawMemory_. */
 #include "law_data.h"
 
 /* Models and memory of the law. */
 typedef struct {
-    LawModel model[LAW_MODELS];
+    LawModelView model[LAW_MODELS];
     LawMemory_ memory;
 } Law;
 

@@ -93,7 +93,7 @@ def _tune() -> Schema:
             "cases": listed(TEXT),
             "scale_errors": by_name(NUMBER),
             "weights": by_name(NUMBER),
-            "reference": TEXT,
+            "judged_by": TEXT,
             "seed": WHOLE,
             "population": WHOLE,
         }

@@ -156,7 +156,7 @@ def pose(
     estimator: str,
     cases: Sequence[Case],
     scale_errors: Mapping[str, float] | None = None,
-    reference: str | None = None,
+    judge_by: str | None = None,
 ) -> Problem:
     """Gains to start from, bounds to search in, and recordings to judge by.
 
@@ -164,7 +164,7 @@ def pose(
     ----------
     estimator : its name.
     scale_errors : relative [1], by output; see `recordings`. None: as the system says.
-    reference : estimator to judge by where no sensor does, see `with_reference`. None: as measured.
+    judge_by : estimator to judge by where no sensor does, see `with_reference`. None: as measured.
 
     Raises
     ------
@@ -172,8 +172,8 @@ def pose(
         If there is no such estimator, the model is not fit for it, or a case cannot judge.
     """
     kind = tunable(system, estimator)
-    if reference is not None:
-        cases = with_reference(cases, system, reference)
+    if judge_by is not None:
+        cases = with_reference(cases, system, judge_by)
     if scale_errors is None:
         scale_errors = {one.name: one.scale_error for one in system.outputs if one.scale_error}
     # A recording shows nothing slower than itself, and its samples carry nothing faster.
@@ -192,7 +192,7 @@ def pose(
             "cases": [case.name for case in cases],
             "scale_errors": dict(scale_errors),
             "weights": dict(system.objective.weights),
-            "reference": reference or "sensors",
+            "judged_by": judge_by or "sensors",
         }
         content = model.path.read_bytes()
     judged = recordings(cases, system, scale_errors)

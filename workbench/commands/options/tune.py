@@ -29,7 +29,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench tune disturbance_observer\n"
         "  python -m workbench tune parameter_estimator --budget 20 --out /tmp/quick\n"
         "  python -m workbench tune disturbance_observer --folds 5\n"
-        "  python -m workbench tune disturbance_observer --reference smoother\n"
+        "  python -m workbench tune disturbance_observer --judge-by smoother\n"
         "  python -m workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -94,7 +94,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
         help="also tune K times without a K-th of the cases, and judge on these",
     )
     parser.add_argument(
-        "--reference",
+        "--judge-by",
         metavar="ESTIMATOR",
         help="judge by one that knows whole recordings, such as smoother, what no sensor measures "
         "(default: by what is measured)",
