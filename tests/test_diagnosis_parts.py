@@ -12,6 +12,7 @@ pytest.importorskip("rumoca")
 from workbench.case import Case, read_cases
 from workbench.diagnosis import choose, read_effects
 from workbench.diagnosis.cleaning import outliers
+from workbench.diagnosis.clocks import in_time
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
@@ -153,6 +154,23 @@ def noisy(seed: int, spikes: tuple[int, ...] = ()) -> Case:
 def ready(case: Case) -> Samples:
     with FMU(MINIMAL) as fmu:
         return prepare(case, fmu)
+
+
+@pytest.mark.parametrize("share", [0.5, -0.5, 2.3])
+def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share: float) -> None:
+    """A line between two samples would have half of its variance, and half a sample be favoured.
+
+    Of 6000 samples the standard deviation is known to 1 %; the mean of ten that moves adds 0.5 %.
+    """
+    samples = ready(noisy(2))
+    late, j = share * SYSTEM.sample_time, samples.signals.index("omegaR")
+    ramp, rng = -3.0 * samples.time, np.random.default_rng(5)
+    y = samples.y.copy()
+    y[:, j] = ramp + 0.1 * rng.standard_normal(ramp.size)
+    found = in_time(replace(samples, y=y), {"omegaR": late}).y[:, j] - (ramp - 3.0 * late)
+    inside = slice(20, -20)  # before the first and after the last sample nothing was recorded
+    assert np.std(found[inside]) == pytest.approx(0.1, rel=0.05)
+    assert abs(np.mean(found[inside])) < 5e-3
 
 
 def test_spikes_are_set_aside_with_their_blocks() -> None:

@@ -79,7 +79,7 @@ class Fit:
     @property
     def reference(self) -> str:
         """The signal against which clocks of others are late."""
-        return self._simulations.recordings[0].signals[0]
+        return self._simulations.system.outputs[0].name
 
     @property
     def own_clocks(self) -> tuple[Effect, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
-from workbench.diagnosis.clocks import listed
 from workbench.diagnosis.counting import FAULTY, MISSING
 from workbench.diagnosis.residuals import Dependence, Residuals
 from workbench.diagnosis.rivals import Rivals
@@ -314,7 +313,7 @@ def _late(late: Late) -> str:
         return "several signals are late by different times; say in [loggers] which share a logger"
     reach = 1.96 * late.sigma
     size = with_interval(late.skew, late.skew - reach, late.skew + reach, "s")
-    signals = listed(late.signals)
+    signals = " and ".join(late.signals)
     return (
         f"{signals} late by {size} against the others, which no logger of the system file has alone"
     )
