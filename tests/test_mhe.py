@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import least_squares, lsq_linear
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
@@ -165,6 +165,22 @@ def residuals(
     return np.concatenate([term.ravel() for term in terms]), ends
 
 
+SIZES = np.array([0.01, 0.01, 1e-5])  # of what a node holds
+
+
+def least(samples: tuple[Vector, Matrix, Matrix]) -> OptimizeResult:
+    """Best nodes, by scipy on the textbook terms of tanks with a bent leak, from true levels."""
+    nodes = samples[0].size - 1
+    return least_squares(
+        lambda x: residuals(x, "Bent", samples)[0],
+        *(np.tile([0.95, 0.75, 0.0], nodes),),
+        x_scale=np.tile(SIZES, nodes),
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+
+
 def horizon(
     fmu: FMU, known: System, samples: int, iterations: int = 1, rare: float = 1e-6
 ) -> MovingHorizonEstimator:
@@ -231,23 +247,14 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(
 ) -> None:
     """Reference: scipy on the textbook terms, from the true levels."""
     samples = recording("Bent", 30)
-    begin = np.tile([0.95, 0.75, 0.0], 29)
-    scale = np.tile([0.01, 0.01, 1e-5], 29)
-    best = least_squares(
-        lambda x: residuals(x, "Bent", samples)[0],
-        *(begin,),
-        x_scale=scale,
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-    )
+    best = least(samples)
     estimator = horizon(*bent, 40, iterations=8)
     estimator.run(*samples)
     window = estimator._memory.window
     count = window.filled[0]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
-    found = window.nodes[:count].ravel()
-    assert_allclose(found / scale, best.x / scale, rtol=0, atol=2e-4)
+    found = window.nodes[:count] / SIZES
+    assert_allclose(found, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
     assert cost(window) == pytest.approx(2.0 * best.cost, rel=1e-7)
     assert_allclose(
         estimator._memory.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
@@ -375,15 +382,7 @@ def test_the_smoother_solves_the_nonlinear_least_squares_problem(
 ) -> None:
     """Reference: scipy on the textbook terms, from the true levels."""
     samples = recording("Bent", 60)
-    scale = np.tile([0.01, 0.01, 1e-5], 59)
-    best = least_squares(
-        lambda x: residuals(x, "Bent", samples)[0],
-        *(np.tile([0.95, 0.75, 0.0], 59),),
-        x_scale=scale,
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-    )
+    best = least(samples)
     found = smoother(*bent).run(*samples)
     ends = residuals(best.x, "Bent", samples)[1]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.

@@ -15,7 +15,7 @@ from workbench.diagnosis import Effect, Outcome, catalogue, choose, diagnose
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import Library, read_library
-from workbench.proposing import needs_law, propose
+from workbench.proposing import needs_law
 from workbench.provenance import run_of, sources
 from workbench.report.diagnosis import write_diagnosis
 from workbench.report.proposal import write_proposal
@@ -63,18 +63,23 @@ def _propose(
     options: argparse.Namespace,
     output: Output,
     outcome: Outcome,
-    library: Library,
-    effects: tuple[Effect, ...],
     held_out: Sequence[Case],
     provenance: Mapping[str, Any],
 ) -> None:
     """Propose a law, if no effect explains what is missing."""
+    from workbench.api import propose  # all of the workbench, which a diagnosis alone does not need
+
     if not needs_law(outcome):
         output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
     folder = options.out / "proposed"
     found = propose(
-        *(outcome, library, effects, folder, options.workers, output.stage), held_out=held_out
+        outcome,
+        held_out=held_out,
+        effects=options.effects,
+        out=folder,
+        workers=options.workers,
+        report=output.stage,
     )
     page = write_proposal(found, provenance, folder, options.workers)
     output.result(f"\n{found.summary()}")
@@ -107,7 +112,7 @@ def _run(
     output.result(outcome.summary())
     page = write_diagnosis(outcome, provenance, options.out, options.workers)
     if options.propose:
-        _propose(options, output, outcome, library, effects, held_out, provenance)
+        _propose(options, output, outcome, held_out, provenance)
     output.stage("done")
     output.result(f"to read: {page}, data and figures beside it")
     status = 130 if outcome.diagnosis.interrupted else 0

@@ -130,7 +130,7 @@ def _usual(
     write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)
     output.result(format_power(summary))
     output.result(f"to read: {options.out / 'index.html'}, data and figures beside it")
-    done = _told(options.out / "power.json", interrupted)
+    done = _written(options.out / "power.json", interrupted)
     return replace(done, page=options.out / "index.html")
 
 
@@ -146,9 +146,7 @@ def _sheet_error(
     results, interrupted = _diagnosed(options, output, groups, system, rig, effects, out)
     rows = summarise_sheet(results)
     write_sheet(rows, _provenance(options, system, rig, interrupted), out)
-    output.result(format_sheet(rows))
-    output.result(f"data: {out}")
-    return _told(out / "sheet_error.json", interrupted)
+    return _told(output, format_sheet(rows), out / "sheet_error.json", interrupted)
 
 
 def _left_out(
@@ -166,9 +164,7 @@ def _left_out(
         report=output.stage,
     )
     write_left_out(rows, _provenance(options, system, rig, interrupted), out)
-    output.result(format_left_out(rows))
-    output.result(f"data: {out}")
-    return _told(out / "left_out.json", interrupted)
+    return _told(output, format_left_out(rows), out / "left_out.json", interrupted)
 
 
 def _thresholds(
@@ -185,9 +181,7 @@ def _thresholds(
     usual = values(thresholds(len(effects)))
     out = options.out / "thresholds"
     write_thresholds(results, usual, _provenance(options, system, rig, interrupted), out)
-    output.result(format_thresholds(results, usual))
-    output.result(f"data: {out}")
-    return _told(out / "thresholds.json", interrupted)
+    return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)
 
 
 def _foreseen(
@@ -202,12 +196,17 @@ def _foreseen(
     output.stage("one set without any effect is made and diagnosed")
     rows = foresee(system, rig, effects, wanted, sizes, options.seed)
     write_plan(rows, sizes, _provenance(options, system, rig, False), out)
-    output.result(format_plan(rows, sizes))
-    output.result(f"data and figure: {out}")
-    return _told(out / "plan.json", False)
+    return _told(output, format_plan(rows, sizes), out / "plan.json", False)
 
 
-def _told(path: Path, interrupted: bool) -> Done:
+def _told(output: Output, text: str, path: Path, interrupted: bool) -> Done:
+    """Say what was found and where it is written."""
+    output.result(text)
+    output.result(f"data: {path.parent}")
+    return _written(path, interrupted)
+
+
+def _written(path: Path, interrupted: bool) -> Done:
     """What was written; sizes are in the unit that stands beside them, or of `matters`."""
     return Done(read_result(path), {"seconds": "s"}, 130 if interrupted else 0)
 

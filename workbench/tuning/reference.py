@@ -28,9 +28,8 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
     known = {name: kind for name, kind in estimators(system).items() if kind.offline}
     if estimator not in known:
         raise InputError(
-            where=f"reference '{estimator}'",
-            found=f"no estimator of this name that knows whole recordings"
-            f"{closest(estimator, known)}",
+            where=f"estimator '{estimator}' to judge by",
+            found=f"none of this name that knows whole recordings{closest(estimator, known)}",
             expected=f"one of {', '.join(known)}",
             remedy="correct the name",
         )
