@@ -309,7 +309,9 @@ def _observers(
     errors: dict[str, dict[str, list[float]]] = {}
     counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
     sizes = diagnosis.best.point.sizes
-    late = lateness(system, {f"{name}.{of}": size for (name, of), size in sizes.items()})
+    late = lateness(
+        late_signals(system), {f"{name}.{of}": size for (name, of), size in sizes.items()}
+    )
     after = (
         with_model(system, OBSERVER, extension.fmu),
         [case_in_time(one, late) for one in cases],

@@ -64,15 +64,18 @@ def late_signals(system: System) -> dict[str, tuple[str, ...]]:
     return {variables(one, SKEW)[0]: one.late for one in (*clocks(system), *own_clocks(system))}
 
 
-def lateness(system: System, values: Mapping[str, float]) -> dict[str, float]:
+def lateness(
+    signals_of: Mapping[str, tuple[str, ...]], values: Mapping[str, float]
+) -> dict[str, float]:
     """By how much signals are late [s], of those that are.
 
     Parameters
     ----------
-    values : by name, see `late_signals`; others are zero.
+    signals_of : see `late_signals`.
+    values : by the same names; others are zero.
     """
     late: dict[str, float] = {}
-    for name, signals in late_signals(system).items():
+    for name, signals in signals_of.items():
         for signal in signals if values.get(name, 0.0) != 0.0 else ():
             late[signal] = late.get(signal, 0.0) + values[name]
     return late

@@ -208,7 +208,7 @@ class Simulator:
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording as by one clock."""
-        return in_time(self._recordings[number], lateness(self._system, values))
+        return in_time(self._recordings[number], lateness(self._clocks, values))
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the FMU's variables."""
@@ -222,7 +222,7 @@ class Simulator:
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
         """What sensors read of signals (n, c, ...), behind structures and late."""
-        one, late = self._recordings[number], lateness(self._system, values)
+        one, late = self._recordings[number], lateness(self._clocks, values)
         if self._delays or late:
             signals = signals.copy()
         for j, (name, _) in self._delays.items():
