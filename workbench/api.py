@@ -284,7 +284,8 @@ def propose(
 
     Parameters
     ----------
-    found : a diagnosis that left something unexplained, or that needed several effects.
+    found : a diagnosis that left something unexplained, that needed several effects, or beside
+        whose one cause errors last.
     held_out, effects, out, workers, report : as of `diagnose`.
 
     Raises
@@ -296,7 +297,7 @@ def propose(
         raise InputError(
             where="the diagnosis",
             found=f"the verdict '{found.diagnosis.verdict}'",
-            expected="'unexplained', or several causes",
+            expected="'unexplained', several causes, or one beside which errors last",
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
     library, chosen = _catalogue(found.system, effects)

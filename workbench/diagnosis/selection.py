@@ -80,9 +80,9 @@ def search(
     """Find what is missing, or what is missing beside what was when other samples counted."""
     if begun is None:
         report("nominal model, levels calibrated")
-        best, steps = _anew(fit, fit.unknowns.start(), ()), list[Step]()
+        best, steps = anew(fit, fit.unknowns.start(), ()), list[Step]()
     else:
-        best, steps = _anew(fit, begun.best.point, begun.best.active), list(begun.steps)
+        best, steps = anew(fit, begun.best.point, begun.best.active), list(begun.steps)
     best, trial, interrupted = seek(fit, catalogue, best, steps, (), report)
     return Sought(best, steps, trial, interrupted, begun)
 
@@ -98,7 +98,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
     if begun is None:
         base = steps[0].before if steps else best
     else:
-        base = _anew(fit, begun.base.point, ())
+        base = anew(fit, begun.base.point, ())
     earlier = 0 if begun is None else len(begun.steps)
     validation, dropped = CrossValidation(fit), set[Effect]()
     while True:
@@ -132,7 +132,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
     )
 
 
-def _anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
+def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
     """A fit that begins at a point, with all derivatives."""
     # A point of its own, by which it is told from a fit to other samples.
     one = fitted(fit, fit.at(replace(point)), active)

@@ -1,6 +1,6 @@
 """A law for what no effect explains: where it acts, what it depends on, and its form.
 
-laws about the nominal model, by evidence -> free functions, fitted -> closed forms of the best
+laws about what is known, by evidence -> free functions, fitted -> closed forms of the best
     -> diagnosis with these beside the catalogue, on recordings that were held out
 """
 
@@ -22,9 +22,10 @@ from workbench.diagnosis import (
 )
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.search import Reporter, beyond
-from workbench.diagnosis.selection import search
-from workbench.diagnosis.thresholds import thresholds
+from workbench.diagnosis.search import Fitted, Reporter, Step, beyond, seek
+from workbench.diagnosis.selection import anew
+from workbench.diagnosis.thresholds import Thresholds, thresholds
+from workbench.diagnosis.verdict import Diagnosis
 from workbench.files import write_whole
 from workbench.modelica import Library
 from workbench.proposing.forms import WrittenForm, candidates
@@ -42,9 +43,16 @@ _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 
 def needs_law(before: Outcome) -> bool:
-    """Whether a diagnosis leaves a law to propose: unexplained, or explained by several."""
+    """Whether a diagnosis leaves a law to propose: something unexplained, or several causes."""
     found = before.diagnosis
-    return found.late is None and (found.verdict == "unexplained" or len(found.causes) > 1)
+    left = found.verdict == "unexplained" or len(found.causes) > 1 or _more(found)
+    return found.late is None and left
+
+
+def _more(found: Diagnosis) -> bool:
+    """Whether beside the one cause that was found errors last: it explains most, and not all."""
+    lasting = float(found.best.linearised.inflation.max())
+    return len(found.causes) == 1 and lasting >= Thresholds.wrong
 
 
 def propose(
@@ -62,7 +70,8 @@ def propose(
     Parameters
     ----------
     before : the diagnosis that left something unexplained, or that needed several effects: then a
-        law is proposed only if it makes the description shorter.
+        law is proposed only if it makes the description shorter. Where errors last beside a single
+        cause, a law is sought beside that.
     library, effects, held_out : as of that.
     out : folder of the extended model and of the generated classes.
     report : takes a line on what is being done.
@@ -73,9 +82,10 @@ def propose(
         If the library cannot be compiled, or the model is none of this library.
     """
     system, cases = before.system, before.cases
-    scan = Scan(system, library, cases, workers, report)
+    about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
+    scan = Scan(system, library, cases, workers, report, about)
     able = _likeliest(scan.prospects)
-    estimates = estimated(system, library, cases, workers, report, able) if able else []
+    estimates = estimated(system, library, cases, workers, report, able, about) if able else []
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
     decides = thresholds(len(scan.prospects), left=system.comparison.left)
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
@@ -83,7 +93,7 @@ def propose(
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
     forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
-    forms = _surviving(system, library, cases, forms, workers, report)
+    forms = _surviving(system, library, cases, forms, workers, report, about)
     found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
     proposal = Proposal(before, *found, forms, None)
     # Beside what bends to the rest, a law may not be seen; alone it may explain a part.
@@ -132,6 +142,7 @@ def _surviving(
     forms: Mapping[str, WrittenForm],
     workers: int,
     report: Reporter,
+    about: Fitted,
 ) -> dict[str, WrittenForm]:
     """The closed form with the shortest description, first, and those that are as good.
 
@@ -143,12 +154,14 @@ def _surviving(
     with tempfile.TemporaryDirectory() as scratch:
         extended, own = _as_effects(library, base, forms, Path(scratch))
         path = Path(scratch) / "Forms.fmu"
-        build_everything(system, extended, own, path)
+        every = [*about.active, *own]
+        build_everything(system, extended, every, path)
         given = given_values(path, system)
+        steps: list[Step] = []
         with Simulations(path, system, given, cases, workers, report=report) as simulations:
             decides = thresholds(len(own), left=system.comparison.left)
-            fit = Fit(simulations, own, replace(decides, most=1))
-            steps = search(fit, own, report).steps
+            fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
+            seek(fit, own, anew(fit, about.point, about.active), steps, (), report)
     if not steps:
         return {}
     before, rivals = steps[0].before, steps[0].rivals

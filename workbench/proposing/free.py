@@ -17,6 +17,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Key
 from workbench.diagnosis.search import Fitted, Reporter, fitted
+from workbench.diagnosis.selection import anew
 from workbench.errors import FMUError, InputError
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
@@ -61,9 +62,9 @@ class FittedLaw:
 
     Attributes
     ----------
-    prospect : about the nominal model.
+    prospect : about what is known.
     deviance : of the fit, see `Linearised`.
-    evidence : log of the marginal likelihood over that of the nominal model.
+    evidence : log of the marginal likelihood over that of what is known.
     coefficients, posterior : of the function, (K,) and their covariance, (K, K).
     """
 
@@ -138,6 +139,7 @@ def estimated(
     workers: int,
     report: Reporter,
     prospects: Sequence[LawProspect],
+    about: Fitted,
 ) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
@@ -147,17 +149,16 @@ def estimated(
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "Free.fmu"
         report(f"compiling {len(prospects)} free functions")
-        able = _compiled(system, library, prospects, path)
+        able = _compiled(system, library, prospects, path, about.active)
         if not able:
             return []
         effects = _effects(library, able)
         given = given_values(path, system)
         with Simulations(path, system, given, cases, workers, report=report) as simulations:
-            none = Fit(simulations, effects)
-            nominal = fitted(none, none.at(none.unknowns.start()), ())
+            fit = Fit(simulations, [*about.active, *effects])
             report("fitting free functions")
-            job = partial(_estimate, simulations, nominal)
-            tried = none.together(job, list(zip(effects, able, strict=True)))
+            job = partial(_estimate, simulations, anew(fit, about.point, about.active))
+            tried = fit.together(job, list(zip(effects, able, strict=True)))
     found = [one for one in tried if one is not None]
     return sorted(found, key=lambda one: -one.evidence)
 
@@ -173,7 +174,11 @@ def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
 
 
 def _compiled(
-    system: System, library: Library, prospects: Sequence[LawProspect], path: Path
+    system: System,
+    library: Library,
+    prospects: Sequence[LawProspect],
+    path: Path,
+    known: Sequence[Effect],
 ) -> list[LawProspect]:
     """Build the FMU of free functions; returns those that it has.
 
@@ -183,7 +188,7 @@ def _compiled(
     with tempfile.TemporaryDirectory() as scratch:
         written = [_written(f"Free{k}", one) for k, one in enumerate(prospects)]
         extended = extended_library(library, written, Path(scratch))
-        effects = _effects(library, prospects)
+        effects = [*known, *_effects(library, prospects)]
         text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
         try:
             build(extended, "FreeFunctions", text, path, every_platform=False)
@@ -192,32 +197,33 @@ def _compiled(
                 return []
         else:
             return list(prospects)
-    able = [one for one in prospects if _compiled(system, library, [one], path)]
-    return _compiled(system, library, able, path) if able else []
+    able = [one for one in prospects if _compiled(system, library, [one], path, known)]
+    return _compiled(system, library, able, path, known) if able else []
 
 
 def _estimate(
-    simulations: Simulations, nominal: Fitted, item: tuple[Free, LawProspect]
+    simulations: Simulations, base: Fitted, item: tuple[Free, LawProspect]
 ) -> FittedLaw | None:
     """Fit one function; None if it leads where the model has no solution."""
     try:
-        return _fitted(simulations, nominal, *item)
+        return _fitted(simulations, base, *item)
     except (FMUError, np.linalg.LinAlgError):
         return None
 
 
 def _fitted(
-    simulations: Simulations, nominal: Fitted, effect: Free, prospect: LawProspect
+    simulations: Simulations, base: Fitted, effect: Free, prospect: LawProspect
 ) -> FittedLaw:
-    smoothness, best = prospect.smoothness, nominal
+    smoothness, best = prospect.smoothness, base
     keys = [(effect.name, name) for name in effect.sizes]
     for _ in range(_ROUNDS):
         inverse: Matrix = np.asarray(np.linalg.inv(smoothness.covariance), np.float64)
         effect = replace(effect, inverse=inverse)
-        fit = Fit(simulations, [effect])
+        active = (*base.active, effect)
+        fit = Fit(simulations, active)
         start = _started(fit, best, keys, smoothness.coefficients)
-        best = fitted(fit, start, (effect,), spread=start.spread)
-        lin = fit.linearise(best.linearised, (effect,))
+        best = fitted(fit, start, active, spread=start.spread)
+        lin = fit.linearise(best.linearised, active)
         joint = fit.quadratics(lin)
         N, g = eliminated(joint, keys)
         # Of the data alone, about no function: the prior is put in anew.
@@ -225,7 +231,7 @@ def _fitted(
         N = N - effect.precision
         g = g - effect.precision @ now - N @ now
         smoothness = smoothest(N, g)
-    gained = nominal.linearised.deviance - best.linearised.deviance
+    gained = base.linearised.deviance - best.linearised.deviance
     spread = np.linalg.slogdet(np.eye(len(keys)) + N @ np.linalg.inv(effect.precision))[1]
     return FittedLaw(
         prospect,
@@ -240,9 +246,9 @@ def _started(fit: Fit, best: Fitted, keys: Sequence[Key], coefficients: Vector) 
     """Where a fit with a free function begins: as much of it as lowers the deviance."""
     before = best.linearised.deviance
     for share in _BEGUN:
-        sizes = dict(zip(keys, map(float, share * coefficients), strict=True))
-        tried = fit.tried(replace(best.point, sizes=sizes))
+        now = dict(zip(keys, map(float, share * coefficients), strict=True))
+        tried = fit.tried(replace(best.point, sizes={**best.point.sizes, **now}))
         if tried is not None and tried.deviance < before:
             return tried
-    old = best.point.sizes or dict.fromkeys(keys, 0.0)
-    return fit.at(replace(best.point, sizes=old))
+    none = dict.fromkeys(keys, 0.0)
+    return fit.at(replace(best.point, sizes={**none, **best.point.sizes}))

@@ -95,9 +95,13 @@ class Proposal:
         ]
         beside = f", beside {' and '.join(known)}" * bool(known)
         part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
+        alone = self.before.diagnosis.gain
+        first_error = (
+            alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
+        )
         return (
             f"{MARK.capitalize()}{part}: {'; and '.join(map(self._said, self.laws))}{beside}. On "
-            f"held-out recordings the error falls from {gain.before:.1f} to {gain.after:.1f} times "
+            f"held-out recordings the error falls from {first_error:.1f} to {gain.after:.1f} times "
             f"the noise. As a free function it is {where}."
         )
 

@@ -1,4 +1,4 @@
-"""Where a law acts and what it depends on: all of them about the nominal model, by evidence."""
+"""Where a law acts and what it depends on: all of them about what is known, by evidence."""
 
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,8 @@ from workbench.diagnosis.extension import build, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.quadratic import Joint, Key
-from workbench.diagnosis.search import Reporter, fitted
+from workbench.diagnosis.search import Fitted, Reporter
+from workbench.diagnosis.selection import anew
 from workbench.diagnosis.slots import read_slots
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
@@ -33,12 +34,12 @@ _SIZE = "d"  # of a probe
 
 @dataclass(frozen=True, eq=False)
 class LawProspect:
-    """A law, as a free function about the nominal model.
+    """A law, as a free function about what is known.
 
     Attributes
     ----------
     knots : where its function lives; None for a constant.
-    largest : of the output of its place, nominally.
+    largest : of the output of its place, without it.
     """
 
     law: Law
@@ -66,14 +67,14 @@ def _probe(place: Place) -> Written:
 
 
 class Scan:
-    """All laws about the nominal model.
+    """All laws about what is known: the nominal model, or that with what was found.
 
     A law that is small acts as a parameter that is added to the output of its slot, and that
-    changes in time as the law says along the nominal motion; so one FMU serves all of them.
+    changes in time as the law says along the motion without it; so one FMU serves all of them.
 
     Attributes
     ----------
-    base : the nominal model, fitted.
+    base : what is known, fitted.
     prospects : of all laws, the likeliest first.
     """
 
@@ -84,6 +85,7 @@ class Scan:
         cases: Sequence[Case],
         workers: int,
         report: Reporter,
+        about: Fitted,
     ) -> None:
         base = system.models[OBSERVER].name
         where = tuple(places(library, base, read_slots(library, base)))
@@ -92,7 +94,8 @@ class Scan:
         )
         with tempfile.TemporaryDirectory() as scratch:
             extended = extended_library(library, map(_probe, where), Path(scratch))
-            effects = [effect_at(place.name, library, place, _SIZE) for place in where]
+            probes = [effect_at(place.name, library, place, _SIZE) for place in where]
+            effects = [*about.active, *probes]
             path = Path(scratch) / "Probes.fmu"
             text = source(extended, base, "Probes", effects, {}, {}, "With probes")
             report(f"compiling probes in {len(where)} places")
@@ -100,7 +103,7 @@ class Scan:
             given = given_values(path, system)
             with Simulations(path, system, given, cases, workers, report=report) as simulations:
                 self._fit = Fit(simulations, effects)
-                self.base = fitted(self._fit, self._fit.at(self._fit.unknowns.start()), ())
+                self.base = anew(self._fit, about.point, about.active)
                 values = self._fit.unknowns.values(self.base.point)
                 tables = simulations.along(values, [f"watched{k}" for k in range(len(names))])
                 self._recordings = [
@@ -119,7 +122,7 @@ class Scan:
         values: Sequence[Mapping[str, float]],
         every: Sequence[Law],
     ) -> list[LawProspect]:
-        lin = self._fit.linearise(self.base.linearised, ())
+        lin = self.base.linearised
         found: list[LawProspect] = []
         each = max(1, _AT_ONCE // COEFFICIENTS)
         for first in range(0, len(every), each):
@@ -146,7 +149,7 @@ class Scan:
         return found
 
     def _largest(self, place: Place) -> float:
-        """Largest size of an output, nominally."""
+        """Largest size of an output, without a law."""
         name = place.output.name
         return max(float(np.abs(place.at(one, name)).max()) for _, one in self._recordings)
 
