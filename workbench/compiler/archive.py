@@ -10,6 +10,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -91,7 +92,12 @@ def compile_library(sources: Path, library: Path, fmi: int, target: str) -> None
         *((f"-Wl,-install_name,@rpath/{library.name}",) if "macos" in target else ()),
         *("-o", os.path.relpath(library, sources)),
     ]
-    run = subprocess.run(command, cwd=sources, capture_output=True, text=True, check=False)
+    # Compilers that share objects may wait for each other for ever (ziglang/zig#22453).
+    with tempfile.TemporaryDirectory() as objects:
+        own = {**os.environ, "ZIG_LOCAL_CACHE_DIR": objects}
+        run = subprocess.run(
+            command, cwd=sources, env=own, capture_output=True, text=True, check=False
+        )
     if run.returncode != 0:
         raise InputError(
             where=f"compiling {sources.name} for {target}",
