@@ -204,6 +204,12 @@ def test_page_opens_without_errors_and_draws_its_curve(
     assert set(found["names"]) == {0}
 
 
+def test_the_convergence_and_all_else_fit_a_narrow_screen(
+    results: Path, narrow: Callable[[Path], None]
+) -> None:
+    narrow(results / "index.html")
+
+
 # --- the result ---
 
 
