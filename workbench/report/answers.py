@@ -119,8 +119,8 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     share, signal = percent(best.worst), called(system, judged)
     first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
     if best.judged == 1:
-        one = f"{best.case}, the only recording that was judged; one cannot say how others differ."
-        return Answer(f"{first} {one}", headline, details)
+        only = f"{best.case}, the only recording that was judged; one cannot say how others differ."
+        return Answer(f"{first} {only}", headline, details)
     sentence = f"{first} the worst of {recordings(best.judged)}, {best.case}"
     if None not in best.usual:
         middle, low, high = (percent(end or 0.0) for end in best.usual)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def _stop(experiment: Mapping[str, Any], system: System) -> Scenario:
     demand = profile.demand(_DEMAND + varied.begins)
     changes = np.flatnonzero(np.diff(demand)) + 1
     steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
-    direction = 1 if said["direction"] > 0 else -1
+    direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
     conditions = Conditions(
         float(said["initial_speed"]), float(demand[0]), "dry", ("dry",) * 3, direction
     )
