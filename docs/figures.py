@@ -2,7 +2,7 @@
 
     python docs/figures.py [--long] [--kept] [--recordings FOLDER] [NAME ...]
 
-A table stands between `<!-- figures: NAME -->` and `<!-- figures end -->`, the command that made
+A table stands between `<!-- figures: NAME -->` and `<!-- figures end -->`, the commands that made
 it below it. All other numbers of the page are typed, from the command that stands beside them. Some
 tables are of recordings that are not part of the repository: without them they stay as they are.
 """
@@ -18,47 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from workbench.lab import said
-from workbench.report.views import label
-from workbench.systems import load_system
-from workbench.wheelset.accuracy import COVERED, ROWS, Worst
-from workbench.wheelset.accuracy_report import cell
+import figure_tables as tables
+from figure_machines import MACHINES, machines
+from figure_tables import LABELLED, NEXT, TUNED, Table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "accuracy.md"
 RESULTS = Path("results", "figures")
-SYSTEM = load_system("wheelset")
-# What is asked of each row of the accuracy, and of the shares of power.
-GOALS = ("2 %", "4 %", "4 %", "15 %", "reached", "0.5 s", "none", "0.01", "0.02")
-ASKED = {
-    "false alarms on clean sets": "at most 2 %",
-    "right cause first, above noise": "95 %",
-    "both of a pair": "80 %",
-    "unknown cause is unexplained": "80 %",
-    "intervals that hold the truth": "90 %",
-}
-# What the rig plants in the stops of `cases` (`ORDINARY_PADS`), as a laboratory says it.
-PLANTED = {
-    "WaterFilm": "film 100 %; E0 450 kJ",
-    "SpeedDependentPadFriction": "slope 20 %",
-    "BrakeFade": "fade 4.0 % per 100 K",
-    "PressureDependentPadFriction": "exponent 4.0 %",
-}
-# What an independent simulator planted in six dry stops each, by the name of the set.
-LABELLED = {
-    "clean": "nothing",
-    "speed_friction": "slope 22 %",
-    "fade": "fade 7.0 % per 100 K",
-    "cylinder_lag": "80 ms",
-    "radius": "-1.5 mm",
-    "pole_ring": "amplitude 0.20 %",
-}
-
-TUNED = ("disturbance_observer", "parameter_estimator")
-
-Table = list[Sequence[str]]  # the first row is the header
 
 
 @dataclass(frozen=True)
@@ -84,198 +50,142 @@ class Figure:
         return any("{recordings}" in one for one in self.commands)
 
 
-# --- tables ---
-
-
-def titled(name: str) -> str:
-    """An estimator as the page calls it: EKF, disturbance observer."""
-    return name.upper() if len(name) == 3 else label(name, SYSTEM)
-
-
-def errors(summary: Mapping[str, Any]) -> Table:
-    """Error of the judged signal by case and estimator."""
-    key = f"{SYSTEM.objective.judged}_nrmse"
-    cases = summary["cases"]
-    names = list(next(iter(cases.values()))["estimators"])
-    rows: Table = [["case", *(titled(name) for name in names)]]
-    for case, found in cases.items():
-        shares = [found["estimators"][name][key] for name in names]
-        rows.append([case, *("n/a" if one is None else f"{100.0 * one:.2f} %" for one in shares)])
-    return rows
-
-
-def worst(summary: Mapping[str, Any]) -> Table:
-    """The worst stop of each row, beside what is asked of it."""
-    found = summary["worst"]
-    rows: Table = [["", "goal", *(titled(name) for name in found)]]
-    for row, goal in zip(ROWS, GOALS, strict=True):
-        cells = []
-        for name in found:
-            one = found[name].get(row.text)
-            value = None if one is None else one["value"]
-            endless = np.inf if value is None else value
-            cells.append(cell(row, None if one is None else Worst(one["stop"], endless)))
-        rows.append([row.text, goal, *cells])
-    return rows
-
-
-def covered(summary: Mapping[str, Any]) -> Table:
-    """Share of samples whose truth a 95 % band holds, mean of the stops."""
-    shares: dict[str, dict[str, list[float]]] = {}
-    for stop in summary["stops"].values():
-        for name, one in stop["estimators"].items():
-            for quantity, share in one.get("covers", {}).items():
-                shares.setdefault(name, {}).setdefault(quantity, []).append(share)
-    rows: Table = [["", *(titled(name) for name in shares)]]
-    for quantity in COVERED:
-        known = [one.get(quantity) for one in shares.values()]
-        texts = ["" if one is None else f"{100.0 * np.mean(one):.1f} %" for one in known]
-        rows.append([quantity, *texts])
-    return rows
-
-
-def sizes(cause: Mapping[str, Any]) -> str:
-    """Parameters of a cause with their intervals, as a laboratory says them."""
-    texts = []
-    for name, one in cause["parameters"].items():
-        ends = [one[key] for key in ("value", "low", "high")]
-        # Four digits: three may hide that an interval misses.
-        (value, low, high), unit = said(ends, one["unit"])
-        texts.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
-    return "; ".join(texts)
-
-
-def causes(summary: Mapping[str, Any]) -> Table:
-    """Causes in the order in which they were named, with their sizes."""
-    rows: Table = [["cause", "planted", "estimate, 95 % interval"]]
-    for cause in summary["causes"]:
-        rows.append([cause["effect"], PLANTED.get(cause["effect"], "nothing"), sizes(cause)])
-    return rows
-
-
-def singles(*summaries: Mapping[str, Any]) -> Table:
-    """What is said of each labelled set, and what it is worth on recordings that were held out."""
-    error = "error on held-out stops, times the noise"
-    rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
-    for (name, planted), summary in zip(LABELLED.items(), summaries, strict=True):
-        found, gain = summary["causes"], summary["gain"]
-        named = ", ".join(" or ".join([c["effect"], *c["confusable_with"]]) for c in found)
-        change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
-        estimate = "; ".join(map(sizes, found))
-        rows.append([f"`{name}`", named or summary["verdict"], planted, estimate, change])
-    return rows
-
-
-def folds(*summaries: Mapping[str, Any]) -> Table:
-    """What tuning gains on stops that it had not seen, by estimator."""
-
-    def change(form: str, *ends: float | None) -> str:
-        return " → ".join("n/a" if one is None else form.format(one) for one in ends)
-
-    header = ["left out"]
-    rows: dict[str, list[str]] = {}
-    for summary in summaries:
-        name = titled(summary["estimator"])
-        header += [f"{name}: z, untuned to tuned", f"error of {summary['judged']}"]
-        for fold in summary["folds"]:
-            numbers = ", ".join(case.partition("_")[0] for case in fold["cases"])
-            errors = (one and 100.0 * one for one in (fold["error_reasoned"], fold["error"]))
-            rows.setdefault(numbers, []).extend(
-                [
-                    change("{:.3f}", fold["reasoned"], fold["tuned"]),
-                    change("{:.2f} %", *errors),
-                ]
-            )
-    return [header, *([numbers, *cells] for numbers, cells in rows.items())]
-
-
-def shares(summary: Mapping[str, Any]) -> Table:
-    """What the command found, with its intervals."""
-    rows: Table = [["", "goal", "measured", "95 % interval (Clopper-Pearson)"]]
-    for name, one in summary["answer"]["headline"].items():
-        known = one["value"] is not None
-        value = f"{one['value']:.0f} {one['unit']}" if known else "n/a"
-        ends = f"{one['low']:.1f} to {one['high']:.1f} %" if known else ""
-        rows.append([name, ASKED.get(name, ""), value, ends])
-    return rows
-
-
-def timed_models(summary: Mapping[str, Any]) -> Table:
-    """Calls into each FMU, in brackets as a ratio to plain C."""
-    rows: Table = [["", "states", "derivatives", "Jacobian", "Co-Simulation steps of 5 ms"]]
-    for name, one in summary["calls"].items():
-        calls = [
-            f"{1e6 * one[f'{call}_fmi']:.3f} us ({one['ratios'][call]:.2f})"
-            for call in ("derivatives", "jacobian")
-        ]
-        rows.append([f"`{name}`", str(one["states"]), *calls, f"{one['steps_per_second']:,.0f} /s"])
-    return rows
-
-
-def timed_observers(summary: Mapping[str, Any]) -> Table:
-    """Loops of observers, and how many times as long other ways take."""
-    rows: Table = [
-        ["observer", "us per step", "times real time", "by FMPy's methods and numpy", "in plain C"]
-    ]
-    for one in summary["observers"]["steps"]:
-        ratios = [
-            f"{one[way] / one['step']:.{2 * (way == 'c')}f} times" if one[way] else ""
-            for way in ("fmpy", "c")
-        ]
-        name = f"{titled(one['observer'])} ({one['states']} states)"
-        step, pace = f"{1e6 * one['step']:.2f}", f"{one['times_real_time']:.0f}"
-        rows.append([name, step, pace, *ratios])
-    return rows
-
-
-def said_of_errors(summary: Mapping[str, Any]) -> Table:
-    """Verdict on sets of a rig that differs from its sheet."""
-    rows: Table = [["wrong in the sheet", "what is said"]]
-    for one in summary["sets"]:
-        wrong = ", ".join(
-            f"{name.replace('_', ' ')} {100.0 * size:+.3g} %" for name, size in one["wrong"].items()
-        )
-        groups = "; ".join(" or ".join(group) for group in one["causes"])
-        rows.append([wrong, groups or one["verdict"]])
-    return rows
-
-
-# --- the page ---
-
 _RIG = ("rig --seed 1 --out {out}/rig", "accuracy {out}/rig --out {out}/accuracy")
 _BENCH = ("bench --out {out}/bench",)
+_FOUR = ("02_dry_100_2.7", "05_dry_120_2.7_rev", "09_wet_160_4.2_wsp", "13_onedisc_100_2.7")
+_QUICK = (
+    f"tune disturbance_observer --cases {' '.join(f'cases/{one}' for one in _FOUR)} "
+    "--budget 12 --population 4"
+)
+
+
+def _before_and_after(cases: str, name: str) -> tuple[str, ...]:
+    """Runs of both estimators that are tuned, untuned, and of each with its gains."""
+    both = " ".join(f"--estimator {one}" for one in TUNED)
+    return (
+        f"simulate {cases}--untuned {both} --out {{out}}/tuned/{name}/untuned",
+        *(
+            f"simulate {cases}--gains {{out}}/tuned/{one}/gains.toml --estimator {one} "
+            f"--out {{out}}/tuned/{name}/{one}"
+            for one in TUNED
+        ),
+    )
+
+
+def _next(planted: str) -> tuple[str, ...]:
+    """Two stops that are alike, the next one that they ask for, and what all three say."""
+    out = f"{{out}}/next/{planted.partition('=')[0]}"
+    rig = f"rig --pads constant --effect {planted}"
+    return (
+        f"{rig} --case 24_alike_80_2.7 --case 25_alike_80_2.7 --out {out}/alike",
+        f"diagnose {out}/alike --out {out}/two",
+        f"next {out}/two --out {out}/next",
+        f"{rig} --next {out}/next --out {out}/made",
+        f"diagnose {out}/alike {out}/made --out {out}/three",
+    )
+
+
 FIGURES = {
     "simulate": Figure(
-        ("simulate --out {out}/simulate",), (Path("simulate/summary.json"),), errors
+        ("simulate --out {out}/simulate",), (Path("simulate/summary.json"),), tables.errors
     ),
-    "accuracy": Figure(_RIG, (Path("accuracy/accuracy.json"),), worst),
-    "coverage": Figure(_RIG, (Path("accuracy/accuracy.json"),), covered),
+    "accuracy": Figure(_RIG, (Path("accuracy/accuracy.json"),), tables.worst),
+    "coverage": Figure(_RIG, (Path("accuracy/accuracy.json"),), tables.covered),
     "diagnose": Figure(
-        ("diagnose --out {out}/diagnose",), (Path("diagnose/summary.json"),), causes
+        ("diagnose --out {out}/diagnose",), (Path("diagnose/summary.json"),), tables.causes
     ),
-    "models": Figure(_BENCH, (Path("bench/bench.json"),), timed_models),
-    "observers": Figure(_BENCH, (Path("bench/bench.json"),), timed_observers),
+    "models": Figure(_BENCH, (Path("bench/bench.json"),), tables.timed_models),
+    "observers": Figure(_BENCH, (Path("bench/bench.json"),), tables.timed_observers),
     "singles": Figure(
         tuple(f"diagnose {{recordings}}/labelled/{n} --out {{out}}/singles/{n}" for n in LABELLED),
         tuple(Path("singles", name, "summary.json") for name in LABELLED),
-        singles,
+        tables.singles,
     ),
     "folds": Figure(
         tuple(f"tune {name} --folds 5 --out {{out}}/tune/{name}" for name in TUNED),
         tuple(Path("tune", name, "summary.json") for name in TUNED),
-        folds,
+        tables.folds,
         long=True,
+    ),
+    "tuning": Figure(
+        (
+            *(f"tune {name} --out {{out}}/tuned/{name}" for name in TUNED),
+            *_before_and_after("", "own"),
+        ),
+        (
+            Path("tuned/own/untuned/summary.json"),
+            *(
+                Path("tuned", folder, "summary.json")
+                for name in TUNED
+                for folder in (name, f"own/{name}")
+            ),
+        ),
+        tables.tuned,
+        long=True,
+    ),
+    "elsewhere": Figure(
+        (
+            *(f"tune {name} --out {{out}}/tuned/{name}" for name in TUNED),
+            *_before_and_after("{recordings}/standard ", "standard"),
+            *_before_and_after("{recordings}/labelled/radius ", "radius"),
+        ),
+        tuple(
+            Path("tuned", folder, name, "summary.json")
+            for folder in ("standard", "radius")
+            for name in ("untuned", *TUNED)
+        ),
+        tables.tuned_elsewhere,
+        long=True,
+    ),
+    "judged": Figure(
+        (
+            f"{_QUICK} --out {{out}}/judged/cells",
+            f"{_QUICK} --judge-by smoother --out {{out}}/judged/smoother",
+            "simulate --estimator disturbance_observer --untuned --out {out}/judged/runs/untuned",
+            *(
+                "simulate --estimator disturbance_observer --gains "
+                f"{{out}}/judged/{by}/gains.toml --out {{out}}/judged/runs/{by}"
+                for by in ("cells", "smoother")
+            ),
+        ),
+        tuple(
+            Path("judged", "runs", name, "summary.json")
+            for name in ("untuned", "cells", "smoother")
+        ),
+        tables.judged_by,
+        long=True,
+    ),
+    "next": Figure(
+        tuple(command for planted in NEXT for command in _next(planted)),
+        tuple(
+            Path("next", planted.partition("=")[0], file)
+            for planted in NEXT
+            for file in ("two/summary.json", "next/next.json", "three/summary.json")
+        ),
+        tables.next_stops,
+        long=True,
+    ),
+    "machines": Figure(
+        (
+            *dict.fromkeys(one.prepare for one in MACHINES.values()),
+            *(one.diagnose(name) for name, one in MACHINES.items()),
+        ),
+        tuple(Path("real", name, "summary.json") for name in MACHINES),
+        machines,
     ),
     "sheet": Figure(
         ("power --sheet-error --repeats 1 --out {out}/power",),
         (Path("power/sheet_error/sheet_error.json"),),
-        said_of_errors,
+        tables.said_of_errors,
         long=True,
     ),
     "power": Figure(
-        ("power --clean 50 --sizes 2 4 8 --repeats 1 --pairs 20 --resume --out {out}/power",),
+        (
+            "power --clean 50 --sizes 2 4 8 --repeats 1 --pairs 20 --seed 2 --resume "
+            "--out {out}/power",
+        ),
         (Path("power/power.json"),),
-        shares,
+        tables.shares,
         long=True,
     ),
 }
@@ -286,9 +196,19 @@ def written(name: str, *summaries: Mapping[str, Any]) -> str:
     header, *rows = FIGURES[name].table(*summaries)
     lines = [header, ["---"] * len(header), *rows]
     text = "\n".join("| " + " | ".join(line).strip() + " |" for line in lines)
-    made = ", then ".join(f"`workbench {one}`" for one in FIGURES[name].commands)
-    made = made.format(out=RESULTS.as_posix(), recordings="FOLDER")
-    return f"{text}\n\n*Written by `make figures` from {made}.*"
+    return f"{text}\n\n{origin(FIGURES[name].commands)}"
+
+
+def origin(commands: Sequence[str]) -> str:
+    """What stands below a table: the commands that made it."""
+    places = {"out": RESULTS.as_posix(), "recordings": "FOLDER"}
+    told = [f"workbench {one}".format_map(places) for one in commands]
+    if len(told) == 1:
+        return f"*Written by `make figures` from `{told[0]}`.*"
+    lines = "\n".join(told)
+    return (
+        f"*Written by `make figures` from*\n\n<!-- parsed: takes minutes -->\n```sh\n{lines}\n```"
+    )
 
 
 def block(name: str) -> re.Pattern[str]:

@@ -224,16 +224,16 @@ document.body.append(answer);
 
 
 @pytest.fixture(scope="session")
-def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, str], dict[str, Any]]:
+def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
     """Opens a page as a file in headless Chromium, with a script that fills `told`.
 
-    What needs the samples of figures goes into a function `then`.
+    What needs the samples of figures goes into a function `then`. A window is 500 px wide at least.
     """
     chromium = shutil.which("chromium")
     if chromium is None:
         pytest.skip("no chromium")
 
-    def opened(page: Path, script: str) -> dict[str, Any]:
+    def opened(page: Path, script: str, width: int = 1200) -> dict[str, Any]:
         folder = tmp_path_factory.mktemp("browser")
         begin = "<script>\n(async () => {\nconst told = {};\nlet then;\n"
         probing = f"{begin}{script}{ANSWER}</body>"
@@ -244,7 +244,7 @@ def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, str], dic
                 chromium,
                 *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"),
                 *("--no-first-run", "--disable-background-networking"),
-                *("--disable-component-update", "--disable-sync", "--window-size=1200,900"),
+                *("--disable-component-update", "--disable-sync", f"--window-size={width},900"),
                 *("--enable-logging=stderr", "--virtual-time-budget=10000", "--dump-dom"),
                 f"--user-data-dir={folder / 'profile'}",
                 (folder / "index.html").as_uri(),
@@ -259,3 +259,38 @@ def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, str], dic
         return json.loads(answer.text_content())
 
     return opened
+
+
+_NARROW = """
+then = () => {
+  for (const one of document.querySelectorAll("details")) one.open = true;
+  document.body.style.width = "296px";
+  dispatchEvent(new Event("resize"));
+  const sideways = (one) => one.scrollWidth > one.clientWidth;
+  const places = [...document.querySelectorAll(".scroll")];
+  told.sideways = places.filter(sideways).map((one) => one.getAttribute("aria-label"));
+  const drawn = [...document.querySelectorAll("main svg:not(svg svg)")];
+  told.drawn = drawn.map((one) => [one.viewBox.baseVal.width, one.getBoundingClientRect().width]);
+  told.cut = [...document.querySelectorAll("main svg text")].filter((one) => {
+    const [text, page] = [one.getBoundingClientRect(), one.closest("main").getBoundingClientRect()];
+    return text.left < page.left - 1 || text.right > page.right + 1;
+  }).map((one) => one.textContent);
+};
+"""
+
+
+@pytest.fixture(scope="session")
+def narrow(probe: Callable[..., dict[str, Any]]) -> Callable[[Path], None]:
+    """Asks that a screen of 320 px shows all of a page, in letters of the usual size."""
+
+    def asked(page: Path) -> None:
+        found = probe(page, _NARROW, width=400)
+        assert found["errors"] == []
+        assert found["sideways"] == []
+        assert found["cut"] == []
+        assert found["drawn"]
+        for units, pixels in found["drawn"]:
+            assert pixels <= 296
+            assert pixels >= 0.98 * units  # one unit is one pixel
+
+    return asked

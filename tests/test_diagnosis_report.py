@@ -388,6 +388,12 @@ def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any
     assert browser["overflow"] <= 0
 
 
+def test_the_matrix_and_all_else_fit_a_narrow_screen(
+    results: Path, narrow: Callable[[Path], None]
+) -> None:
+    narrow(results / "index.html")
+
+
 def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, Any]) -> None:
     best: dict[str, float] = {}
     for one in summary["candidates"]:

@@ -1,18 +1,13 @@
 """Tables of the page of figures are written from what the commands found."""
 
-import importlib.util
-import re
 from pathlib import Path
 
+import figure_tables as tables
+import figures
 import pytest
+from figure_machines import MACHINES, machines
 
 ROOT = Path(__file__).parents[1]
-_found = importlib.util.spec_from_file_location("figures", ROOT / "docs" / "figures.py")
-assert _found is not None
-assert _found.loader is not None
-figures = importlib.util.module_from_spec(_found)
-_found.loader.exec_module(figures)
-
 WORST = {
     "worst": {
         "ekf": {
@@ -39,24 +34,22 @@ def test_each_table_has_one_place_on_the_page(name: str) -> None:
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_what_is_said_to_be_written_is_of_its_command(name: str) -> None:
     (text,) = figures.block(name).findall(figures.PAGE.read_text())
-    if said := re.search(r"\*Written by `make figures` from (.*)\.\*$", text):
-        commands = re.findall(r"`workbench ([^`]+)`", said[1])
-        places = {"out": figures.RESULTS.as_posix(), "recordings": "FOLDER"}
-        assert commands == [one.format_map(places) for one in figures.FIGURES[name].commands]
+    if "Written by" in text:
+        assert text.endswith(f"\n\n{figures.origin(figures.FIGURES[name].commands)}")
 
 
 def test_tables_say_what_was_found() -> None:
-    header, force, *_ = table = figures.worst(WORST)
+    header, force, *_ = table = tables.worst(WORST)
     assert (header[1], force[:3]) == ("goal", ["force, dry discs", "2 %", "0.18 %"])
     assert {row[0]: row[2] for row in table}["delay at 90 % of the force"] == "never"
     # The mean of the stops; an estimator without bands has no column.
-    (_, *names), (_, *force), *_ = figures.covered(COVERED)
+    (_, *names), (_, *force), *_ = tables.covered(COVERED)
     assert (len(names), force) == (1, ["94.0 %"])
-    found = figures.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
+    found = tables.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
     estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
     assert found[1:] == [["BrakeFade", "fade 4.0 % per 100 K", estimate]]
     headline = {"both of a pair": SHARE, "right cause and no other": {**SHARE, "value": None}}
-    assert figures.shares({"answer": {"headline": headline}})[1:] == [
+    assert tables.shares({"answer": {"headline": headline}})[1:] == [
         ["both of a pair", "80 %", "95 %", "75.1 to 99.9 %"],
         ["right cause and no other", "", "n/a", ""],
     ]
@@ -66,8 +59,8 @@ def test_sets_that_are_labelled_have_a_row_each() -> None:
     cause = {"effect": "BrakeFade", "confusable_with": ["WaterFilm"], "parameters": FADE}
     named = {"verdict": "found", "causes": [cause], "gain": {"before": 55.2, "after": 1.12}}
     nothing = {"verdict": "nothing", "causes": [], "gain": None}
-    sets = [named if name == "fade" else nothing for name in figures.LABELLED]
-    _, clean, _, fade, *_ = figures.singles(*sets)
+    sets = [named if name == "fade" else nothing for name in tables.LABELLED]
+    _, clean, _, fade, *_ = tables.singles(*sets)
     assert clean == ["`clean`", "nothing", "nothing", "", ""]
     estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
     planted = "fade 7.0 % per 100 K"
@@ -78,10 +71,68 @@ def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out() -> None
     fold = {"cases": ["04_dry_160_4.2", "09_wet"], "reasoned": 0.158, "tuned": None}
     fold |= {"error_reasoned": 0.0046, "error": 0.0172}
     first = {"estimator": "disturbance_observer", "judged": "Fx", "folds": [fold]}
-    header, row = figures.folds(first, {**first, "estimator": "ekf"})
+    header, row = tables.folds(first, {**first, "estimator": "ekf"})
     assert header[1:3] == ["disturbance observer: z, untuned to tuned", "error of Fx"]
     assert header[3] == "EKF: z, untuned to tuned"
     assert row == ["04, 09", *2 * ["0.158 → n/a", "0.46 % → 1.72 %"]]
+
+
+def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None:
+    cause = {"effect": "FxGain", "confusable_with": ["DriveTorqueGain"]}
+    two, three = {"causes": [cause]}, {"causes": [{**cause, "confusable_with": []}]}
+    part = {"experiment": "a step", "separation": 7.84, "groups": [[0], [1]]}
+    alike = {"experiment": "a sine", "separation": 0.1, "groups": [[0, 1]]}
+    parted = (two, {"tried": [part, alike], "sensors": {}}, three)
+    stays = (two, {"tried": [alike], "sensors": {"the force": part}}, two)
+    _, first, second, *_ = tables.next_stops(*parted, *stays * (len(tables.NEXT) - 1))
+    assert first[1:] == ["FxGain or DriveTorqueGain", "1 of 2", "a step", "7.8", "FxGain"]
+    assert second[2:5] == ["none of 1; a sensor of the force would", "", ""]
+
+
+def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
+    def runs(**errors: float) -> dict[str, object]:
+        names = {name: {"Fx_nrmse": error, "z": 10 * error} for name, error in errors.items()}
+        return {"cases": {"01_dry_80": {"estimators": names}, "07_wet_80": {"estimators": names}}}
+
+    usual, better = (dict.fromkeys(tables.TUNED, error) for error in (0.02, 0.01))
+    tuning = {"gains": {"a": 1, "b": 2}, "z_reasoned": 0.2, "z": 0.1, "work": {"saved": 0.8}}
+    header, z, worst, wet, dry, saved = tables.tuned(runs(**usual), *2 * (tuning, runs(**better)))
+    assert header[1] == "disturbance observer (2 gains)"
+    assert [z[1], saved[1]] == ["0.200 → 0.100", "80 %"]
+    assert {worst[1], wet[1], dry[1]} == {"2.00 % → 1.00 %"}
+    sets = (runs(**usual), runs(**better), runs(**better))
+    assert [row[1] for row in tables.tuned_elsewhere(*sets, *sets)[1:]] == 2 * ["2.00 % → 1.00 %"]
+    by = tables.judged_by(runs(**usual), runs(**better), runs(**better))
+    assert by[1:3] == [
+        ["untuned", "0.200", "2.00 %"],
+        ["tuned by the load cells", "0.100", "1.00 %"],
+    ]
+
+
+def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it() -> None:
+    def error(unit: str, channel: str = "", **more: object) -> dict[str, object]:
+        sizes = {"rms": [0.3, 0.04], "mean_absolute": [0.2, 0.02]}
+        return {"unit": unit, "samples": 100, "held_out": True, "channel": channel, **sizes, **more}
+
+    units = {"mrad": "rad", "mbar": "Pa", "mV": "V"}
+    summaries = [
+        {
+            "causes": [{"effect": "Leak", "confusable_with": []}],
+            "errors": [
+                error(units.get(one.unit, one.unit), one.channel, held_out=bool(one.held_out)),
+                error("m", "other", held_out=not one.held_out),
+            ],
+        }
+        for one in MACHINES.values()
+    ]
+    _, *rows = machines(*summaries)
+    found = dict(zip(MACHINES, (row[2:] for row in rows), strict=True))
+    assert found["cascaded_tanks"] == ["0.3 V", "0.04 V", "Leak"]
+    assert found["servo_pendulum"] == ["200 mrad", "20 mrad", "Leak"]
+    # Of two recordings the rms is that of all their samples: sqrt((100*0.3^2 + 300*0.5^2)/400).
+    one = MACHINES["O-ring"]
+    longer = error("N", samples=300, rms=[0.5, 0.5])
+    assert one.errors({"errors": [error("N"), longer]})[0] == pytest.approx(0.458, abs=5e-4)
 
 
 def test_without_their_recordings_tables_stay(

@@ -1,5 +1,6 @@
 """The next stop on the virtual rig: it parts what stops that are all alike did not."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
 from workbench.experiments import NextStop, RankedExperiment
 from workbench.system import System
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Conditions, Effects, Scenario, plant
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, proposed_stop
 
 from .distances import parted
 from .recordings import record
@@ -30,11 +31,8 @@ def one_speed(system: System) -> System:
 
 def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
     """Two stops from 80 km/h at 2.7 bar."""
-    usual = SCENARIOS["02_dry_100_2.7"]
-    conditions = replace(usual.conditions, initial_speed=80 / 3.6)
-    for number in (20, 21):
-        stop = replace(usual, name=f"{number}_alike", conditions=conditions)
-        record(stop, number, effects, folder / stop.name)
+    for seed, name in enumerate(("24_alike_80_2.7", "25_alike_80_2.7")):
+        record(SCENARIOS[name], seed, effects, folder / name)
     return [read_case(one, system) for one in sorted(folder.iterdir())]
 
 
@@ -58,23 +56,9 @@ def proposed(undecided: Outcome) -> NextStop:
 
 
 def made(one: RankedExperiment, system: System, folder: Path) -> Case:
-    """The stop as the rig makes it: pressure is asked for anew every 50 ms."""
-    said, (profile,) = one.prediction.case.conditions, one.prediction.candidate.profiles
-    time = np.arange(0.0, 60.0, 0.05)
-    demand = profile.demand(time + profile.input.begins)
-    steps = [
-        (float(time[k]), float(demand[k]))
-        for k in range(1, time.size)
-        if demand[k] != demand[k - 1]
-    ]
-    conditions = Conditions(
-        float(said["initial_speed"]),  # type: ignore[arg-type]
-        float(demand[0]),
-        "dry",
-        ("dry",) * 3,
-        1,
-    )
-    stop = Scenario("30_next", conditions, 0.40, None, True, tuple(steps))
+    """The stop as the rig makes it."""
+    (folder / "next.json").write_text(json.dumps({"tried": [one.to_dict()]}))
+    stop = proposed_stop(folder, system)
     record(stop, 30, PLANTED, folder / stop.name)
     return read_case(folder / stop.name, system)
 

@@ -270,7 +270,10 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
             for kind in ("png", "svg")
         ),
     }
-    assert "BrakeFade" in format_power(found)
+    (row,) = (line for line in format_power(found).splitlines() if line.startswith("BrakeFade "))
+    _, shown, unit = row.split(maxsplit=2)
+    assert unit.startswith("% per 100 K")
+    assert float(shown) * 1e-4 == pytest.approx(found["effects"]["BrakeFade"]["size"])
 
 
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
@@ -390,6 +393,10 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     check("plan", json.loads((tmp_path / "plan.json").read_text()))
     assert (tmp_path / "plan.svg").exists()
     assert "these recordings cannot show it" in format_plan(rows, sizes)
+    (row,) = (one for one in format_plan(rows, sizes).splitlines() if one.startswith("FxGain "))
+    assert row.count("%") == 2 + len(
+        sizes
+    )  # of the size that matters, of chances, and that is sure
 
 
 @pytest.mark.parametrize("unknowns", [1, 7])

@@ -28,6 +28,8 @@ from workbench.system import OBSERVER
 from workbench.systems import load_system
 from workbench.template import AREA, OUTLET, write_system
 
+from .page_rules import check_page
+
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
@@ -141,6 +143,18 @@ def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal: Path) -
     source = (proposal / "model" / "Proposed.mo").read_text()
     assert 'unit="' in source
     assert (proposal / "model" / "Extended.fmu").is_file()
+
+
+def test_the_diagnosis_and_what_is_proposed_lead_to_each_other(proposal: Path) -> None:
+    for here, there in (
+        ("index.html", "proposed/index.html"),
+        ("proposed/index.html", "index.html"),
+    ):
+        page = proposal.parent / here
+        content = check_page(page, json.loads(page.with_name("summary.json").read_text()))
+        links = content.xpath("//header//a/@href")
+        led = [(page.parent / link).resolve() for link in links if not link.startswith("#")]
+        assert led == [proposal.parent / there]
 
 
 def test_the_estimated_function_is_the_law(proposal: Path) -> None:

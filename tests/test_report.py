@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.observers.gains import matrix_names
-from workbench.report.answers import standings
+from workbench.report.answers import standings, usual_error
 from workbench.report.views import label
 from workbench.system import System
 
@@ -182,6 +182,28 @@ def test_worst_case_of_the_best_estimator_comes_first(
     assert label(best, system) in headline
     assert judged[0] in headline
     assert f"{100 * errors[judged[0]]:.2f} %" in headline
+
+
+def test_the_answer_says_how_sure_it_is(page: Any, summary: dict[str, Any]) -> None:
+    """The interval of the page and of the summary, by hand: Student's t of two degrees, 4.303."""
+    best = best_estimator(summary)
+    errors = [summary["cases"][name]["estimators"][best]["Fx_nrmse"] for name in CASES]
+    middle = np.exp(np.mean(np.log(errors)))
+    factor = np.exp(4.3027 * np.std(np.log(errors), ddof=1) / np.sqrt(len(errors)))
+    told = summary["answer"]["headline"][f"usual error of Fx, {best}"]
+    ends = [told[key] for key in ("value", "low", "high")]
+    assert_allclose(ends, 100 * np.array([middle, middle / factor, middle * factor]), rtol=1e-4)
+    value, low, high = (f"{end:.2f}" for end in ends)
+    shown = f"{value} % (95 %: {low} to {high}) in a usual one"
+    assert shown in page.find_class("headline")[0].text_content()
+
+
+def test_intervals_hold_the_usual_error_as_often_as_they_say() -> None:
+    """Of 2000 sets of three recordings, 95 % but for two standard deviations of that count."""
+    errors = np.random.default_rng(1).lognormal(np.log(0.2), 0.5, (2000, 3))
+    ends = np.array([usual_error(one.tolist()) for one in errors])
+    held = np.mean((ends[:, 1] <= 0.2) & (ends[:, 2] >= 0.2))
+    assert abs(held - 0.95) < 2 * np.sqrt(0.95 * 0.05 / 2000)
 
 
 def test_page_says_what_was_run(page: Any, summary: dict[str, Any]) -> None:

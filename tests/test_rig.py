@@ -24,6 +24,7 @@ from workbench.wheelset.rig import (
     STANDARD,
     StopTruth,
     check_files,
+    proposed_stop,
     sample,
     select,
     simulate,
@@ -193,6 +194,53 @@ def test_only_the_wet_disc_has_less_friction_and_stays_cooler() -> None:
     early = np.searchsorted(stop.time, stop.drawn.coasting + 1.5)
     assert stop.truth["muDC2"][early] < 0.6 * stop.truth["muDC1"][early]
     assert stop.truth["temperature2"][-1] < stop.truth["temperature1"][-1] - 5.0
+
+
+PROPOSED = {
+    "conditions": {
+        "initial_speed": 40.0,
+        "direction": -1,
+        "wheel_rail": "dry",
+        "discs": ["dry"] * 3,
+    },
+    "inputs": {"pB": {"profile": "staircase", "levels": [3e5, 1.2e5], "every": 5.0}},
+}
+
+
+def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
+    (tmp_path / "next.json").write_text(json.dumps({"tried": [PROPOSED]}))
+    stop = proposed_stop(tmp_path, SYSTEM)
+    assert (stop.conditions.initial_speed, stop.conditions.direction) == (40.0, -1)
+    assert [stop.demand(time) for time in (0.0, 4.9, 5.1, 9.9, 10.1)] == [
+        3e5,
+        3e5,
+        1.2e5,
+        1.2e5,
+        3e5,
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "no JSON",
+        "[]",
+        '{"tried": []}',
+        json.dumps({"tried": [PROPOSED | {"inputs": {}}]}),
+        json.dumps(
+            {"tried": [{**PROPOSED, "conditions": {**PROPOSED["conditions"], "discs": ["wet"]}}]}
+        ),
+    ],
+)
+def test_what_the_rig_cannot_make_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "next.json").write_text(text)
+    with pytest.raises(InputError, match="no experiment that says speed, direction and pressure"):
+        proposed_stop(tmp_path, SYSTEM)
+
+
+def test_a_folder_without_a_proposal_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"next\.json"):
+        proposed_stop(tmp_path, SYSTEM)
 
 
 # --- files and command line ---

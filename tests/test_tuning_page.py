@@ -204,6 +204,12 @@ def test_page_opens_without_errors_and_draws_its_curve(
     assert set(found["names"]) == {0}
 
 
+def test_the_convergence_and_all_else_fit_a_narrow_screen(
+    results: Path, narrow: Callable[[Path], None]
+) -> None:
+    narrow(results / "index.html")
+
+
 # --- the result ---
 
 
@@ -356,7 +362,7 @@ def test_curve_of_the_convergence_holds_z_of_every_generation(
     points = np.array(re.findall(r"H([\d.]+)V([\d.]+)", path), float)
     z = np.array([*summary["convergence"], summary["z_reasoned"]])
     rule = drawing.xpath("./path[@class='noise']/@d")[0]
-    heights = np.array([*points[:, 1], float(rule.split()[1].split("h")[0])])
+    heights = np.array([*points[:, 1], float(rule.split()[1].split("H")[0])])
     assert np.diff(points[:, 0]) == pytest.approx(np.ptp(points[:, 0]) / (len(points) - 1), abs=0.1)
     slope = np.ptp(heights) / np.ptp(z)
     assert_allclose(heights, heights[-1] + slope * (z[-1] - z), atol=0.2)  # [px] as rounded, twice

@@ -48,6 +48,16 @@ def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
     return [round(value / factor, 12) if factor != 1.0 else value for value in values], shown
 
 
+def with_unit(value: float, unit: str) -> str:
+    """A value in the unit in which people say it.
+
+    >>> with_unit(4e-4, "1/K"), with_unit(0.02, "1"), with_unit(150.0, "N")
+    ('4 % per 100 K', '2 %', '150 N')
+    """
+    (shown,), name = said([value], unit)
+    return f"{shown:.3g} {name}"
+
+
 def with_interval(value: float, low: float, high: float, unit: str) -> str:
     """A value with its 95 % interval, in one unit.
 

@@ -80,6 +80,24 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Add how a command that writes a page is run: processes, a report, isolated or not."""
+    add_workers(parser)
+    add_pdf(parser)
+    add_isolated(parser)
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Add the observer model, which may be one that a diagnosis has extended."""
+    parser.add_argument(
+        "--fmu",
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="observer model, or an extension of it (default: the system's)",
+    )
+
+
 def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
     """Add the cases to read and the folder to write to."""
     parser.add_argument(

@@ -18,7 +18,7 @@ from workbench.modelica import Library, read_library
 from workbench.proposing import needs_law
 from workbench.provenance import run_of, sources
 from workbench.report.diagnosis import write_diagnosis
-from workbench.report.proposal import write_proposal
+from workbench.report.proposal import PROPOSED, write_proposal
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system, open_model
@@ -72,18 +72,17 @@ def _propose(
     if not needs_law(outcome):
         output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
-    folder = options.out / "proposed"
     found = propose(
         outcome,
         held_out=held_out,
         effects=options.effects,
-        out=folder,
+        out=options.out / PROPOSED,
         workers=options.workers,
         report=output.stage,
     )
-    page = write_proposal(found, provenance, folder, options.workers)
+    told = write_proposal(found, outcome, provenance, options.out, options.workers)
     output.result(f"\n{found.summary()}")
-    output.result(f"to read: {page or folder / 'proposal.json'}, data and figures beside it")
+    output.result(f"to read: {told}, data and figures beside it")
 
 
 def _run(

@@ -332,7 +332,7 @@ def _told(cause: Cause) -> list[str]:
     """Lines on a cause."""
     lines = [f"{cause.effect.name}: {cause.effect.text}"]
     lines += [
-        f"  {name} = {one.value:.4g} {one.unit}, 95 %: {one.low:.4g} to {one.high:.4g}"
+        f"  {name} = {with_interval(one.value, one.low, one.high, one.unit)}"
         for name, one in cause.parameters.items()
     ]
     lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")

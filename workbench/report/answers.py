@@ -1,11 +1,11 @@
 """What each command found, from its summary: a sentence, and the numbers to compare runs by."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
 import numpy as np
+from scipy.stats import t
 
 from workbench.answer import Answer, Better, Measure
 from workbench.report.views import called, label, percent
@@ -26,8 +26,9 @@ class Standing:
     Attributes
     ----------
     name : key in the summary.
-    worst, least, median : error of the judged signal, rms over mean [1].
+    worst : error of the judged signal, rms over mean [1].
     case : where it was worst.
+    usual : error in a recording like these, with its 95 % interval if there are several [1].
     z : largest objective z_k [1].
     judged : number of cases with an error.
     seconds : wall time of all its runs.
@@ -35,9 +36,8 @@ class Standing:
 
     name: str
     worst: float | None
-    least: float | None
-    median: float | None
     case: str
+    usual: tuple[float | None, float | None, float | None]
     z: float | None
     judged: int
     seconds: float
@@ -62,9 +62,8 @@ def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
             Standing(
                 name=name,
                 worst=errors.get(worst),
-                least=min(errors.values(), default=None),
-                median=median(errors.values()) if errors else None,
                 case=worst,
+                usual=usual_error(list(errors.values())),
                 z=max((s["z"] for s in scores.values() if s["z"] is not None), default=None),
                 judged=len(errors),
                 seconds=sum(s["seconds"] for s in scores.values()),
@@ -72,6 +71,27 @@ def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
         )
     # One that fails on a hard case must not win by having been judged on the easy ones.
     return sorted(table, key=lambda s: (-s.judged, s.worst if s.worst is not None else np.inf))
+
+
+def usual_error(errors: Sequence[float]) -> tuple[float | None, float | None, float | None]:
+    """Geometric mean of errors, and its 95 % interval: from recording to recording they scatter.
+
+    They do so by factors, and few recordings have to do: Student's t of the logarithms.
+
+    >>> [round(one, 3) for one in usual_error([0.1, 0.2, 0.4])]
+    [0.2, 0.036, 1.119]
+    >>> usual_error([0.25])
+    (0.25, None, None)
+    """
+    if not errors or min(errors) <= 0.0:
+        return None, None, None
+    logarithms = np.log(errors)
+    middle = float(np.exp(logarithms.mean()))
+    count = len(errors)
+    if count < 2:
+        return middle, None, None
+    reach = t.ppf(0.975, count - 1) * logarithms.std(ddof=1) / np.sqrt(count)
+    return middle, float(middle * np.exp(-reach)), float(middle * np.exp(reach))
 
 
 def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
@@ -82,6 +102,10 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     headline = {}
     for one in ranking:
         headline[f"worst error of {judged}, {one.name}"] = _percent(one.worst)
+        usual = [None if end is None else 100.0 * end for end in one.usual]
+        headline[f"usual error of {judged}, {one.name}"] = Measure(
+            usual[0], "%", "lower", *usual[1:]
+        )
         headline[f"objective z, {one.name}"] = Measure(one.z, "1", "lower")
     details = {
         f"{case}: error of {judged}, {name}": _percent(score[f"{judged}_nrmse"])
@@ -89,18 +113,20 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
         for name, score in values["estimators"].items()
     }
     count = len(summary["cases"])
-    if best.worst is None or best.least is None:
+    if best.worst is None:
         sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be judged."
         return Answer(sentence, headline, details)
     share, signal = percent(best.worst), called(system, judged)
-    where = (
-        f"in {best.case}, the only recording that was judged"
-        if best.judged == 1
-        else f"in the worst of {recordings(best.judged)}, {best.case}, and {percent(best.least)} "
-        "in the best"
-    )
-    sentence = f"The {label(best.name, system)} errs least: {share} of the mean {signal} {where}."
-    return Answer(sentence, headline, details)
+    first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
+    if best.judged == 1:
+        only = f"{best.case}, the only recording that was judged; one cannot say how others differ."
+        return Answer(f"{first} {only}", headline, details)
+    sentence = f"{first} the worst of {recordings(best.judged)}, {best.case}"
+    if None not in best.usual:
+        middle, low, high = (percent(end or 0.0) for end in best.usual)
+        ends = f"{low.removesuffix(' %')} to {high.removesuffix(' %')}"
+        sentence += f", {middle} (95 %: {ends}) in a usual one"
+    return Answer(f"{sentence}.", headline, details)
 
 
 def recordings(count: int) -> str:

@@ -27,7 +27,11 @@ from workbench.report.figures import draw_case
 
 
 def write_diagnosis(
-    outcome: Outcome, provenance: Mapping[str, Any], out: Path, workers: int
+    outcome: Outcome,
+    provenance: Mapping[str, Any],
+    out: Path,
+    workers: int,
+    related: Mapping[str, str] | None = None,
 ) -> Path:
     """Write summary.json, data and figures, and the page that shows them; returns the page.
 
@@ -35,6 +39,7 @@ def write_diagnosis(
     ----------
     provenance : what was run.
     workers : processes that draw.
+    related : see `write_diagnosis_page`.
     """
     content = {**outcome.to_dict(), "provenance": provenance}
     summary = with_answer(diagnosed(content), content)
@@ -57,10 +62,16 @@ def write_diagnosis(
         for one in outcome.residuals:
             _write_recording(one, lasting_blocks(outcome.system), out / f"{one.name}.csv")
         _write_tables(summary, out)
-        page = write_diagnosis_page(outcome.system, summary, figures, out)
+        page = write_diagnosis_page(outcome.system, summary, figures, out, related)
         for picture in drawn:
             picture.result()
     return page
+
+
+def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) -> None:
+    """Write the page of a diagnosis in `out` anew, with links; see `write_diagnosis_page`."""
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    write_diagnosis_page(outcome.system, summary, recording_figures(outcome), out, related)
 
 
 def _pictures(out: Path, name: str) -> list[Path]:

@@ -29,7 +29,11 @@ _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of th
 
 
 def write_diagnosis_page(
-    system: System, summary: Mapping[str, Any], figures: Sequence[CaseFigure], folder: Path
+    system: System,
+    summary: Mapping[str, Any],
+    figures: Sequence[CaseFigure],
+    folder: Path,
+    related: Mapping[str, str] | None = None,
 ) -> Path:
     """Write the page into the folder, beside the files of each figure; returns its path.
 
@@ -37,6 +41,7 @@ def write_diagnosis_page(
     ----------
     summary : as written to summary.json.
     figures : one for each recording, the one that shows most first.
+    related : what a file says that belongs to this diagnosis, by its path from the folder.
     """
     modelica = summary["model"]["modelica"]
     text = rendered(
@@ -54,6 +59,7 @@ def write_diagnosis_page(
         styles={"nominal": NOMINAL, "extended": EXTENDED},
         flagged=_FLAGGED,
         words=_words(system, summary, figures),
+        related=related or {},
         source=None if modelica is None else Path(modelica).read_text(),
         # What is written into the folder is linked from there.
         files={

@@ -160,14 +160,14 @@ function zoomable(figure) {
   notes.hidden = true;
   place.after(notes);
 
-  /** A title that fits; what follows its first comma stands below the figure where it does not. */
+  /** A title that fits; one that does not is cut at its first comma or colon, and stands below the figure. */
   function head({ heading, title }, total) {
     heading.textContent = title;
     heading.setAttribute("x", left);
     if (total === breadth || heading.getComputedTextLength() <= total - left) return "";
     heading.setAttribute("x", 0);
     if (heading.getComputedTextLength() <= total) return "";
-    heading.textContent = title.split(", ")[0];
+    heading.textContent = title.split(/[,:] /)[0];
     return title;
   }
 

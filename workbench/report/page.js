@@ -56,23 +56,31 @@ function fitted(act) {
   addEventListener("toggle", act, true);
 }
 
-/** Draw dots as wide as their place, where that is narrow: names stand above their dots. */
+/** Draw something anew as wide as its place, where that is narrow: `place` puts each part. */
+function narrowed(plot, height, place) {
+  const { width: breadth, height: depth } = plot.viewBox.baseVal;
+  const drawn = plot.innerHTML;
+  fitted(() => {
+    const room = plot.parentElement.clientWidth;
+    const total = room < Math.min(NARROW, breadth) ? room : breadth;
+    if (!room || total === plot.viewBox.baseVal.width) return;
+    const narrow = total < breadth;
+    plot.innerHTML = drawn;
+    plot.setAttribute("viewBox", `0 0 ${total} ${narrow ? height : depth}`);
+    plot.classList.toggle("narrow", narrow);
+    if (narrow) place(total);
+  });
+}
+
+/** Dots and curves: what stood beside them stands above. */
 function dotted(plot) {
   const [left, width] = ["left", "width"].map((name) => Number(plot.dataset[name]));
-  const { width: breadth, height } = plot.viewBox.baseVal;
-  const drawn = plot.innerHTML;
   const edge = 24; // [px], half of a number
-  const widen = () => {
-    const room = plot.parentElement.clientWidth;
-    const total = room < NARROW ? room : breadth;
-    if (!room || total === plot.viewBox.baseVal.width) return;
-    plot.innerHTML = drawn;
-    plot.setAttribute("viewBox", `0 0 ${total} ${height}`);
-    plot.classList.toggle("narrow", total < breadth);
-    if (total === breadth) return;
+  narrowed(plot, plot.viewBox.baseVal.height, (total) => {
     const at = (x) => (edge + ((Number(x) - left) * (total - 2 * edge)) / width).toFixed(1);
     for (const one of plot.children) {
-      if (one.getAttribute("text-anchor") === "end") {
+      const x = Number(one.getAttribute("x"));
+      if (one.getAttribute("text-anchor") === "end" && x < left) {
         one.setAttribute("text-anchor", "start");
         one.setAttribute("x", 0);
         one.setAttribute("y", Number(one.getAttribute("y")) - 12);
@@ -84,8 +92,47 @@ function dotted(plot) {
         one.setAttribute(name, at(one.getAttribute(name)));
       }
     }
-  };
-  fitted(widen);
+  });
+}
+
+/** A matrix: names stand above their rows, and columns have the numbers of the rows. */
+function numbered(plot) {
+  const [left, cell] = ["left", "cell"].map((name) => Number(plot.dataset[name]));
+  const count = Math.round((plot.viewBox.baseVal.width - left) / cell);
+  const head = 16; // [px] of the numbers above
+  narrowed(plot, head + count * cell, (total) => {
+    const wide = total / count;
+    const down = (y) => Number(y) - left + head + cell / 2; // of the cells of a row
+    let [rows, columns] = [0, 0];
+    for (const one of [...plot.children]) {
+      const [x, y] = ["x", "y"].map((name) => Number(one.getAttribute(name)));
+      const begin = Math.floor((x - left) / cell) * wide;
+      if (one.hasAttribute("transform")) {
+        one.removeAttribute("transform");
+        one.classList.add("value");
+        one.textContent = columns += 1;
+        one.setAttribute("text-anchor", "middle");
+        one.setAttribute("x", (columns - 0.5) * wide);
+        one.setAttribute("y", head - 4);
+      } else if (one.getAttribute("text-anchor") === "end") {
+        one.textContent = `${(rows += 1)} ${one.textContent}`;
+        one.setAttribute("text-anchor", "start");
+        one.setAttribute("x", 0);
+        one.setAttribute("y", down(y) - cell + 6);
+      } else if (one.matches("path")) {
+        const top = down(one.getAttribute("d").match(/ ([\d.]+)H/)[1]);
+        one.setAttribute("d", `M1 ${top}H${total - 1}v${cell / 2}H1z`);
+      } else if (one.matches("rect")) {
+        for (const [name, value] of [["x", begin], ["y", down(y)], ["width", wide - 1], ["height", cell / 2 - 1]])
+          one.setAttribute(name, value);
+      } else {
+        one.setAttribute("x", begin + wide / 2);
+        one.setAttribute("y", down(y) - cell / 4);
+        const fits = Math.min(10, (10 * wide) / one.getComputedTextLength()); // [px], 10 is usual
+        one.style.fontSize = `${fits}px`;
+      }
+    }
+  });
 }
 
 /** Bring the page to life; resolves when all figures in view have their samples. */
@@ -94,6 +141,7 @@ function start() {
   document.querySelectorAll("main table").forEach(labelled);
   document.querySelectorAll("table.sortable").forEach(sortable);
   document.querySelectorAll(".dots[data-left]").forEach(dotted);
+  document.querySelectorAll(".matrix").forEach(numbered);
   const figures = [...document.querySelectorAll("figure.zoomable")].map(zoomable);
   addEventListener("hashchange", reveal);
   addEventListener("beforeprint", () => {

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workbench.files import write_json
+from workbench.lab import with_unit
 from workbench.power import CLEAR, VISIBLE, Findable
 from workbench.report.answers import powered, with_answer
 from workbench.report.diagnosis_figures import draw_heat
@@ -60,7 +61,7 @@ def _curves(effects: Mapping[str, Any]) -> Figure:
         axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
         axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
         hidden = ", hidden" if one["hidden"] else ""
-        axes.set_title(f"{name}\n1 = {_size(one)}{hidden}", fontsize=6.5)
+        axes.set_title(f"{name}\n1 = {with_unit(one['size'], one['unit'])}{hidden}", fontsize=6.5)
         axes.set_xticks(places, list(one["right_first"]))
         axes.set_ylim(-5.0, 105.0)
     for row in panels:
@@ -118,7 +119,7 @@ def format_power(summary: Mapping[str, Any]) -> str:
     """Table for the terminal."""
     effects, outside = summary["effects"], summary["outside"]
     sizes = sorted({float(s) for one in effects.values() for s in one["right_first"]})
-    header = f"{'effect':<30}{'1 is':>12}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
+    header = f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
     lines = [
         f"{summary['sets']} sets of recordings, {len(summary['failed'])} failed",
         f"false alarms on clean sets          {_text(summary['false_alarms'])}",
@@ -136,7 +137,7 @@ def format_power(summary: Mapping[str, Any]) -> str:
         "-" * (len(header) + 11),
     ]
     for name, one in effects.items():
-        row = f"{name:<30}{_size(one):>12}"
+        row = f"{name:<30}{with_unit(one['size'], one['unit']):>18}"
         row += "".join(f"{_count(one['right_first'].get(f'{size:g}')):>8}" for size in sizes)
         lines.append(row + f"{_count(one['coverage']):>11}" + "  hidden" * one["hidden"])
     for name, one in outside.items():
@@ -144,12 +145,8 @@ def format_power(summary: Mapping[str, Any]) -> str:
             f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
             for size, verdicts in one["verdicts"].items()
         )
-        lines.append(f"{name:<30}{_size(one):>12}  {'; '.join(said)}")
+        lines.append(f"{name:<30}{with_unit(one['size'], one['unit']):>18}  {'; '.join(said)}")
     return "\n".join(lines)
-
-
-def _size(one: Mapping[str, Any]) -> str:
-    return f"{one['size']:g} {one['unit']}".removesuffix(" 1")
 
 
 def _count(one: Mapping[str, Any] | None) -> str:

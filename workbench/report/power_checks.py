@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from workbench.answer import Answer, Measure
 from workbench.files import write_json
+from workbench.lab import with_unit
 from workbench.power.planned import SURE, Foreseen
 from workbench.power.sensitivity import FACTORS, Varied
 from workbench.report.answers import with_answer
@@ -147,15 +148,15 @@ def write_plan(
 
 def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
     """Table of chances, by size."""
-    lines = [f"{'effect':<30}{'1 is':>16}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
+    lines = [f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
     lines[0] += f"{f'found by {SURE:.0%} from':>24}"
     for one in rows:
-        row = f"{one.effect:<30}{f'{one.matters:g} {one.unit}'.removesuffix(' 1'):>16}"
+        row = f"{one.effect:<30}{with_unit(one.matters, one.unit):>18}"
         if one.least is None:
             lines.append(f"{row}  these recordings cannot show it")
             continue
         row += "".join(f"{f'{chance:.0%}':>8}" for _, chance in one.chances)
-        lines.append(f"{row}{f'{one.least:.3g} {one.unit}'.removesuffix(' 1'):>24}")
+        lines.append(f"{row}{with_unit(one.least, one.unit):>24}")
     return "\n".join(lines)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from workbench.lab import said
+from workbench.lab import with_unit
 from workbench.power import VISIBLE
 from workbench.report.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 
@@ -72,8 +72,7 @@ def _effects(summary: Mapping[str, Any]) -> Rows:
     ]
     rows = []
     for name, one in effects.items():
-        (size,), unit = said([one["size"]], one["unit"])
-        cells = [Cell(f"{size:.3g} {unit}")]
+        cells = [Cell(with_unit(one["size"], one["unit"]))]
         cells += [_share(one["right_first"].get(size)) for size in sizes]
         cells += [_share(one["coverage"]), Cell("hidden" if one["hidden"] else "")]
         rows.append((name, tuple(cells)))

@@ -7,23 +7,30 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from workbench.diagnosis import Outcome
 from workbench.files import write_json, write_whole
 from workbench.proposing import Proposal
-from workbench.report.diagnosis import write_diagnosis
+from workbench.report.diagnosis import relate_diagnosis, write_diagnosis
 from workbench.report.figures import LIGHT, STYLE, save_figure
 
+PROPOSED = "proposed"  # folder below that of the diagnosis
 _SHOWN = 3
 
 
 def write_proposal(
-    found: Proposal, provenance: Mapping[str, Any], out: Path, workers: int
-) -> Path | None:
-    """Write what was proposed; returns the page of the diagnosis with it, if there is one.
+    found: Proposal, outcome: Outcome, provenance: Mapping[str, Any], diagnosis: Path, workers: int
+) -> Path:
+    """Write what was proposed; returns the page of the diagnosis with it, or proposal.json.
 
     proposal.json, laws.csv (where something may act, and on what it may depend, by evidence),
     functions.csv and the figure of the estimated functions; of a law that holds, all files of a
-    diagnosis that has it beside the catalogue.
+    diagnosis that has it beside the catalogue. Both pages have a link to the other.
+
+    Parameters
+    ----------
+    outcome : without the proposal, as it was written to the folder `diagnosis`.
     """
+    out = diagnosis / PROPOSED
     write_json(out / "proposal.json", {**found.to_dict(), "provenance": provenance})
     write_whole(out / "laws.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
     if found.estimates:
@@ -31,8 +38,13 @@ def write_proposal(
         write_whole(out / "functions.csv", functions.to_csv(index=False, float_format="%.6g"))
         save_figure(functions_figure(found), [out / "functions.png", out / "functions.svg"])
     if not found.laws or found.outcome is None:
-        return None
-    return write_diagnosis(found.outcome, provenance, out, workers)
+        told, text = out / "proposal.json", "No law that was proposed holds: what was tried"
+    else:
+        back = {"../index.html": "The diagnosis without what is proposed here"}
+        told = write_diagnosis(found.outcome, provenance, out, workers, back)
+        text = "Proposed, not known physics: the diagnosis with a law for what is missing"
+    relate_diagnosis(outcome, diagnosis, {told.relative_to(diagnosis).as_posix(): text})
+    return told
 
 
 def functions_figure(found: Proposal) -> Figure:

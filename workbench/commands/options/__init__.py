@@ -35,6 +35,7 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
             own = import_module(f"{package.__name__}.options.{name}").add(commands, text)
             own.set_defaults(work=f"{package.__name__}.{name}")
     for one in parsers(parser):
+        one.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
         _add_output(one)
     return parser
 

@@ -3,13 +3,7 @@
 import argparse
 from pathlib import Path
 
-from workbench.commands.arguments import (
-    Commands,
-    add_isolated,
-    add_out,
-    add_system,
-    add_told,
-)
+from workbench.commands.arguments import Commands, add_isolated, add_out, add_system, add_told
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -22,7 +16,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
         "workers, memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
         epilog="example:\n  python -m workbench bench --out /tmp/bench",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_out(bench, "results/bench")
     add_system(bench)

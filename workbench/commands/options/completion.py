@@ -15,7 +15,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         epilog="examples:\n"
         "  workbench completion bash > ~/.local/share/bash-completion/completions/workbench\n"
         "  workbench completion zsh > ~/.zfunc/_workbench     # a folder of $fpath",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("shell", choices=("bash", "zsh", "fish", "tcsh"), help="of the user")
     return parser

@@ -1,16 +1,14 @@
 """What `workbench diagnose` may be told."""
 
 import argparse
-from pathlib import Path
 
 from workbench.commands.arguments import (
     Commands,
     add_effects,
-    add_isolated,
-    add_pdf,
+    add_model,
     add_recordings,
+    add_run,
     add_system,
-    add_workers,
 )
 
 
@@ -33,7 +31,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
         "  python -m workbench diagnose my_recordings --propose\n"
         "  python -m workbench diagnose --list",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/diagnose")
     add_system(parser)
@@ -45,13 +42,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="recordings by name (* is any letters), on which only errors of both models are "
         "measured",
     )
-    parser.add_argument(
-        "--fmu",
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="observer model, or an extension of it (default: the system's)",
-    )
+    add_model(parser)
     add_effects(parser, "consider")
     parser.add_argument(
         "--list", action="store_true", help="list the effects of the library, and end"
@@ -68,7 +59,5 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="if something is missing that no effect explains, infer a law for it: where it acts, "
         "on what it depends, its form (into OUT/proposed)",
     )
-    add_workers(parser)
-    add_pdf(parser)
-    add_isolated(parser)
+    add_run(parser)
     return parser

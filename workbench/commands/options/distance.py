@@ -1,16 +1,14 @@
 """What `workbench distance` may be told."""
 
 import argparse
-from pathlib import Path
 
 from workbench.commands.arguments import (
     Commands,
-    add_isolated,
-    add_pdf,
+    add_model,
     add_recordings,
+    add_run,
     add_seed,
     add_system,
-    add_workers,
     count,
     positive,
 )
@@ -34,7 +32,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench distance --system my_machine my_stops --ask speed='160 km/h'\n"
         "  python -m workbench distance --system my_machine my_stops --safety 0\n"
         "  python -m workbench distance --system my_machine my_stops --plain 100000",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/distance")
     add_system(parser)
@@ -47,17 +44,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "rest is usual; may be repeated",
     )
     _add_counts(parser)
-    parser.add_argument(
-        "--fmu",
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="observer model, or an extension of it (default: the system's)",
-    )
+    add_model(parser)
     add_seed(parser, "all that is drawn")
-    add_workers(parser)
-    add_pdf(parser)
-    add_isolated(parser)
+    add_run(parser)
     return parser
 
 

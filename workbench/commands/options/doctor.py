@@ -15,5 +15,4 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "look at the folder of what is kept between runs; say what to do. Exit status: 0 sound, "
         "1 something does not work as it is.",
         epilog="examples:\n  python -m workbench doctor\n  python -m workbench doctor --json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -20,7 +20,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
         "  python -m workbench export --estimator mhe --fmi 3 --out /tmp/export\n"
         "  python -m workbench export --estimator imm --gains results/tune/ekf/gains.toml",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     export.add_argument(
         "--gains",

@@ -3,12 +3,7 @@
 import argparse
 from pathlib import Path
 
-from workbench.commands.arguments import (
-    Commands,
-    above_zero,
-    add_isolated,
-    positive,
-)
+from workbench.commands.arguments import Commands, above_zero, add_isolated, positive
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -32,7 +27,6 @@ def _add_build(jobs: Commands) -> None:
         "  python -m workbench fmu build MyRig/package.mo MyRig.Model --fmi 3 --out model.fmu\n"
         "  python -m workbench fmu build --all --check\n"
         "  python -m workbench fmu build --all --compiler omc",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     build.add_argument("package", nargs="?", type=Path, help="package.mo of the library")
     build.add_argument("model", nargs="?", help="dotted name of the model")
@@ -64,7 +58,6 @@ def _add_info(jobs: Commands) -> None:
         help="say what an FMU is and offers",
         description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
         epilog="example:\n  python -m workbench fmu info model.fmu",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
     info.set_defaults(job="info")
@@ -79,7 +72,6 @@ def _add_check(jobs: Commands) -> None:
         "time per call. A crash of the FMU is a finding. Exit status: 0 fit, 1 not fit, 2 no FMU "
         "to check, 3 not measured, because the FMU did not answer in time.",
         epilog="example:\n  python -m workbench fmu check my_model.fmu --json > fitness.json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     checking.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
     checking.add_argument(

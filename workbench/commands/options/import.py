@@ -19,7 +19,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench import monday/*.mf4 --out cases\n"
         "  python -m workbench import stop7.csv --out cases --condition load='2 kN'\n"
         "  python -m workbench import stop7.csv --out cases --column 'time=Zeit [ms]' --yes",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="of a recorder")
     add_out(parser, "imported")

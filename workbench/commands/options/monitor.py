@@ -2,15 +2,7 @@
 
 import argparse
 
-from workbench.commands.arguments import (
-    Commands,
-    add_isolated,
-    add_out,
-    add_pdf,
-    add_system,
-    add_workers,
-    share,
-)
+from workbench.commands.arguments import Commands, add_out, add_run, add_system, share
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -28,7 +20,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench monitor my_recordings --system my_machine --out results/mine\n"
         "  python -m workbench monitor stops --system train --false-alarms 0.001\n"
         "  python -m workbench monitor trains --system train --fleet",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "history",
@@ -66,7 +57,5 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "[cluster]",
     )
     add_out(parser, "results/monitor")
-    add_workers(parser)
-    add_pdf(parser)
-    add_isolated(parser)
+    add_run(parser)
     return parser

@@ -18,7 +18,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench new my_machine\n"
         "  python -m workbench simulate --system my_machine\n"
         "  python -m workbench diagnose --system my_machine",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where to write; made as needed")
     return parser

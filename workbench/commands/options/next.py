@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, add_isolated, add_out, add_pdf, add_workers
+from workbench.commands.arguments import Commands, add_out, add_run
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -21,7 +21,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench diagnose my_recordings --out results/mine\n"
         "  python -m workbench next results/mine\n"
         "  python -m workbench next results/mine --system my_machine --out results/mine_next",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="folder of a diagnosis, with summary.json"
@@ -33,7 +32,5 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="an installed system, or a system file (default: that of the diagnosis, by its name)",
     )
     add_out(parser, "results/next")
-    add_workers(parser)
-    add_pdf(parser)
-    add_isolated(parser)
+    add_run(parser)
     return parser

@@ -4,12 +4,10 @@ import argparse
 
 from workbench.commands.arguments import (
     Commands,
-    add_isolated,
     add_models,
-    add_pdf,
     add_recordings,
+    add_run,
     add_system,
-    add_workers,
     example_case,
 )
 
@@ -27,12 +25,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench observability\n"
         f"  python -m workbench observability {own} --out /tmp/one\n"
         "  python -m workbench observability my_cases --system my/system.toml",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(observability, out="results/observability")
     add_system(observability)
     add_models(observability)
-    add_workers(observability)
-    add_pdf(observability)
-    add_isolated(observability)
+    add_run(observability)
     return observability

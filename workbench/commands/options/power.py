@@ -38,7 +38,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  python -m workbench power --sheet-error --repeats 2\n"
         "  python -m workbench power --system train --recorded labelled healthy",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_sets(parser)
     add_workers(parser)

@@ -17,7 +17,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         epilog="examples:\n"
         "  python -m workbench prepare cascaded_tanks\n"
         "  python -m workbench prepare cascaded_tanks --from DOWNLOADED --out tanks",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("system", metavar="SYSTEM", help="an installed system, or a system file")
     parser.add_argument(

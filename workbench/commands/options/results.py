@@ -19,7 +19,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench results results\n"
         "  python -m workbench results results/before results/after\n"
         "  python -m workbench results results/before results/after --json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "folder", type=Path, metavar="FOLDER", help="of results, or before a change"

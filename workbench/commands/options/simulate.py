@@ -30,7 +30,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
         f"  python -m workbench simulate {own} --live\n"
         "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(parser, out="results/simulate")
     add_system(parser)

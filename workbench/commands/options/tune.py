@@ -31,7 +31,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench tune disturbance_observer --folds 5\n"
         "  python -m workbench tune disturbance_observer --judge-by smoother\n"
         "  python -m workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "estimator", metavar="ESTIMATOR", help="one with gains, such as disturbance_observer or ekf"

@@ -13,7 +13,7 @@ from workbench.commands.output import Done, Output
 from workbench.files import claimed
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
-from workbench.system import REFERENCE
+from workbench.system import REFERENCE, System
 from workbench.systems import load_system, model_path
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
@@ -24,6 +24,7 @@ from workbench.wheelset.rig import (
     Scenario,
     check_files,
     plant,
+    proposed_stop,
     select,
     simulate,
     write_recording,
@@ -60,21 +61,23 @@ def run(options: argparse.Namespace, output: Output) -> Done:
                 "effects": {one.name: dict(one.metadata) for one in dataclasses.fields(Effects)},
             }
         )
-    scenarios = select(options.case)
+    system = load_system(options.system)
+    scenarios = [proposed_stop(options.next, system)] if options.next else select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     with claimed(options.out):
-        return _recorded(options, output, scenarios, effects)
+        return _recorded(options, output, system, scenarios, effects)
 
 
 def _recorded(
     options: argparse.Namespace,
     output: Output,
+    system: System,
     scenarios: Sequence[Scenario],
     effects: Effects,
 ) -> Done:
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
-    fmu = options.reference or model_path(load_system(options.system), REFERENCE)
+    fmu = options.reference or model_path(system, REFERENCE)
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()

@@ -5,6 +5,7 @@ Nothing here reads an estimator, and no estimator reads the truth that is writte
 
 from workbench.wheelset.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
 from workbench.wheelset.rig.files import check_files, write_recording
+from workbench.wheelset.rig.proposed import proposed_stop
 from workbench.wheelset.rig.run import TRUTH, Drawn, Phases, StopTruth, simulate
 from workbench.wheelset.rig.scenarios import SCENARIOS, STANDARD, Conditions, Scenario, select
 from workbench.wheelset.rig.sensors import MEASURED, received, sample
@@ -24,6 +25,7 @@ __all__ = [
     "StopTruth",
     "check_files",
     "plant",
+    "proposed_stop",
     "received",
     "sample",
     "select",

@@ -2,13 +2,7 @@
 
 import argparse
 
-from workbench.commands.arguments import (
-    Commands,
-    add_pdf,
-    add_recordings,
-    add_system,
-    example_case,
-)
+from workbench.commands.arguments import Commands, add_pdf, add_recordings, add_system, example_case
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -26,7 +20,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench rig --seed 1 --out /tmp/rig\n"
         "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
         f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_recordings(accuracy, out="results/accuracy")
     accuracy.add_argument(

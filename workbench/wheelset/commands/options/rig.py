@@ -1,6 +1,7 @@
 """What `workbench rig` may be told."""
 
 import argparse
+from pathlib import Path
 
 from workbench.commands.arguments import (
     Commands,
@@ -25,8 +26,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench rig --out /tmp/rig\n"
         "  python -m workbench rig --list\n"
         "  python -m workbench rig --case 15_locked_wheel --out /tmp/rig\n"
-        "  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig\n"
+        "  python -m workbench rig --next results/next --out /tmp/rig",
     )
     add_out(rig, "results/rig")
     rig.add_argument("--list", action="store_true", help="list scenarios and effects, and end")
@@ -36,6 +37,12 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         default=[],
         metavar="NAME",
         help="scenario, may be repeated (default: the fourteen standard ones)",
+    )
+    rig.add_argument(
+        "--next",
+        type=Path,
+        metavar="RESULT",
+        help="make the best experiment of a result of 'workbench next' in place of scenarios",
     )
     add_seed(rig, "tolerances and noise")
     rig.add_argument(

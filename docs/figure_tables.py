@@ -1,0 +1,280 @@
+"""Tables of `accuracy.md`, each from the summaries that the commands of `figures.py` write."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from workbench.lab import said
+from workbench.report.views import label
+from workbench.systems import load_system
+from workbench.wheelset.accuracy import COVERED, ROWS, Worst
+from workbench.wheelset.accuracy_report import cell
+
+Table = list[Sequence[str]]  # the first row is the header
+Summary = Mapping[str, Any]
+
+TUNED = ("disturbance_observer", "parameter_estimator")
+SYSTEM = load_system("wheelset")
+# What is asked of each row of the accuracy, and of the shares of power.
+GOALS = ("2 %", "4 %", "4 %", "15 %", "reached", "0.5 s", "none", "0.01", "0.02")
+ASKED = {
+    "false alarms on clean sets": "at most 2 %",
+    "right cause first, above noise": "95 %",
+    "both of a pair": "80 %",
+    "unknown cause is unexplained": "80 %",
+    "intervals that hold the truth": "90 %",
+}
+# What the rig plants in the stops of `cases` (`ORDINARY_PADS`), as a laboratory says it.
+PLANTED = {
+    "WaterFilm": "film 100 %; E0 450 kJ",
+    "SpeedDependentPadFriction": "slope 20 %",
+    "BrakeFade": "fade 4.0 % per 100 K",
+    "PressureDependentPadFriction": "exponent 4.0 %",
+}
+# What the rig plants in two stops that are alike, to ask for the next one.
+NEXT = (
+    "pressure_exponent=0.04",
+    "bedding_in=0.05",
+    "fx_gain=0.02",
+    "torque_gain=0.01",
+    "fx_offset=150",
+    "wheel_radius=0.0008",
+)
+# What an independent simulator planted in six dry stops each, by the name of the set.
+LABELLED = {
+    "clean": "nothing",
+    "speed_friction": "slope 22 %",
+    "fade": "fade 7.0 % per 100 K",
+    "cylinder_lag": "80 ms",
+    "radius": "-1.5 mm",
+    "pole_ring": "amplitude 0.20 %",
+}
+
+
+def titled(name: str) -> str:
+    """An estimator as the page calls it: EKF, disturbance observer."""
+    return name.upper() if len(name) == 3 else label(name, SYSTEM)
+
+
+def errors(summary: Summary) -> Table:
+    """Error of the judged signal by case and estimator."""
+    key = f"{SYSTEM.objective.judged}_nrmse"
+    cases = summary["cases"]
+    names = list(next(iter(cases.values()))["estimators"])
+    rows: Table = [["case", *(titled(name) for name in names)]]
+    for case, found in cases.items():
+        shares = [found["estimators"][name][key] for name in names]
+        rows.append([case, *("n/a" if one is None else f"{100.0 * one:.2f} %" for one in shares)])
+    return rows
+
+
+def worst(summary: Summary) -> Table:
+    """The worst stop of each row, beside what is asked of it."""
+    found = summary["worst"]
+    rows: Table = [["", "goal", *(titled(name) for name in found)]]
+    for row, goal in zip(ROWS, GOALS, strict=True):
+        cells = []
+        for name in found:
+            one = found[name].get(row.text)
+            value = None if one is None else one["value"]
+            endless = np.inf if value is None else value
+            cells.append(cell(row, None if one is None else Worst(one["stop"], endless)))
+        rows.append([row.text, goal, *cells])
+    return rows
+
+
+def covered(summary: Summary) -> Table:
+    """Share of samples whose truth a 95 % band holds, mean of the stops."""
+    shares: dict[str, dict[str, list[float]]] = {}
+    for stop in summary["stops"].values():
+        for name, one in stop["estimators"].items():
+            for quantity, share in one.get("covers", {}).items():
+                shares.setdefault(name, {}).setdefault(quantity, []).append(share)
+    rows: Table = [["", *(titled(name) for name in shares)]]
+    for quantity in COVERED:
+        known = [one.get(quantity) for one in shares.values()]
+        texts = ["" if one is None else f"{100.0 * np.mean(one):.1f} %" for one in known]
+        rows.append([quantity, *texts])
+    return rows
+
+
+def sizes(cause: Summary) -> str:
+    """Parameters of a cause with their intervals, as a laboratory says them."""
+    texts = []
+    for name, one in cause["parameters"].items():
+        ends = [one[key] for key in ("value", "low", "high")]
+        # Four digits: three may hide that an interval misses.
+        (value, low, high), unit = said(ends, one["unit"])
+        texts.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
+    return "; ".join(texts)
+
+
+def verdict(summary: Summary) -> str:
+    """Causes that a diagnosis names, each with what it cannot be told from, or its verdict."""
+    groups = ([one["effect"], *one["confusable_with"]] for one in summary["causes"])
+    return "; ".join(map(" or ".join, groups)) or str(summary["verdict"])
+
+
+def causes(summary: Summary) -> Table:
+    """Causes in the order in which they were named, with their sizes."""
+    rows: Table = [["cause", "planted", "estimate, 95 % interval"]]
+    for cause in summary["causes"]:
+        rows.append([cause["effect"], PLANTED.get(cause["effect"], "nothing"), sizes(cause)])
+    return rows
+
+
+def singles(*summaries: Summary) -> Table:
+    """What is said of each labelled set, and what it is worth on recordings that were held out."""
+    error = "error on held-out stops, times the noise"
+    rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
+    for (name, planted), summary in zip(LABELLED.items(), summaries, strict=True):
+        found, gain = summary["causes"], summary["gain"]
+        change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
+        estimate = "; ".join(map(sizes, found))
+        rows.append([f"`{name}`", verdict(summary), planted, estimate, change])
+    return rows
+
+
+def change(form: str, *ends: float | None) -> str:
+    """Numbers before and after."""
+    return " → ".join("n/a" if one is None else form.format(one) for one in ends)
+
+
+def folds(*summaries: Summary) -> Table:
+    """What tuning gains on stops that it had not seen, by estimator."""
+    header = ["left out"]
+    rows: dict[str, list[str]] = {}
+    for summary in summaries:
+        name = titled(summary["estimator"])
+        header += [f"{name}: z, untuned to tuned", f"error of {summary['judged']}"]
+        for fold in summary["folds"]:
+            numbers = ", ".join(case.partition("_")[0] for case in fold["cases"])
+            errors = (one and 100.0 * one for one in (fold["error_reasoned"], fold["error"]))
+            rows.setdefault(numbers, []).extend(
+                [
+                    change("{:.3f}", fold["reasoned"], fold["tuned"]),
+                    change("{:.2f} %", *errors),
+                ]
+            )
+    return [header, *([numbers, *cells] for numbers, cells in rows.items())]
+
+
+def shares(summary: Summary) -> Table:
+    """What the command found, with its intervals."""
+    rows: Table = [["", "goal", "measured", "95 % interval (Clopper-Pearson)"]]
+    for name, one in summary["answer"]["headline"].items():
+        known = one["value"] is not None
+        value = f"{one['value']:.0f} {one['unit']}" if known else "n/a"
+        ends = f"{one['low']:.1f} to {one['high']:.1f} %" if known else ""
+        rows.append([name, ASKED.get(name, ""), value, ends])
+    return rows
+
+
+def next_stops(*summaries: Summary) -> Table:
+    """What two stops say, the third one that is proposed, and what all three say."""
+    header = ["planted", "said of two stops", "experiments that part", "the best"]
+    rows: Table = [[*header, "separation", "said of three stops"]]
+    for planted, two, then, three in zip(
+        NEXT, summaries[::3], summaries[1::3], summaries[2::3], strict=True
+    ):
+        tried = then["tried"]
+        parting = sum(len(one["groups"]) > 1 for one in tried)
+        sensors = "".join(f"; a sensor of {name} would" for name in then["sensors"])
+        best = [tried[0]["experiment"], f"{tried[0]['separation']:.1f}"] if parting else ["", ""]
+        number = f"{parting or 'none'} of {len(tried)}{sensors}"
+        rows.append([f"`{planted}`", verdict(two), number, *best, verdict(three)])
+    return rows
+
+
+def by_case(summary: Summary, name: str) -> dict[str, float]:
+    """Error of the judged signal of an estimator by case [% of the mean]."""
+    key = f"{SYSTEM.objective.judged}_nrmse"
+    return {case: 100.0 * one["estimators"][name][key] for case, one in summary["cases"].items()}
+
+
+def tuned(untuned: Summary, *summaries: Summary) -> Table:
+    """What each tuning gains on the stops that it was made on: itself, and a run with its gains."""
+    judged = SYSTEM.objective.judged
+    texts = [f"{judged}, worst stop", f"{judged}, wet discs, mean", f"{judged}, dry discs, mean"]
+    columns = [["", "z", *(f"error of {text}" for text in texts), "work saved by dropping"]]
+    for name, tuning, after in zip(TUNED, summaries[::2], summaries[1::2], strict=True):
+        errors = [by_case(one, name) for one in (untuned, after)]
+        dry = [[v for case, v in one.items() if "_dry_" in case] for one in errors]
+        wet = [[v for case, v in one.items() if "_dry_" not in case] for one in errors]
+        worst = [max(one.values()) for one in errors]
+        means = ([float(np.mean(end)) for end in some] for some in (wet, dry))
+        columns.append(
+            [
+                f"{titled(name)} ({len(tuning['gains'])} gains)",
+                change("{:.3f}", tuning["z_reasoned"], tuning["z"]),
+                *(change("{:.2f} %", *ends) for ends in (worst, *means)),
+                f"{100.0 * tuning['work']['saved']:.0f} %",
+            ]
+        )
+    return list(zip(*columns, strict=True))
+
+
+def tuned_elsewhere(*summaries: Summary) -> Table:
+    """Worst errors on recordings of others: of each set a run before, and one with each gains."""
+    rows: Table = [[f"worst error of {SYSTEM.objective.judged}", *map(titled, TUNED)]]
+    runs = 1 + len(TUNED)
+    texts = ("fourteen stops of an independent simulator", "six of it, a radius 1.5 mm off")
+    for text, (before, *after) in zip(texts, (summaries[:runs], summaries[runs:]), strict=True):
+        ends = (
+            [max(by_case(run, name).values()) for run in (before, one)]
+            for name, one in zip(TUNED, after, strict=True)
+        )
+        rows.append([text, *(change("{:.2f} %", *one) for one in ends)])
+    return rows
+
+
+def judged_by(*summaries: Summary) -> Table:
+    """What gains are worth on all stops, by what judged them while they were tuned on four."""
+    name = TUNED[0]
+    rows: Table = [["gains", "z", f"worst error of {SYSTEM.objective.judged}"]]
+    texts = ("untuned", "tuned by the load cells", "tuned by the smoother")
+    for text, one in zip(texts, summaries, strict=True):
+        z = max(case["estimators"][name]["z"] for case in one["cases"].values())
+        rows.append([text, f"{z:.3f}", f"{max(by_case(one, name).values()):.2f} %"])
+    return rows
+
+
+def timed_models(summary: Summary) -> Table:
+    """Calls into each FMU, in brackets as a ratio to plain C."""
+    rows: Table = [["", "states", "derivatives", "Jacobian", "Co-Simulation steps of 5 ms"]]
+    for name, one in summary["calls"].items():
+        calls = [
+            f"{1e6 * one[f'{call}_fmi']:.3f} us ({one['ratios'][call]:.2f})"
+            for call in ("derivatives", "jacobian")
+        ]
+        rows.append([f"`{name}`", str(one["states"]), *calls, f"{one['steps_per_second']:,.0f} /s"])
+    return rows
+
+
+def timed_observers(summary: Summary) -> Table:
+    """Loops of observers, and how many times as long other ways take."""
+    rows: Table = [
+        ["observer", "us per step", "times real time", "by FMPy's methods and numpy", "in plain C"]
+    ]
+    for one in summary["observers"]["steps"]:
+        ratios = [
+            f"{one[way] / one['step']:.{2 * (way == 'c')}f} times" if one[way] else ""
+            for way in ("fmpy", "c")
+        ]
+        name = f"{titled(one['observer'])} ({one['states']} states)"
+        step, pace = f"{1e6 * one['step']:.2f}", f"{one['times_real_time']:.0f}"
+        rows.append([name, step, pace, *ratios])
+    return rows
+
+
+def said_of_errors(summary: Summary) -> Table:
+    """Verdict on sets of a rig that differs from its sheet."""
+    rows: Table = [["wrong in the sheet", "what is said"]]
+    for one in summary["sets"]:
+        wrong = ", ".join(
+            f"{name.replace('_', ' ')} {100.0 * size:+.3g} %" for name, size in one["wrong"].items()
+        )
+        groups = "; ".join(" or ".join(group) for group in one["causes"])
+        rows.append([wrong, groups or one["verdict"]])
+    return rows

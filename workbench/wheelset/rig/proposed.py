@@ -1,0 +1,61 @@
+"""The stop that `workbench next` proposes, as the rig makes it."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.experiments.candidates import Profile
+from workbench.recording import read_text
+from workbench.system import System
+from workbench.wheelset.rig.scenarios import DRY_FRICTION, Conditions, Scenario
+
+_NAME = "30_next"
+_DEMAND = np.arange(0.0, 90.0, 0.05)  # [s] from the first, when a controller asks anew
+
+
+def proposed_stop(result: Path, system: System) -> Scenario:
+    """The best experiment of a result of `workbench next`.
+
+    Parameters
+    ----------
+    result : folder with next.json.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it asks for what the rig cannot do.
+    """
+    file = result / "next.json"
+    remedy = "give the folder that 'workbench next' wrote for this rig"
+    text = read_text(file, remedy)
+    try:
+        return _stop(json.loads(text)["tried"][0], system)
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        raise InputError(
+            where=str(file),
+            found="no experiment that says speed, direction and pressure of a dry stop",
+            expected="what 'workbench next' writes",
+            remedy=remedy,
+        ) from None
+
+
+def _stop(experiment: Mapping[str, Any], system: System) -> Scenario:
+    """A stop whose pressure follows the profile of an experiment."""
+    said, asked = experiment["conditions"], experiment["inputs"]["pB"]
+    if system.experiments is None or {said["wheel_rail"], *said["discs"]} != {"dry"}:
+        raise ValueError
+    (varied,) = (one for one in system.experiments.varied if one.name == "pB")
+    levels = tuple(map(float, asked["levels"]))
+    profile = Profile(varied, str(asked["profile"]), levels, float(asked["every"]))
+    demand = profile.demand(_DEMAND + varied.begins)
+    changes = np.flatnonzero(np.diff(demand)) + 1
+    steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
+    direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
+    conditions = Conditions(
+        float(said["initial_speed"]), float(demand[0]), "dry", ("dry",) * 3, direction
+    )
+    return Scenario(_NAME, conditions, DRY_FRICTION, None, True, steps)
