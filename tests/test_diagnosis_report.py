@@ -259,6 +259,35 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
         assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
 
 
+# --- the best estimate ---
+
+
+def test_best_estimates_of_the_recording_shown_are_those_of_the_data(
+    page: Any, results: Path, summary: dict[str, Any]
+) -> None:
+    smoothed = summary["smoothed"]
+    assert smoothed["recording"] == text(page.xpath("//article[figure]/h3")[0])
+    table = pd.read_csv(results / "smoothed.csv")
+    rows = {text(row[0]): row for row in page.get_element_by_id("estimate-table").find("tbody")}
+    applied = table["measured.pB [Pa]"].gt(1e4) & table["measured.omegaW [rad/s]"].abs().gt(0.22)
+    window = slice(applied.idxmax(), applied[::-1].idxmax() + 1)
+    for j, (model, numbers) in enumerate(smoothed["models"].items()):
+        force, friction = numbers["Fx"], numbers["muDC"]
+        value, sigma = (table[f"{model}.{kind}Fx [N]"][window].mean() for kind in ("", "sigma_"))
+        # The window ends some samples apart: at 0.1 m/s of speed, here of the wheel.
+        assert_allclose(force["value"], value, rtol=2e-3)
+        assert_allclose(force["high"] - force["low"], 2 * 1.96 * sigma, rtol=2e-2)
+        cell = rows["Creep force Fx"][1 + 2 * j]
+        assert float(cell.get("data-value")) == pytest.approx(force["value"] / 1e3)
+        assert "kN" in text(cell)
+        assert 0.25 < friction["low"] < friction["value"] < friction["high"] < 0.35
+        # Cells that are wrong by 150 N, fifteen times the band, stay outside whatever the model.
+        assert force["inside"] < 0.1
+    assert {"nominal_model", "extended_model"} == set(smoothed["models"])
+    legend = section(page, "estimate").xpath(".//ul[@class='legend']/li")
+    assert {"style-0", "style-2"} <= {entry.get("class") for entry in legend}
+
+
 # --- summaries that were changed ---
 
 
@@ -273,7 +302,9 @@ def written(
 ) -> Any:
     """The page of a summary that was changed, without an extended model."""
     changed = {**summary, "model": dict.fromkeys(summary["model"])}
-    return lxml.html.fromstring(write_diagnosis_page(system, changed, figures, folder).read_bytes())
+    changed["smoothed"] = None
+    written_to = write_diagnosis_page(system, changed, figures, None, folder)
+    return lxml.html.fromstring(written_to.read_bytes())
 
 
 def test_the_unexplained_is_no_cause(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.diagnosis import Outcome, Residuals
+from workbench.diagnosis.best_estimate import bands, best_estimate
 from workbench.files import write_json, write_whole
 from workbench.report.answers import diagnosed, with_answer
 from workbench.report.diagnosis_figures import (
@@ -18,12 +19,14 @@ from workbench.report.diagnosis_figures import (
     draw_confusability,
     draw_dependences,
     draw_gain,
+    estimate_figure,
     lasting,
     lasting_blocks,
     recording_figures,
 )
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import draw_case
+from workbench.report.results import write_estimates
 
 
 def write_diagnosis(
@@ -36,11 +39,16 @@ def write_diagnosis(
     provenance : what was run.
     workers : processes that draw.
     """
-    content = {**outcome.to_dict(), "provenance": provenance}
+    figures = recording_figures(outcome)
+    best = best_estimate(outcome, figures[0].name)
+    content = {
+        **outcome.to_dict(),
+        "smoothed": best and {"recording": best.case.name, "models": bands(best)},
+        "provenance": provenance,
+    }
     summary = with_answer(diagnosed(content), content)
     write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
-    figures = recording_figures(outcome)
     # Ctrl-C is this process's affair.
     ignored = (signal.SIGINT, signal.SIG_IGN)
     with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
@@ -57,7 +65,10 @@ def write_diagnosis(
         for one in outcome.residuals:
             _write_recording(one, lasting_blocks(outcome.system), out / f"{one.name}.csv")
         _write_tables(summary, out)
-        page = write_diagnosis_page(outcome.system, summary, figures, out)
+        if best is not None:
+            write_estimates(best, out / "smoothed.csv")
+        estimated = None if best is None else estimate_figure(best)
+        page = write_diagnosis_page(outcome.system, summary, figures, estimated, out)
         for picture in drawn:
             picture.result()
     return page

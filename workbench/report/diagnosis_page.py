@@ -15,7 +15,7 @@ from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, lasting_blocks
 from workbench.report.figures import CaseFigure
 from workbench.report.recordings import placed
 from workbench.report.templates import rendered
-from workbench.report.views import called, capital, named
+from workbench.report.views import called, capital, named, per_shown, shown_unit
 from workbench.system import System
 from workbench.units import si_factor
 
@@ -29,7 +29,11 @@ _DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of th
 
 
 def write_diagnosis_page(
-    system: System, summary: Mapping[str, Any], figures: Sequence[CaseFigure], folder: Path
+    system: System,
+    summary: Mapping[str, Any],
+    figures: Sequence[CaseFigure],
+    estimated: CaseFigure | None,
+    folder: Path,
 ) -> Path:
     """Write the page into the folder, beside the files of each figure; returns its path.
 
@@ -37,12 +41,17 @@ def write_diagnosis_page(
     ----------
     summary : as written to summary.json.
     figures : one for each recording, the one that shows most first.
+    estimated : of the best estimate of that one.
     """
+    more = [] if estimated is None else [estimated]
+    drawings = placed([figures[0], *more, *figures[1:]], summary, folder)
     modelica = summary["model"]["modelica"]
     text = rendered(
         "diagnosis.html",
         summary,
-        drawings=placed(figures, summary, folder),
+        estimated=drawings.pop(1) if more else None,
+        drawings=drawings,
+        smoothed=_smoothed(system, summary["smoothed"]),
         found=[cause["effect"] for cause in summary["causes"]],
         dependences=_dependences(summary["dependences"]),
         channels=list(summary["lasting_errors"]),
@@ -77,6 +86,20 @@ def _errors(system: System, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         factor = si_factor(unit, one["unit"], one["channel"])
         sizes = [one[size][i] / factor for i in models for size in ("rms", "mean_absolute")]
         rows.append({**one, "unit": unit, "sizes": sizes})
+    return rows
+
+
+def _smoothed(system: System, found: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """Rows on the best estimates, by quantity, in the units of figures; a cell for each model."""
+    models = [] if found is None else list(found["models"].values())
+    rows = []
+    for name in dict.fromkeys(name for one in models for name in one):
+        unit = shown_unit(system, name)
+        factor, cells = per_shown(system, name, unit), []
+        for one in (model.get(name) for model in models):
+            ends = one and {key: one[key] / factor for key in ("value", "low", "high")}
+            cells.append(ends and {**ends, "unit": unit, "inside": one["inside"]})
+        rows.append({"name": capital(named(system, name)), "cells": cells})
     return rows
 
 
