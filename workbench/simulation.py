@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 # A 95 % band of deviations that are too small by the root of this covers 93 %.
 OVERCONFIDENT = (1.960 / 1.812) ** 2
-_LONGEST = 400_000  # samples of which a smoother that nobody asked for keeps all: half a gigabyte
+# [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
+_MOST = 5e8
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,8 @@ class Simulation:
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
         """The smoother's estimate, where a recording has nothing that is only there to judge by."""
-        if any(one.name in case for one in self.system.judged) or case.time.size > _LONGEST:
+        kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
+        if any(one.name in case for one in self.system.judged) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoothed(case, self.system)
 

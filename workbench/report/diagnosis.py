@@ -26,7 +26,7 @@ from workbench.report.diagnosis_figures import (
 )
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import draw_case
-from workbench.report.results import write_estimates
+from workbench.report.results import write_estimates, write_numbers
 
 
 def write_diagnosis(
@@ -92,7 +92,7 @@ def _write_recording(one: Residuals, span: int, path: Path) -> None:
         columns[f"lasting_sigma.{name}"] = means.sigma[:, c]
     for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
         columns[f"residual.{balance.name} [{balance.unit}]"] = values
-    write_whole(path, _csv(pd.DataFrame(columns)))
+    write_numbers(pd.DataFrame(columns), path, 6)
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:

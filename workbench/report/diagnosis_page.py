@@ -97,10 +97,16 @@ def _smoothed(system: System, found: Mapping[str, Any] | None) -> list[dict[str,
         unit = shown_unit(system, name)
         factor, cells = per_shown(system, name, unit), []
         for one in (model.get(name) for model in models):
-            ends = one and {key: one[key] / factor for key in ("value", "low", "high")}
-            cells.append(ends and {**ends, "unit": unit, "inside": one["inside"]})
-        rows.append({"name": capital(named(system, name)), "cells": cells})
+            cells.append(one and {**one, **_with_band(one, factor)})
+        rows.append({"name": f"{capital(named(system, name))} [{unit}]", "cells": cells})
     return rows
+
+
+def _with_band(one: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """A mean and half of its band in another unit, in digits that tell the band."""
+    value, half = one["value"] / factor, 0.5 * (one["high"] - one["low"]) / factor
+    digits = max(0, 1 - int(np.floor(np.log10(half)))) if half > 0.0 else 4
+    return {"value": value, "text": f"{value:.{digits}f} ± {half:.{digits}f}"}
 
 
 def _words(
