@@ -87,7 +87,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     for number, name in enumerate(view.signals):
         factor, judged = per_shown(system, name, unit), name == system.objective.judged
         if judged or name not in fed:
-            for style, run in known if name in fed else best + known:
+            for style, run in known if name in fed else known + best:
                 curves += _estimated(run, style, name, factor)
         if judged and (measured := result.measured()) is not None:
             measured = measured / factor
