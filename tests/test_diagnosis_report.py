@@ -259,6 +259,37 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
         assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
 
 
+# --- the best estimate ---
+
+
+def test_best_estimates_of_the_recording_shown_are_those_of_the_data(
+    page: Any, results: Path, summary: dict[str, Any]
+) -> None:
+    smoothed = summary["smoothed"]
+    assert smoothed["recording"] == text(page.xpath("//article[figure]/h3")[0])
+    table = pd.read_csv(results / "smoothed.csv")
+    rows = {text(row[0]): row for row in page.get_element_by_id("estimate-table").find("tbody")}
+    # While braking: from 0.1 bar to 1 m/s, of a wheel of 0.46 m, which a sample may round.
+    braking = table["measured.pB [Pa]"].gt(1e4), table["measured.omegaW [rad/s]"].abs().gt(2.17)
+    window = slice(braking[0].idxmax(), braking[1][::-1].idxmax() + 1)
+    for j, (model, numbers) in enumerate(smoothed["models"].items()):
+        force, friction = numbers["Fx"], numbers["muDC"]
+        value, sigma = (table[f"{model}.{kind}Fx [N]"][window].mean() for kind in ("", "sigma_"))
+        assert_allclose(force["value"], value, rtol=1e-3)
+        assert_allclose(force["high"] - force["low"], 2 * 1.96 * sigma, rtol=1e-2)
+        cell = rows["Creep force Fx [kN]"][1 + 2 * j]
+        assert float(cell.get("data-value")) == pytest.approx(force["value"] / 1e3)
+        shown, half = map(float, text(cell).split(" ± "))
+        # In kN, with two digits of the band of some 20 N.
+        assert_allclose([shown, half], [force["value"] / 1e3, 1.96e-3 * sigma], atol=6e-4)
+        assert 0.25 < friction["low"] < friction["value"] < friction["high"] < 0.35
+        # Cells that are wrong by 150 N, fifteen times the band, stay outside whatever the model.
+        assert force["inside"] < 0.1
+    assert {"nominal_model", "extended_model"} == set(smoothed["models"])
+    legend = section(page, "estimate").xpath(".//ul[@class='legend']/li")
+    assert {"style-0", "style-2"} <= {entry.get("class") for entry in legend}
+
+
 # --- summaries that were changed ---
 
 
@@ -273,7 +304,8 @@ def written(
 ) -> Any:
     """The page of a summary that was changed, without an extended model."""
     changed = {**summary, "model": dict.fromkeys(summary["model"])}
-    return lxml.html.fromstring(write_diagnosis_page(system, changed, figures, folder).read_bytes())
+    path = write_diagnosis_page(system, {**changed, "smoothed": None}, figures, None, folder)
+    return lxml.html.fromstring(path.read_bytes())
 
 
 def test_the_unexplained_is_no_cause(
@@ -381,7 +413,7 @@ def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict
 
 def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any]) -> None:
     assert browser["errors"] == []
-    assert [len(heights) for heights in browser["panels"]] == [8] * len(STOPS)
+    assert [len(heights) for heights in browser["panels"]] == [8, 7, 8, 8]
     assert min(min(heights) for heights in browser["panels"]) > 35  # [px] that can be read
     assert min(browser["curves"]) > 0
     assert min(browser["sizes"]) > 100
@@ -407,8 +439,8 @@ def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, An
     assert sorted(up) == sorted(best)
 
 
-def test_only_stops_zoom(browser: dict[str, Any]) -> None:
-    assert browser["tools"] == len(STOPS)
+def test_only_stops_and_the_best_estimate_of_one_zoom(browser: dict[str, Any]) -> None:
+    assert browser["tools"] == len(STOPS) + 1
     assert browser["zoomed"][2] == 0.5 * browser["whole"][2]
 
 

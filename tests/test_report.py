@@ -221,6 +221,28 @@ def test_missing_scores_are_explained(page: Any) -> None:
     assert any(UNJUDGED in text and "no Fx" in text for text in warnings)
 
 
+def test_a_recording_without_the_cells_shows_the_smoother_as_reference(
+    results: Path, page: Any, summary: dict[str, Any], root: Path
+) -> None:
+    for name, case in summary["cases"].items():
+        article = page.get_element_by_id(name.replace(" ", "_"))
+        legend = [entry.text_content() for entry in article.xpath(".//ul[@class='legend']/li")]
+        bands = article.xpath(".//g[starts-with(text, 'Creep force')]//path[@data-style='raw']")
+        told = "reference, as no sensor reads it: smoother, knows the whole recording" in legend
+        assert told == (name == UNJUDGED)
+        assert ("band style-raw" in [band.get("class") for band in bands]) == told
+        assert case["reference"] == ("smoother" if told else None)
+    # What the cells said, which it did not see: in means over 50 ms, whose noise is 80 N / 10^0.5.
+    found = pd.read_csv(results / f"{UNJUDGED}.csv")
+    cells = pd.read_csv(root / "cases" / CASES[0] / "measured.csv")["Fx [N]"][: len(found)]
+    block = np.arange(len(found)) // 10
+    error = (found["smoother.Fx [N]"] - cells).groupby(block).mean()
+    sigma = found["smoother.sigma_Fx [N]"].groupby(block).mean()
+    inside = error.abs() < 1.96 * np.hypot(sigma, 80.0 / np.sqrt(10.0))
+    assert inside.mean() >= 0.93
+    assert not [c for c in pd.read_csv(results / f"{CASES[0]}.csv") if c.startswith("smoother")]
+
+
 def test_curve_of_the_page_is_that_of_the_data(results: Path, page: Any) -> None:
     name = CASES[2]
     data = pd.read_csv(results / f"{name}.csv")

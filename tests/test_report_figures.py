@@ -108,9 +108,9 @@ def test_standard_deviations_become_bands_and_columns(
     x, y = np.cumsum(steps, axis=0).T
     half = 1e3 * (uncertain.case.time[-1] - uncertain.case.time[0]) / 2
     assert_allclose(x.max(), half, rtol=0, atol=200.0)  # [ms] two blocks of the band
-    # The band closes with the lower edge below the upper one by two standard deviations.
+    # The band closes with the lower edge below the upper one by twice 1.96 standard deviations.
     height = (y[-1] - y[0]) / 4000 * (float(panel.get("data-high")) - float(panel.get("data-low")))
-    assert_allclose(height, 2.0, rtol=0.01)  # [kN] rounded to levels of some 10 N
+    assert_allclose(height, 3.92, rtol=0.01)  # [kN] rounded to levels of some 10 N
     write_estimates(uncertain, tmp_path / "case.csv")
     table = pd.read_csv(tmp_path / "case.csv")
     assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]

@@ -14,6 +14,7 @@ from workbench.__main__ import main
 from workbench.api import diagnose
 from workbench.case import check_recording, read_cases
 from workbench.diagnosis import Outcome
+from workbench.diagnosis.best_estimate import bands, best_estimate
 from workbench.diagnosis.cleaning import deviation_of
 from workbench.diagnosis.motion import led_by, motion
 from workbench.errors import InputError
@@ -263,7 +264,8 @@ def test_estimators_find_the_stiffness_without_a_state(balance: Path, tmp_path: 
     options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     assert main(["simulate", str(balance / "recordings" / "00_pull"), *options]) == 0
     estimates = pd.read_csv(tmp_path / "00_pull.csv")
-    for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf"):
+    # The smoother is the reference: nothing there is only to judge by.
+    for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "smoother"):
         # Friction is 5 % of the spring's force there at most, and changes its sign.
         pulled = estimates["measured.F [N]"] > 8.0
         found = estimates[f"{name}.c [N/m]"][pulled].mean()
@@ -291,6 +293,9 @@ def test_the_pivot_that_rubs_is_named(balance: Path, tmp_path: Path) -> None:
     assert outcome.extension is not None
     with FMU(outcome.extension.fmu) as extended:
         assert extended.states == ()
+    best = best_estimate(outcome, "00_pull")
+    assert best is not None
+    assert set(bands(best)["extended_model"]) == {"c"}
 
 
 def test_states_of_an_extension_are_not_corrected(balance: Path, tmp_path: Path) -> None:
@@ -322,7 +327,9 @@ def test_a_model_without_anything_to_estimate_is_refused(
     options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["simulate", str(folder / "recordings"), *options]) == 2
     assert "expected something to estimate" in capsys.readouterr().err
-    assert diagnosed(folder, tmp_path, ["DryFriction"]).diagnosis.verdict == "found"
+    outcome = diagnosed(folder, tmp_path, ["DryFriction"])
+    assert outcome.diagnosis.verdict == "found"
+    assert best_estimate(outcome, "00_pull") is None
 
 
 def test_a_correction_has_the_sign_by_which_the_output_shows_it(

@@ -19,7 +19,7 @@ import pandas as pd
 from workbench.case import Case, check_recording, read_only
 from workbench.case import read_cases as read_folders
 from workbench.conditions import read_conditions
-from workbench.cosim import Run, replay
+from workbench.cosim import Run, observed
 from workbench.diagnosis import Effect, Outcome, catalogue, choose
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.errors import InputError
@@ -33,7 +33,6 @@ from workbench.monitoring import RATE, Monitored
 from workbench.monitoring import monitor as watch_machine
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
-from workbench.observers.gains_file import usual_gains
 from workbench.plausibility import Origin, doubts
 from workbench.prepare import read_recorded, write_cases
 from workbench.proposing import Proposal, needs_law
@@ -41,7 +40,7 @@ from workbench.proposing import propose as propose_law
 from workbench.recording import header
 from workbench.stopping import Distance, Effort, distance_of_stop
 from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.systems import load_system
 from workbench.tables import Table
 from workbench.tuning import Lines, Plan, Tuned, evaluators, pose
 from workbench.tuning import tune as tune_problem
@@ -190,8 +189,7 @@ def observe(system: System, case: Case, estimator: str, gains: Gains | None = No
         If there is no such estimator, or the model is not fit for it.
     """
     (kind,) = choose_estimators(system, [estimator]).values()
-    with open_model(system, kind.role) as fmu:
-        return replay(case, kind(fmu, system, gains or usual_gains(kind, fmu, system)))
+    return observed(case, system, kind, gains)
 
 
 def tune(

@@ -15,13 +15,17 @@ from workbench.case import Case
 from workbench.companion import companion_part
 from workbench.errors import FMUError
 from workbench.fmu import Matrix, Vector
-from workbench.observers import Estimate, Estimator
+from workbench.observers import Estimate, Estimator, Gains
+from workbench.observers.gains_file import usual_gains
+from workbench.system import System
+from workbench.systems import open_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 SURE = 0.95  # probability, that of a band
+BAND = 1.96  # standard deviations of half of it
 
 
 class Ending(enum.Enum):
@@ -117,13 +121,26 @@ class Run:
 
     def plot(self) -> "Figure":
         """Figure of all that was estimated."""
-        from workbench.report.figures import run_figure, sheet
+        from workbench.report.figures import sheet
+        from workbench.report.run_figures import run_figure
 
         return sheet(run_figure(self))
 
     def _repr_html_(self) -> str:
         """Smallest, largest and typical values, for notebooks."""
         return f"<p>{escape(self.summary())}</p>{self.to_frame().describe().to_html()}"
+
+
+def observed(case: Case, system: System, kind: type[Estimator], gains: Gains | None = None) -> Run:
+    """Feed a recording to an estimator on the system's model, with its usual gains unless given.
+
+    Raises
+    ------
+    InputError
+        If the model is not fit for it.
+    """
+    with open_model(system, kind.role) as fmu:
+        return replay(case, kind(fmu, system, gains or usual_gains(kind, fmu, system)))
 
 
 def replay(case: Case, estimator: Estimator) -> Run:

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
-from workbench.cosim import Run, replay
+from workbench.cosim import Ending, Run, observed, replay
+from workbench.errors import InputError
 from workbench.fmu import FMU, Vector
 from workbench.objective import Score, judged_window, low_pass, score
 from workbench.observers import Estimator, Gains
 from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.smoother import Smoother
 from workbench.pool import Pool
 from workbench.system import System
 from workbench.systems import open_model
@@ -25,16 +27,24 @@ if TYPE_CHECKING:
 
 # A 95 % band of deviations that are too small by the root of this covers 93 %.
 OVERCONFIDENT = (1.960 / 1.812) ** 2
+# [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
+_MOST = 5e8
 
 
 @dataclass(frozen=True)
 class CaseResult:
-    """All estimators on one case: runs and scores by estimator name."""
+    """All estimators on one case: runs and scores by estimator name.
+
+    Attributes
+    ----------
+    reference : the smoother's estimate, where no sensor is only there to judge by; else None.
+    """
 
     system: System
     case: Case
     runs: Mapping[str, Run]
     scores: Mapping[str, Score]
+    reference: Run | None
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
@@ -50,11 +60,6 @@ class CaseResult:
             return None
         error = self.runs[name].signal(judged) - self.case[judged]
         return low_pass(self.case.time, error, bandwidth)
-
-    def sigma(self, name: str, signal: str) -> Vector | None:
-        """Standard deviation of an estimated signal, (n,); None for a method without."""
-        sigma = self.runs[name].deviation(signal)
-        return None if np.isnan(sigma).all() else sigma
 
     def surprise(self, name: str) -> float:
         """Variance of innovations over what a method says, where judged; 0 for one without."""
@@ -82,6 +87,8 @@ class CaseResult:
             columns |= {f"{name}.{key}": values for key, values in run.to_columns().items()}
             if (error := self.error(name)) is not None:
                 columns[f"{name}.{judged}_error [{unit}]"] = error
+        if (best := self.reference) is not None:
+            columns |= {f"{best.estimator}.{key}": one for key, one in best.to_columns().items()}
         return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
@@ -91,6 +98,7 @@ class CaseResult:
         return {
             "title": self.case.title,
             "doubts": list(self.case.doubts),
+            "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
                 name: {
                     f"{judged}_rms_{unit}": one.rms,
@@ -111,7 +119,8 @@ class CaseResult:
 
     def plot(self) -> "Figure":
         """Figure of all that was measured and estimated."""
-        from workbench.report.figures import case_figure, sheet
+        from workbench.report.figures import sheet
+        from workbench.report.run_figures import case_figure
 
         return sheet(case_figure(self))
 
@@ -158,7 +167,34 @@ class Simulation:
         with self.estimators() as estimators:
             runs = {name: replay(case, one) for name, one in estimators.items()}
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
-        return CaseResult(self.system, case, runs, scores)
+        return CaseResult(self.system, case, runs, scores, self._reference(case, runs))
+
+    def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
+        """The smoother's estimate, where a recording has nothing that is only there to judge by."""
+        kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
+        if any(one.name in case for one in self.system.judged) or kept > _MOST:
+            return None
+        return runs.get(Smoother.name) or smoothed(case, self.system)
+
+
+def hidden(system: System) -> tuple[str, ...]:
+    """What an estimate says that no sensor feeds it: quantities, and outputs that are reported."""
+    fed = {*system.corrections, *(one.name for one in system.outputs)}
+    return tuple(name for name in system.columns if name not in fed)
+
+
+def smoothed(case: Case, system: System) -> Run | None:
+    """The best estimate of a recording that is over; None where nothing is hidden.
+
+    And where the model is not fit for it, or it fails.
+    """
+    if not hidden(system):
+        return None
+    try:
+        run = observed(case, system, Smoother)
+    except InputError:
+        return None
+    return run if run.ending is Ending.OK else None
 
 
 def prepare(

@@ -16,7 +16,7 @@ import numpy as np
 from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
-from workbench.diagnosis.clocks import case_in_time, catalogue, late_signals, lateness
+from workbench.diagnosis.clocks import case_in_time, catalogue, late_signals
 from workbench.diagnosis.counting import refuse_too_few
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, parameter_of, source
@@ -309,12 +309,9 @@ def _observers(
     errors: dict[str, dict[str, list[float]]] = {}
     counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
     sizes = diagnosis.best.point.sizes
-    late = lateness(
-        late_signals(system), {f"{name}.{of}": size for (name, of), size in sizes.items()}
-    )
     after = (
         with_model(system, OBSERVER, extension.fmu),
-        [case_in_time(one, late) for one in cases],
+        [case_in_time(one, system, sizes) for one in cases],
     )
     for one, recorded in ((system, cases), after):
         with open_model(one) as fmu:

@@ -116,8 +116,15 @@ def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:
     return replace(samples, u=u, y=y)
 
 
-def case_in_time(case: Case, late: Mapping[str, float]) -> Case:
-    """As `in_time`, of all that was recorded."""
+def case_in_time(case: Case, system: System, sizes: Mapping[tuple[str, str], float]) -> Case:
+    """As `in_time`, of all that was recorded.
+
+    Parameters
+    ----------
+    sizes : by effect and parameter, those of clocks among them.
+    """
+    named = {f"{name}.{of}": size for (name, of), size in sizes.items()}
+    late = lateness(late_signals(system), named)
     return case.with_signals(
         {n: moved(case.time, case[n], -by) for n, by in late.items() if n in case}
     )

@@ -1,6 +1,6 @@
 """Figures, tables and files, the last stage: reads results, computes nothing."""
 
-from workbench.report.figures import CaseFigure, case_figure, draw_case
+from workbench.report.figures import CaseFigure, draw_case
 from workbench.report.live import LiveWindow
 from workbench.report.page import write_page
 from workbench.report.results import (
@@ -8,6 +8,7 @@ from workbench.report.results import (
     summarise_runs,
     write_estimates,
 )
+from workbench.report.run_figures import case_figure
 
 __all__ = [
     "CaseFigure",

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.diagnosis import Outcome, Residuals
+from workbench.diagnosis.best_estimate import bands, best_estimate
 from workbench.files import write_json, write_whole
 from workbench.report.answers import diagnosed, with_answer
 from workbench.report.diagnosis_figures import (
@@ -18,12 +19,14 @@ from workbench.report.diagnosis_figures import (
     draw_confusability,
     draw_dependences,
     draw_gain,
+    estimate_figure,
     lasting,
     lasting_blocks,
     recording_figures,
 )
 from workbench.report.diagnosis_page import write_diagnosis_page
 from workbench.report.figures import draw_case
+from workbench.report.results import write_estimates, write_numbers
 
 
 def write_diagnosis(
@@ -41,11 +44,16 @@ def write_diagnosis(
     workers : processes that draw.
     related : see `write_diagnosis_page`.
     """
-    content = {**outcome.to_dict(), "provenance": provenance}
+    figures = recording_figures(outcome)
+    best = best_estimate(outcome, figures[0].name)
+    content = {
+        **outcome.to_dict(),
+        "smoothed": best and {"recording": best.case.name, "models": bands(best)},
+        "provenance": provenance,
+    }
     summary = with_answer(diagnosed(content), content)
     write_json(out / "summary.json", summary)
     effects = [cause["effect"] for cause in summary["causes"]]
-    figures = recording_figures(outcome)
     # Ctrl-C is this process's affair.
     ignored = (signal.SIGINT, signal.SIG_IGN)
     with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
@@ -62,7 +70,10 @@ def write_diagnosis(
         for one in outcome.residuals:
             _write_recording(one, lasting_blocks(outcome.system), out / f"{one.name}.csv")
         _write_tables(summary, out)
-        page = write_diagnosis_page(outcome.system, summary, figures, out, related)
+        if best is not None:
+            write_estimates(best, out / "smoothed.csv")
+        estimated = best and estimate_figure(best)
+        page = write_diagnosis_page(outcome.system, summary, figures, estimated, out, related)
         for picture in drawn:
             picture.result()
     return page
@@ -71,7 +82,11 @@ def write_diagnosis(
 def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) -> None:
     """Write the page of a diagnosis in `out` anew, with links; see `write_diagnosis_page`."""
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    write_diagnosis_page(outcome.system, summary, recording_figures(outcome), out, related)
+    figures = recording_figures(outcome)
+    best = best_estimate(outcome, figures[0].name)
+    write_diagnosis_page(
+        outcome.system, summary, figures, best and estimate_figure(best), out, related
+    )
 
 
 def _pictures(out: Path, name: str) -> list[Path]:
@@ -92,7 +107,7 @@ def _write_recording(one: Residuals, span: int, path: Path) -> None:
         columns[f"lasting_sigma.{name}"] = means.sigma[:, c]
     for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
         columns[f"residual.{balance.name} [{balance.unit}]"] = values
-    write_whole(path, _csv(pd.DataFrame(columns)))
+    write_numbers(pd.DataFrame(columns), path, 6)
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:

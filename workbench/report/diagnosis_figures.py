@@ -1,7 +1,7 @@
 """Figures of a diagnosis: prediction errors of a recording, dependences, twins, gain."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,9 @@ from workbench.diagnosis.outcome import duration
 from workbench.errors import InputError, closest
 from workbench.fmu import Matrix, Vector
 from workbench.report.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.report.run_figures import case_figure
 from workbench.report.views import capital, named, per_shown, shown_unit
+from workbench.simulation import CaseResult
 from workbench.system import Channel, System
 from workbench.units import si_factor
 
@@ -154,6 +156,12 @@ def recording_figure(
         legend=tuple(legend),
         panels=tuple(panels),
     )
+
+
+def estimate_figure(result: CaseResult) -> CaseFigure:
+    """Describe the figure of the best estimates of a recording, by model."""
+    figure = case_figure(result, (NOMINAL, EXTENDED))
+    return replace(figure, name=f"{figure.name}, smoothed")
 
 
 def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[Path]) -> None:

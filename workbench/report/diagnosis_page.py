@@ -15,7 +15,7 @@ from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, lasting_blocks
 from workbench.report.figures import CaseFigure
 from workbench.report.recordings import placed
 from workbench.report.templates import rendered
-from workbench.report.views import called, capital, named
+from workbench.report.views import called, capital, named, per_shown, shown_unit
 from workbench.system import System
 from workbench.units import si_factor
 
@@ -32,6 +32,7 @@ def write_diagnosis_page(
     system: System,
     summary: Mapping[str, Any],
     figures: Sequence[CaseFigure],
+    estimated: CaseFigure | None,
     folder: Path,
     related: Mapping[str, str] | None = None,
 ) -> Path:
@@ -41,13 +42,18 @@ def write_diagnosis_page(
     ----------
     summary : as written to summary.json.
     figures : one for each recording, the one that shows most first.
+    estimated : of the best estimate of that one.
     related : what a file says that belongs to this diagnosis, by its path from the folder.
     """
+    more = [] if estimated is None else [estimated]
+    drawings = placed([figures[0], *more, *figures[1:]], summary, folder)
     modelica = summary["model"]["modelica"]
     text = rendered(
         "diagnosis.html",
         summary,
-        drawings=placed(figures, summary, folder),
+        estimated=drawings.pop(1) if more else None,
+        drawings=drawings,
+        smoothed=_smoothed(system, summary["smoothed"]),
         found=[cause["effect"] for cause in summary["causes"]],
         dependences=_dependences(summary["dependences"]),
         channels=list(summary["lasting_errors"]),
@@ -84,6 +90,26 @@ def _errors(system: System, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         sizes = [one[size][i] / factor for i in models for size in ("rms", "mean_absolute")]
         rows.append({**one, "unit": unit, "sizes": sizes})
     return rows
+
+
+def _smoothed(system: System, found: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """Rows on the best estimates, by quantity, in the units of figures; a cell for each model."""
+    models = [] if found is None else list(found["models"].values())
+    rows = []
+    for name in dict.fromkeys(name for one in models for name in one):
+        unit = shown_unit(system, name)
+        factor, cells = per_shown(system, name, unit), []
+        for one in (model.get(name) for model in models):
+            cells.append(one and {**one, **_with_band(one, factor)})
+        rows.append({"name": f"{capital(named(system, name))} [{unit}]", "cells": cells})
+    return rows
+
+
+def _with_band(one: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """A mean and half of its band in another unit, in digits that tell the band."""
+    value, half = one["value"] / factor, 0.5 * (one["high"] - one["low"]) / factor
+    digits = max(0, 1 - int(np.floor(np.log10(half)))) if half > 0.0 else 4
+    return {"value": value, "text": f"{value:.{digits}f} ± {half:.{digits}f}"}
 
 
 def _words(

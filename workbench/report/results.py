@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from workbench.files import write_whole
 from workbench.report.answers import simulated, with_answer
 from workbench.report.views import below, percent, window
@@ -13,9 +15,12 @@ from workbench.system import System
 
 def write_estimates(result: CaseResult, path: Path) -> None:
     """Write one CSV of a case; see `CaseResult.to_frame`."""
-    frame = result.to_frame()
-    # As pandas writes it, in a quarter of the time: a row at once, not a number.
-    row = ",".join(["%.7g"] * frame.shape[1]) + "\n"
+    write_numbers(result.to_frame(), path, 7)
+
+
+def write_numbers(frame: pd.DataFrame, path: Path, digits: int) -> None:
+    """Write a table as pandas does, in a quarter of the time: a row at once, not a number."""
+    row = ",".join([f"%.{digits}g"] * frame.shape[1]) + "\n"
     rows = "".join(row % tuple(values) for values in frame.to_numpy(float).tolist())
     write_whole(path, frame.head(0).to_csv(index=False) + rows.replace("nan", ""))
 

@@ -69,7 +69,8 @@ def _simulate() -> Schema:
         "patternProperties": {r"_rms_|_nrmse$": ERROR},
         "additionalProperties": False,
     }
-    case = closed({"title": TEXT, "doubts": listed(TEXT), "estimators": by_name(score)})
+    texts = {"title": TEXT, "doubts": listed(TEXT), "reference": or_null(TEXT)}
+    case = closed({**texts, "estimators": by_name(score)})
     meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
     provenance = {
         **closed({"run": RUN, **VERSIONS, "fmu": FMU, "meanings": meanings}),
@@ -129,6 +130,8 @@ def _diagnose() -> Schema:
             "separation": TEXT,
         }
     )
+    of_band = {name: NUMBER for name in ("value", "low", "high")}
+    estimate = closed({**of_band, "unit": TEXT, "inside": ERROR})
     ends = {name: NUMBER for name in ("before", "after")}
     gain = {"measure": TEXT, **ends, "low": NUMBER, "high": NUMBER, "recordings": by_name(BOTH)}
     candidate = {
@@ -167,6 +170,7 @@ def _diagnose() -> Schema:
         "errors": listed(declared(Errors)),
         "start_values": by_name(by_name(NUMBER)),
         "observers": by_name(by_name(closed({"before": ERROR, "after": ERROR}))),
+        "smoothed": or_null(closed({"recording": TEXT, "models": by_name(by_name(estimate))})),
         "rivals": or_null(_rivals(matrix)),
         "cases": listed(TEXT),
     }

@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 
 from workbench.case import Case
-from workbench.cosim import Ending, replay
+from workbench.cosim import Ending, observed
 from workbench.errors import InputError, closest
 from workbench.observers import estimators
-from workbench.observers.gains_file import usual_gains
 from workbench.system import System
-from workbench.systems import open_model
 
 
 def with_reference(cases: Sequence[Case], system: System, estimator: str) -> list[Case]:
@@ -33,18 +31,16 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
             expected=f"one of {', '.join(known)}",
             remedy="correct the name",
         )
-    kind = known[estimator]
     found = []
-    with open_model(system, kind.role) as fmu:
-        for case in cases:
-            run = replay(case, kind(fmu, system, usual_gains(kind, fmu, system)))
-            if run.ending is not Ending.OK:
-                raise InputError(
-                    where=str(case.source),
-                    found=f"{estimator}: {run.ending.value} {run.message}".strip(),
-                    expected="an estimate to judge by",
-                    remedy="leave this case out of the tuning with --cases",
-                )
-            judged = [name for name in system.objective.weights if name not in case.outputs]
-            found.append(case.with_signals({name: run.signal(name) for name in judged}))
+    for case in cases:
+        run = observed(case, system, known[estimator])
+        if run.ending is not Ending.OK:
+            raise InputError(
+                where=str(case.source),
+                found=f"{estimator}: {run.ending.value} {run.message}".strip(),
+                expected="an estimate to judge by",
+                remedy="leave this case out of the tuning with --cases",
+            )
+        judged = [name for name in system.objective.weights if name not in case.outputs]
+        found.append(case.with_signals({name: run.signal(name) for name in judged}))
     return found
