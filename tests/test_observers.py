@@ -13,10 +13,11 @@ from workbench.case import Case, read_cases
 from workbench.cosim import Ending, replay
 from workbench.errors import InputError
 from workbench.fmu import FMU
+from workbench.kernel import solve
 from workbench.objective import judged_window, low_pass, score
 from workbench.observers import Estimator, Gains, estimators
 from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.observers.kalman import ExtendedKalmanFilter, carry
 from workbench.observers.open_loop import OpenLoop
 from workbench.observers.operating import settle, walks
 from workbench.observers.parameter import ParameterEstimator
@@ -454,3 +455,30 @@ def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(
 
     with pytest.raises(InputError, match=r"silent: found no method `space`.*tunable = False"):
         Silent.space(minimal, system, Silent.reasoned(minimal, system), 0.1, 10.0)
+
+
+# --- what laws are made of ---
+
+
+@pytest.mark.parametrize(("n", "q"), [(0, 2), (1, 0), (2, 2), (18, 17)])
+def test_a_covariance_is_carried_as_by_matrices(n: int, q: int) -> None:
+    random = np.random.default_rng(1)
+    root, rows = random.standard_normal((n + q, n + q)), random.standard_normal((n, n + q))
+    before = root @ root.T
+    F = np.vstack([rows, np.eye(n + q)[n:]])
+    P = before.copy()
+    carry(rows, P, np.zeros((n, n + q)))
+    assert_allclose(P, F @ before @ F.T, rtol=1e-13, atol=1e-12)  # rounding of up to 35**2 terms
+    assert_array_equal(P, P.T)
+
+
+@pytest.mark.parametrize("n", [1, 2, 18])
+def test_equations_with_zeros_are_solved_as_by_lapack(n: int) -> None:
+    """Each unknown with the first and the last alone, which are zero where pivots are sought."""
+    random = np.random.default_rng(1)
+    A, b = np.zeros((n, n)), random.standard_normal((n, 3))
+    A[0], A[-1], A[:, -1] = (random.standard_normal(n) for _ in range(3))
+    A += np.diag(1.0 + np.arange(n))
+    system = np.hstack([A, b])
+    assert solve(system) == 0
+    assert_allclose(system[:, n:], np.linalg.solve(A, b), rtol=1e-11, atol=1e-12)

@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose
 
 from workbench.case import Case, read_cases
 from workbench.errors import InputError
+from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.power import Planting, Repertoire, read_recorded_sets
 from workbench.power.diagnosing import library_effects
+from workbench.published.train import growth
 from workbench.published.train.planting import PLANTABLE, PlantedTrain, virtual_rig
 from workbench.systems import load_system, open_model
 
@@ -121,3 +123,24 @@ def test_sets_of_the_independent_simulator_are_understood() -> None:
         pytest.skip("the recordings are not at hand")
     found = {next(iter(group[0].effects)) for group in read_recorded_sets(SYSTEM, [folder]).groups}
     assert {"WeakPads[3]", "IsolatedUnit[6]", "DraggingBrake[5]", "Glazing"} <= found
+
+
+# --- trains of any length ---
+
+
+def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Path) -> None:
+    pytest.importorskip("rumoca")
+    generated, estimates = growth.build(2, tmp_path), []
+    samples = growth.stop(generated)
+    for one in (SYSTEM, generated):
+        # Inputs of a system file stand in an order of its own.
+        order = [[x.name for x in generated.inputs].index(x.name) for x in one.inputs]
+        names = [x.name for x in one.estimated]
+        with open_model(one) as model:
+            kind = ExtendedKalmanFilter
+            estimator = kind(model, one, kind.reasoned(model, one))
+            values = estimator.run(samples[0], samples[1][:, order], samples[2]).values
+        at = [list(one.columns).index(name) for name in sorted(names)]
+        estimates.append(values[:, at])
+    # Their equations are sorted and rounded in other orders.
+    assert_allclose(estimates[1], estimates[0], rtol=1e-7, atol=1e-9)

@@ -77,8 +77,8 @@ equation
     end for;
   end for;
   for i in 1:n loop
-    ordinary[i] = (muDC[i] + dmuDC[i])*pads*(1.0 + speedLaw*(1.0 - v/vRef))
-      *(noEvent(max(100.0, Fperp[i]))/35000.0)^(-exponent)*(1.0 - fade*(T[i] - 333.15));
+    ordinary[i] = ordinaryFriction(
+      (muDC[i] + dmuDC[i])*pads, v, Fperp[i], T[i], speedLaw, vRef, exponent, fade);
     tauB[i] = acting[i]*mu[i]*Fperp[i]*rB;
     Fx[i] = 2.0*Rig.Contact.creepForce(
       v - rA[i]*omega[i], v, Q[i], Rig.Contact.kalkerStiffness(Q[i], K0, 80000.0),

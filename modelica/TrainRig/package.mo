@@ -8,6 +8,7 @@ package TrainRig "A train that brakes: axles, bogies and vehicles, as its own se
     Documentation(info="<html>
 <p><code>Train</code> is the longitudinal dynamics of a train in service, with the contact law and the
 axle losses of <code>WheelsetRig</code>; <code>TwoVehicles</code> names the signals of one of two vehicles.
+<code>Reference</code> is more detailed: couplers, a rail that is cleaned, discs, slide protection.
 <code>Effects</code> holds what it may lack. There are no load cells: a recording has cylinder pressures
 of the bogies, speeds of the axles and an accelerometer.</p>
 <h4>Signs</h4>

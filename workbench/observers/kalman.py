@@ -58,6 +58,7 @@ class FilterMemory(NamedTuple):
     P: Matrix
     system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
     spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
+    product: Matrix  # (n, n + q), see `carry`
     change: Vector
     column: Vector
     levels: Levels
@@ -111,32 +112,28 @@ def transition(model, system, h):  # type: ignore[no-untyped-def]
 
 @compiled
 def carry(F, P, work):  # type: ignore[no-untyped-def]
-    """P <- F P F' of states and quantities, (s, s), which stays symmetric; work, (s,).
+    """P <- F P F' of states and quantities, (s, s), which stays symmetric; work, (n, s).
 
     Parameters
     ----------
     F : (n, s) rows of states, see `transition`.
     """
     n, size = F.shape
-    for j in range(size):
-        for i in range(n):
-            work[i] = 0.0
-            for k in range(size):
-                work[i] += F[i, k] * P[k, j]
-        for i in range(n):
-            P[i, j] = work[i]
+    for i in range(n):
+        for j in range(size):
+            work[i, j] = 0.0
+        for k in range(size):
+            factor = F[i, k]
+            for j in range(size):
+                work[i, j] += factor * P[k, j]
     for i in range(n):
         for j in range(i + 1):
-            work[j] = 0.0
+            total = 0.0
             for k in range(size):
-                work[j] += P[i, k] * F[j, k]
-        for j in range(i + 1):
-            P[i, j] = work[j]
-    for i in range(n):
+                total += work[i, k] * F[j, k]
+            P[i, j] = P[j, i] = total
         for j in range(n, size):
-            P[j, i] = P[i, j]
-        for j in range(i):
-            P[j, i] = P[i, j]
+            P[i, j] = P[j, i] = work[i, j]
 
 
 @inlined
@@ -212,7 +209,7 @@ def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     for j in range(y.size):
         memory.levels.noise[j] = variance(settings, fade, y, j)
     status = status or transition(model, memory.spread, h)
-    carry(memory.spread[:, model.x.size :], P, memory.change)
+    carry(memory.spread[:, model.x.size :], P, memory.product)
     if layout.columns > model.x.size:
         status = status or put(model, memory.z) or read(model)
         status = status or linearise(model, layout.columns)
@@ -345,8 +342,9 @@ def _share(gains: Gains, output: str) -> float:
     return gains[name] if name in gains.names else 0.0
 
 
-def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
+def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Vector]:
     """Memory and work space of a filter with so many states and quantities: z to change."""
     size = n + q
-    z, change = np.zeros(size), np.zeros(size)
-    return z, np.zeros((size, size)), np.zeros((n, n + 1)), np.zeros((n, n + size)), change
+    z, change, product = np.zeros(size), np.zeros(size), np.zeros((n, size))
+    spread = np.zeros((n, n + size))
+    return z, np.zeros((size, size)), np.zeros((n, n + 1)), spread, product, change

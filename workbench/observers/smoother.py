@@ -96,7 +96,7 @@ def _filter_again(model, settings, memory):  # type: ignore[no-untyped-def]
             P[i, i] += window.noise[k, i] * window.wider[k, i]
             error[i] = 0.0
         status = status or expand(model, settings, memory, k)
-        carry(window.F[k], P, window.work)
+        carry(window.F[k], P, window.product)
         for j in range(seen.size):
             if not np.isnan(window.errors[k, j]):
                 absorb(

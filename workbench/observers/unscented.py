@@ -38,6 +38,7 @@ class PointsMemory(NamedTuple):
     P: Matrix
     system: Matrix
     spread: Matrix
+    product: Matrix
     change: Vector
     column: Vector
     levels: Levels

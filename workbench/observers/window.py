@@ -52,7 +52,7 @@ class Window(NamedTuple):
     next_mean, next_covariance : as mean and covariance, of the second node.
     before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
     costates : (N, s) of the nodes: what noise does to the cost.
-    costate, error, work : (s,); P : (s, s).
+    costate, error, work : (s,); product : (n, s); P : (s, s).
     """
 
     filled: NDArray[np.intp]
@@ -92,6 +92,7 @@ class Window(NamedTuple):
     costate: Vector
     error: Vector
     work: Vector
+    product: Matrix
     P: Matrix
 
 
@@ -137,6 +138,7 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
         costate=np.zeros(s),
         error=np.zeros(s),
         work=np.zeros(s),
+        product=np.zeros((n, s)),
         P=np.zeros((s, s)),
     )
 
@@ -225,7 +227,7 @@ def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
                 if i == j:
                     P[i, i] += window.noise[k, i] * window.wider[k, i]
                 window.spread[k, i, j] = P[i, j]
-        carry(F, P, window.work)
+        carry(F, P, window.product)
         for i in range(n):
             error[i] = 0.0
             for j in range(s):

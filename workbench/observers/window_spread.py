@@ -109,5 +109,5 @@ def gather_spread(window, seen, spread):  # type: ignore[no-untyped-def]
                 )
         _back(window.F[k], information, product)
         _reduce(window.spread[k], information, product, spread.covariances[k])
-        carry(window.F[k], spread.covariances[k], window.work)
+        carry(window.F[k], spread.covariances[k], window.product)
     _reduce(window.covariance, information, product, spread.first)

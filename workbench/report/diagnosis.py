@@ -19,7 +19,6 @@ from workbench.report.diagnosis_figures import (
     draw_confusability,
     draw_dependences,
     draw_gain,
-    estimate_figure,
     lasting,
     lasting_blocks,
     recording_figures,
@@ -72,8 +71,7 @@ def write_diagnosis(
         _write_tables(summary, out)
         if best is not None:
             write_estimates(best, out / "smoothed.csv")
-        estimated = best and estimate_figure(best)
-        page = write_diagnosis_page(outcome.system, summary, figures, estimated, out, related)
+        page = write_diagnosis_page(outcome.system, summary, figures, best, out, related)
         for picture in drawn:
             picture.result()
     return page
@@ -84,9 +82,7 @@ def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) ->
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     figures = recording_figures(outcome)
     best = best_estimate(outcome, figures[0].name)
-    write_diagnosis_page(
-        outcome.system, summary, figures, best and estimate_figure(best), out, related
-    )
+    write_diagnosis_page(outcome.system, summary, figures, best, out, related)
 
 
 def _pictures(out: Path, name: str) -> list[Path]:

@@ -11,11 +11,12 @@ import numpy as np
 
 from workbench.diagnosis.outcome import duration
 from workbench.files import write_whole
-from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, lasting_blocks
+from workbench.report.diagnosis_figures import EXTENDED, NOMINAL, estimate_figure, lasting_blocks
 from workbench.report.figures import CaseFigure
 from workbench.report.recordings import placed
 from workbench.report.templates import rendered
 from workbench.report.views import called, capital, named, per_shown, shown_unit
+from workbench.simulation import CaseResult
 from workbench.system import System
 from workbench.units import si_factor
 
@@ -32,7 +33,7 @@ def write_diagnosis_page(
     system: System,
     summary: Mapping[str, Any],
     figures: Sequence[CaseFigure],
-    estimated: CaseFigure | None,
+    best: CaseResult | None,
     folder: Path,
     related: Mapping[str, str] | None = None,
 ) -> Path:
@@ -42,10 +43,10 @@ def write_diagnosis_page(
     ----------
     summary : as written to summary.json.
     figures : one for each recording, the one that shows most first.
-    estimated : of the best estimate of that one.
+    best : estimate of that one, see `best_estimate`.
     related : what a file says that belongs to this diagnosis, by its path from the folder.
     """
-    more = [] if estimated is None else [estimated]
+    more = [] if best is None else [estimate_figure(best)]
     drawings = placed([figures[0], *more, *figures[1:]], summary, folder)
     modelica = summary["model"]["modelica"]
     text = rendered(

@@ -1,0 +1,3 @@
+within TrainRig;
+package Parts "Components of the reference model"
+end Parts;

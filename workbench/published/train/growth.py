@@ -1,0 +1,148 @@
+"""Cost of the extended Kalman filter by the number of axles, on trains that are generated for it.
+
+`python -m workbench.published.train.growth 1 2 4` measures trains of 1, 2 and 4 vehicles. Needs the
+extra [compiler].
+"""
+
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench import compiler
+from workbench.fmu import Matrix, Vector
+from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.system import OBSERVER, Estimated, System
+from workbench.systems import load_system, open_model
+
+_SAMPLES, _REPEATS = 300, 5
+_SLOWING, _BEGIN = 0.9, 2.0  # of the stop [m/s2], and when its brakes are on [s]
+
+
+def model_of(vehicles: int) -> str:
+    """Modelica of a train of so many vehicles, with a name for each signal, in `TrainRig`."""
+    bogies, axles, every = 2 * vehicles, 4 * vehicles, range(1, vehicles + 1)
+    inputs = [f'pB{j}(unit="Pa")' for j in range(1, bogies + 1)]
+    inputs += [f'mass{k}(unit="kg", start=48000.0)' for k in every]
+    inputs += [f'slope{k}(unit="1")' for k in every]
+    inputs += [f'dmuDC{i}(unit="1")' for i in range(1, axles + 1)]
+    inputs += [f'dr{i}(unit="m")' for i in range(1, axles + 1)]
+    inputs += ['curve(unit="1")', 'dbias(unit="m/s2")']
+    states = [f'omega{i}(unit="rad/s", nominal=50.0' for i in range(1, axles + 1)]
+    states += ['a(unit="m/s2", nominal=1.0', 'vTrain(unit="m/s", nominal=20.0']
+    states = [f"{one}, start=0.0, fixed=true)" for one in states]
+    outputs = ['slip(unit="m/s") = v - rA[1]*omega1', 'force(unit="N") = sum(Fx)']
+    return "\n".join(
+        [
+            f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
+            f"  extends Train(final vehicles={vehicles});",
+            *(f"  input Real {one};" for one in inputs),
+            *(f"  output Real {one};" for one in (*states, *outputs)),
+            "equation",
+            "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
+            "  uphill = sum(m[k]*slope[k] for k in 1:vehicles)/sum(m);",
+            "  air = C;\n  curves = curve;\n  v = vTrain;",
+            f"  pC = {_vector('pB', bogies)};\n  m = {_vector('mass', vehicles)};",
+            f"  slope = {_vector('slope', vehicles)};\n  dmuDC = {_vector('dmuDC', axles)};",
+            f"  rA = r + {_vector('dr', axles)};\n  omega = {_vector('omega', axles)};",
+            *(f"  der(omega{i}) = rate[{i}];" for i in range(1, axles + 1)),
+            "  der(vTrain) = acceleration;",
+            "  der(a) = 6.283185307179586*5.0*(felt + dbias - a);\nend Longer;\n",
+        ]
+    )
+
+
+def _vector(name: str, size: int) -> str:
+    return "{" + ", ".join(f"{name}{i}" for i in range(1, size + 1)) + "}"
+
+
+def build(vehicles: int, folder: Path) -> System:
+    """Compile such a train in a folder; returns its system, the usual one with more signals."""
+    system = load_system("train")
+    library = folder / "TrainRig"
+    shutil.copytree(system.library.parents[1], folder, dirs_exist_ok=True)
+    (library / "Longer.mo").write_text(model_of(vehicles))
+    order = library / "package.order"
+    order.write_text(f"{order.read_text()}Longer\n")
+    fmu = folder / "Longer.fmu"
+    platforms = [compiler.native()]
+    compiler.build(library / "package.mo", "TrainRig.Longer", fmu, platforms=platforms)
+    axles, every = range(1, 4 * vehicles + 1), range(1, vehicles + 1)
+    given = {one.name: one for one in system.inputs}
+    pressures = [replace(given["pB1"], name=f"pB{j}") for j in range(1, 2 * vehicles + 1)]
+    vehicle = [
+        replace(given[f"{one}1"], name=f"{one}{k}") for one in ("mass", "slope") for k in every
+    ]
+    speed, accelerometer = system.outputs[0], system.outputs[-1]
+    speeds = [replace(speed, name=f"omega{i}", reading=f"omega{i}") for i in axles]
+    known = {one.name: one for one in system.estimated}
+
+    def estimated(name: str) -> list[Estimated]:
+        one = known[f"{name}[1]"]
+        return [
+            replace(one, name=f"{name}[{i}]", correction=f"d{name}{i}", acts_on=f"omega{i}")
+            for i in axles
+        ]
+
+    return replace(
+        system,
+        models={OBSERVER: replace(system.models[OBSERVER], path=fmu)},
+        inputs=(*pressures, *vehicle, given["curve"]),
+        outputs=(*speeds, accelerometer),
+        estimated=(*estimated("muDC"), *estimated("r"), known["bias"]),
+        states=(),
+    )
+
+
+def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
+    """Time, inputs and outputs of a stop at constant deceleration, with noise of sensors."""
+    random, step = np.random.default_rng(1), system.sample_time
+    t = step * np.arange(_SAMPLES, dtype=np.float64)
+    v = 33.0 - _SLOWING * np.maximum(t - _BEGIN, 0.0)
+    levels = {"pB": 2.2e5 * (t >= _BEGIN), "mass": 48e3 + 0.0 * t, "slope": 0.0 * t}
+    levels |= {"omega": v / 0.46, "a": np.gradient(v, step), "curve": 0.0 * t}
+    u = [levels[one.name.rstrip("0123456789")] for one in system.inputs]
+    y = [levels[one.name.rstrip("0123456789")] for one in system.outputs]
+    noise = [one.noise * random.standard_normal(t.size) for one in system.outputs]
+    inputs: Matrix = np.column_stack(u)
+    outputs: Matrix = np.column_stack(y) + np.column_stack(noise)
+    return t, inputs, outputs
+
+
+def time_filter(system: System) -> float:
+    """Processor time of the filter for a sample, the least of five runs [s]."""
+    with open_model(system) as fmu:
+        kind = ExtendedKalmanFilter
+        estimator, samples = kind(fmu, system, kind.reasoned(fmu, system)), stop(system)
+        estimator.run(*samples)
+        spent = []
+        for _ in range(_REPEATS):
+            begin = time.process_time()
+            estimator.run(*samples)
+            spent.append((time.process_time() - begin) / _SAMPLES)
+    return min(spent)
+
+
+def report(sizes: Iterable[int]) -> Iterable[str]:
+    """A line for each number of vehicles."""
+    for vehicles in sizes:
+        with tempfile.TemporaryDirectory() as scratch:
+            system = build(vehicles, Path(scratch))
+            spent = 1e6 * time_filter(system)
+        axles = 4 * vehicles
+        yield f"{axles:>3} axles {spent:>8.1f} us a sample, {spent / axles:>6.2f} us an axle"
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the report for numbers of vehicles."""
+    for line in report(int(one) for one in arguments):
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
