@@ -76,14 +76,9 @@ def test_a_fleet_goes_on_from_its_states_and_reads_urls(
 
 def test_a_cluster_finds_the_same(fleet: Path, local: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    # Dask pauses workers whose process is large, as this one is after hundreds of tests: no limit.
-    options = {
-        "n_workers": 1,
-        "threads_per_worker": 1,
-        "dashboard_address": ":0",
-        "memory_limit": 0,
-    }
-    with distributed.LocalCluster(processes=False, **options) as cluster:
+    # In processes of their own: within this one, after hundreds of tests, a task may never end.
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with distributed.LocalCluster(processes=True, **options) as cluster:
         watched(str(fleet), tmp_path, "--cluster", cluster.scheduler_address)
     for name in ("one", "two"):
         pd.testing.assert_frame_equal(estimates(tmp_path / name), estimates(local / name))

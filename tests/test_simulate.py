@@ -112,7 +112,7 @@ def test_the_table_of_the_documentation_is_that_of_the_command(results: Path) ->
     summary = json.loads((results / "summary.json").read_text())
     (text,) = figures.block("simulate").findall(figures.PAGE.read_text())
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
-    header, *made = figures.errors(summary)
+    header, *made = figures.tables.errors(summary)
     assert rows[0] == list(header)
     for row, found in zip(rows[2:], made, strict=True):
         assert row[0] == found[0]
