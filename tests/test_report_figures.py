@@ -144,7 +144,7 @@ def test_samples_are_those_of_the_curves(uncertain: CaseResult) -> None:
     rows = iter(codes[2:])
     curves = [curve for panel in figure.panels for curve in panel.curves]
     for curve, ranges in zip(curves, json.loads(told)["curves"], strict=True):
-        for values, (least, most) in zip((curve.values, curve.sigma), ranges, strict=False):
+        for values, (least, most) in zip((curve.values, curve.reach), ranges, strict=False):
             row = next(rows)
             assert values is not None
             found = np.where(row == 65535, np.nan, least + (most - least) * row / 65534)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests import growth
 from workbench.case import Case, read_cases
 from workbench.errors import InputError
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.power import Planting, Repertoire, read_recorded_sets
 from workbench.power.diagnosing import library_effects
-from workbench.published.train import growth
 from workbench.published.train.planting import PLANTABLE, PlantedTrain, virtual_rig
 from workbench.systems import load_system, open_model
 

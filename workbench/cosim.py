@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 SURE = 0.95  # probability, that of a band
-BAND = 1.96  # standard deviations of half of it
 
 
 class Ending(enum.Enum):

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+BAND = 1.96  # standard deviations of half a 95 % band, of a normal distribution
+
 # Units that are said, largest first, by the SI unit of a model; the last one takes what is less.
 _SAID = {
     "1": (("%", 0.01),),

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from workbench.cosim import BAND, Run
+from workbench.cosim import Run
 from workbench.diagnosis.cleaning import Mask
 from workbench.diagnosis.clocks import case_in_time
 from workbench.diagnosis.outcome import Outcome
+from workbench.lab import BAND
 from workbench.objective import judged_window, score
 from workbench.simulation import CaseResult, hidden, smoothed
 from workbench.system import OBSERVER

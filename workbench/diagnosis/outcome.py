@@ -19,7 +19,7 @@ from workbench.diagnosis.timing import Late
 from workbench.diagnosis.trial import Prospect
 from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
-from workbench.lab import with_interval
+from workbench.lab import BAND, with_interval
 from workbench.system import Channel, Signal, System
 from workbench.units import si_factor
 
@@ -311,7 +311,7 @@ def _late(late: Late) -> str:
     """Signals that are late, and what to do, for people."""
     if not late.signals:
         return "several signals are late by different times; say in [loggers] which share a logger"
-    reach = 1.96 * late.sigma
+    reach = BAND * late.sigma
     size = with_interval(late.skew, late.skew - reach, late.skew + reach, "s")
     signals = " and ".join(late.signals)
     return (

@@ -16,10 +16,10 @@ from workbench.diagnosis.timing import Late, by_themselves
 from workbench.diagnosis.trial import Prospect
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
+from workbench.lab import BAND
 
 Verdict = Literal["nothing", "found", "unexplained"]
 
-_QUANTILE = 1.96  # of a normal distribution, 95 %
 _FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 
@@ -241,7 +241,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
         low, high = unknowns.bounds(effect, parameter)
         # Beside the noise: forms of laws that differ in detail, and immaterial companions.
         form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
-        reach = float(_QUANTILE * np.hypot(sigma[trial.joint.known.index(key)], form))
+        reach = float(BAND * np.hypot(sigma[trial.joint.known.index(key)], form))
         ends = max(value - reach, low), min(value + reach, high)
         parameters[key[1]] = Interval(value, *ends, unknowns.unit(effect, parameter))
     fast = effect.order_locked

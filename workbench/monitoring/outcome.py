@@ -11,6 +11,7 @@ import pandas as pd
 
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
+from workbench.lab import BAND
 from workbench.monitoring.chart import LevelChange
 from workbench.monitoring.estimate import watched
 from workbench.monitoring.state import Delivered
@@ -19,8 +20,6 @@ from workbench.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_BAND = 1.96  # standard deviations, of 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +191,7 @@ class Monitored:
 
     def _size(self, track: Track, size: float, known: float) -> str:
         """A change with its 95 % range, and its share of the nominal value."""
-        low, high = size - _BAND * known, size + _BAND * known
+        low, high = size - BAND * known, size + BAND * known
         text = f"{size:+.3g} ({low:.3g} to {high:.3g}) {track.unit}".removesuffix(" 1")
         nominal = abs(self.system.values.get(track.name, 0.0))
         return f"{text}, {size / nominal:+.1%} of nominal" if nominal else text

@@ -11,6 +11,7 @@ from scipy.stats import ttest_rel
 
 from workbench.diagnosis import Cause, Outcome
 from workbench.diagnosis.search import Fitted
+from workbench.lab import BAND
 from workbench.proposing.forms import MARK, WrittenForm
 from workbench.proposing.free import FittedLaw
 from workbench.proposing.scan import LawProspect
@@ -18,7 +19,6 @@ from workbench.proposing.scan import LawProspect
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_QUANTILE = 1.96  # of a normal distribution, 95 %
 _CHANCE = 0.05  # that held-out recordings fare better with a law that is none
 _NONE = "No law is proposed"
 
@@ -169,10 +169,10 @@ class Proposal:
                         "value": values,
                         "function_unit": one.law.carrier.unit,
                         "function": function,
-                        "low": function - _QUANTILE * sigma,
-                        "high": function + _QUANTILE * sigma,
-                        "shape_low": function - _QUANTILE * shape,
-                        "shape_high": function + _QUANTILE * shape,
+                        "low": function - BAND * sigma,
+                        "high": function + BAND * sigma,
+                        "shape_low": function - BAND * shape,
+                        "shape_high": function + BAND * shape,
                     }
                 )
             )

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.stats import t
 
 from workbench.answer import Answer, Better, Measure
+from workbench.lab import BAND
 from workbench.report.views import called, label, percent
 from workbench.system import System
-
-_SURE = 1.96  # standard errors, of 95 %
 
 
 def with_answer(answer: Answer, summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -285,7 +284,7 @@ def watched(summary: Mapping[str, Any]) -> Answer:
         level, sure = one["level"], one["standard_error"]
         ends = (None, None)
         if level is not None and sure is not None:
-            ends = (level - _SURE * sure, level + _SURE * sure)
+            ends = (level - BAND * sure, level + BAND * sure)
         details[f"level of {name}"] = Measure(level, one["unit"], "", *ends)
     return Answer(
         "; ".join(said) + "." if said else f"Nothing changed in {count}.", headline, details

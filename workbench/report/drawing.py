@@ -118,12 +118,12 @@ def _curve(time: Vector, curve: Curve, panel: Panel) -> dict[str, Any]:
     known = np.isfinite(y)
     runs = np.split(np.arange(y.size), np.flatnonzero(np.diff(known)) + 1)
     band = ""
-    if curve.sigma is not None:
+    if curve.reach is not None:
         kept = extremes(curve.values, _BLOCKS // 2)
-        kept = kept[np.isfinite(curve.values[kept] + curve.sigma[kept])]
+        kept = kept[np.isfinite(curve.values[kept] + curve.reach[kept])]
         if kept.size:
-            values, sigma, there = curve.values[kept], curve.sigma[kept], milliseconds[kept]
-            edges = np.r_[levels(values + sigma), levels(values - sigma)[::-1]]
+            values, reach, there = curve.values[kept], curve.reach[kept], milliseconds[kept]
+            edges = np.r_[levels(values + reach), levels(values - reach)[::-1]]
             band = _path(np.r_[there, there[::-1]], edges) + "z"
     return {
         "style": curve.style,

@@ -69,11 +69,11 @@ function zoomable(figure) {
       const level = (value) => ((panel.high - value) * panel.levels) / (panel.high - panel.low);
       let band = 0;
       panel.curves = panel.lines.map((line) => {
-        const { values, sigma } = sampled[next++];
-        const drawn = sigma?.some((one) => !Number.isNaN(one)) ? panel.bands[band++] : undefined;
-        const upper = drawn && values.map((value, i) => level(value + sigma[i]));
-        const lower = drawn && values.map((value, i) => level(value - sigma[i]));
-        return { line, xs, ys: values.map(level), values, sigma, band: drawn, upper, lower };
+        const { values, reach } = sampled[next++];
+        const drawn = reach?.some((one) => !Number.isNaN(one)) ? panel.bands[band++] : undefined;
+        const upper = drawn && values.map((value, i) => level(value + reach[i]));
+        const lower = drawn && values.map((value, i) => level(value - reach[i]));
+        return { line, xs, ys: values.map(level), values, reach, band: drawn, upper, lower };
       });
     }
     all = xs;
@@ -203,9 +203,9 @@ function zoomable(figure) {
   spoken.className = "unseen";
 
   const digits = (value) => String(Number(value.toPrecision(5))).replace("-", "−");
-  function said(panel, value, sigma) {
+  function said(panel, value, reach) {
     const { unit, further } = panel;
-    const own = `${digits(value)}${sigma > 0 ? ` ± ${digits(Number(sigma.toPrecision(2)))}` : ""}`;
+    const own = `${digits(value)}${reach > 0 ? ` ± ${digits(Number(reach.toPrecision(2)))}` : ""}`;
     const beside = further ? ` (${digits(Number((value * further[1]).toPrecision(4)))} ${further[0]})` : "";
     return `${own}${unit === "1" ? "" : ` ${unit}`}${beside}`;
   }
@@ -218,10 +218,10 @@ function zoomable(figure) {
         const value = one.values[sample];
         if (one.line.style.display === "none" || Number.isNaN(value)) continue;
         const { style } = one.line.dataset;
-        const sigma = one.sigma ? one.sigma[sample] : NaN;
+        const reach = one.reach ? one.reach[sample] : NaN;
         const dashed = one.line.classList.contains("dashed") ? ", dashed" : "";
         const name = `${words.get(style) ?? ""}${dashed}`;
-        entries.push({ style, name, text: said(panel, value, sigma) });
+        entries.push({ style, name, text: said(panel, value, reach) });
       }
       return { title: panel.title, entries };
     });

@@ -63,13 +63,13 @@ class Curve:
     ----------
     style : key of LIGHT and DARK, which ties it to an entry of the legend.
     values : (n,) in the panel's unit, NaN where there is none.
-    sigma : (n,) half of its band in the same unit, NaN where there is none; or None.
+    reach : (n,) half of its band in the same unit, NaN where there is none; or None.
     dashed : set apart from another curve of the same style.
     """
 
     style: str
     values: Vector
-    sigma: Vector | None = None
+    reach: Vector | None = None
     dashed: bool = False
 
 
@@ -129,8 +129,8 @@ def sheet(figure: CaseFigure) -> Figure:
                 line = "--" if curve.dashed else "-"
                 width = {"raw": 0.5, "measured": 0.8}.get(curve.style, 1.2)
                 axes.plot(figure.time, curve.values, line, color=colour, linewidth=width)
-                if curve.sigma is not None:
-                    band = (curve.values - curve.sigma, curve.values + curve.sigma)
+                if curve.reach is not None:
+                    band = (curve.values - curve.reach, curve.values + curve.reach)
                     axes.fill_between(figure.time, *band, color=colour, alpha=0.2, linewidth=0)
             if figure.window:
                 axes.axvspan(*figure.window, color=LIGHT["2"], alpha=0.05, linewidth=0)

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
+from workbench.lab import BAND
 from workbench.monitoring import Monitored, Track
 from workbench.report.answers import watched, with_answer
 from workbench.report.figures import LIGHT, STYLE, save_figure
 from workbench.report.monitoring_page import write_monitoring_page
 
-_BAND = 1.96  # standard deviations, of 95 %
 _COLUMNS = 4  # of panels
 _POINT, _LEVEL, _ALARM = LIGHT["2"], LIGHT["measured"], LIGHT["7"]
 
@@ -78,7 +78,7 @@ def _heights(tracks: list[Track]) -> dict[tuple[bool, str], float]:
 def _half(track: Track) -> Vector:
     """Half of the 95 % band of each estimate."""
     scale = float(np.sqrt(np.nan_to_num(track.scatter, nan=1.0)))
-    half: Vector = _BAND * scale * track.deviations
+    half: Vector = BAND * scale * track.deviations
     return half
 
 

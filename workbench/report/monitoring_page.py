@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from workbench.fmu import Vector
+from workbench.lab import BAND
 from workbench.monitoring import Monitored, Track
 from workbench.report.figures import CaseFigure, Curve, Panel
 from workbench.report.parts import Cell, Heading, Part, Rows, Strip, number, write_parts
@@ -15,7 +16,6 @@ from workbench.report.recordings import placed
 from workbench.report.views import capital
 
 _POINT, _LEVEL, _CHANGED = "2", "measured", "7"
-_SURE = 1.96  # standard errors, of 95 %
 _ENTRY = re.compile(r"(.+)\[(\d+)\]")
 
 
@@ -65,7 +65,7 @@ def write_monitoring_page(found: Monitored, summary: Mapping[str, Any], out: Pat
 
 
 _EXPLAINED = (
-    "One point for each recording, with a band of one standard deviation; the level that it is "
+    "One point for each recording, with a band that holds 95 %; the level that it is "
     "compared with, red after a change that was told. The shaded recordings are where the last "
     "change was, with 95 %. Each quantity is compared with its own past; one of several that are "
     "alike against the others."
@@ -118,10 +118,10 @@ def _figure(track: Track, found: Monitored) -> CaseFigure:
     count = len(found.names)
     scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
     sound, changed = _levels(track, count)
-    sigma = scale * track.deviations
-    curves = (Curve(_POINT, track.values, sigma), Curve(_LEVEL, sound), Curve(_CHANGED, changed))
-    low = float(np.nanmin(track.values - 2.0 * sigma))
-    high = float(np.nanmax(track.values + 2.0 * sigma))
+    reach = BAND * scale * track.deviations
+    curves = (Curve(_POINT, track.values, reach), Curve(_LEVEL, sound), Curve(_CHANGED, changed))
+    low = float(np.nanmin(track.values - reach))
+    high = float(np.nanmax(track.values + reach))
     room = 0.05 * (high - low) or 1.0
     label = capital(f"{track.label} {track.name}".replace("  ", " "))
     title = f"{label} [{track.unit}]".removesuffix(" [1]")
@@ -180,8 +180,8 @@ def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Rows:
             Cell(one["changed_after"]),
             Cell(" to ".join(between)),
             number(size, "{:+.3g}".format),
-            number(size - _SURE * sure, "{:+.3g}".format),
-            number(size + _SURE * sure, "{:+.3g}".format),
+            number(size - BAND * sure, "{:+.3g}".format),
+            number(size + BAND * sure, "{:+.3g}".format),
             number(None if share is None else 100.0 * share, "{:+.1f}".format),
             Cell(one["unit"]),
         )

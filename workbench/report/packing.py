@@ -26,7 +26,7 @@ def packed(figure: CaseFigure) -> tuple[str, str]:
     """All samples of a figure: ranges of the channels as JSON, and their codes.
 
     The first two channels are the high and the low half of the time in ticks of the whole; then
-    come values and, where there are any, standard deviations, curve by curve.
+    come values and, where there are any, halves of bands, curve by curve.
     """
     begin, end = float(figure.time[0]), float(figure.time[-1])
     ticks = np.rint((figure.time - begin) / (end - begin) * _TICKS).astype(np.uint64)
@@ -35,7 +35,7 @@ def packed(figure: CaseFigure) -> tuple[str, str]:
     for panel in figure.panels:
         for curve in panel.curves:
             ranges = []
-            for values in (curve.values, curve.sigma):
+            for values in (curve.values, curve.reach):
                 if values is not None:
                     codes, low, high = _codes(values)
                     rows.append(codes)

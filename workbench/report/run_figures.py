@@ -9,8 +9,9 @@ from itertools import cycle
 
 import numpy as np
 
-from workbench.cosim import BAND, Run
+from workbench.cosim import Run
 from workbench.fmu import Vector
+from workbench.lab import BAND
 from workbench.objective import judged_window
 from workbench.report.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.report.views import (

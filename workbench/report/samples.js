@@ -36,7 +36,7 @@ const ABSENT = 65535; // code of a sample without a value
 const valued = (codes, [low, high]) =>
   Float64Array.from(codes, (code) => (code === ABSENT ? NaN : low + ((high - low) * code) / (ABSENT - 1)));
 
-/** Times [ms] after the first sample, and by curve its values and deviations. */
+/** Times [ms] after the first sample, and by curve its values and halves of bands. */
 async function samples(figure, plot) {
   const text = figure.querySelector(".samples")?.textContent;
   if (!text || !("DecompressionStream" in window)) return null;
@@ -45,8 +45,8 @@ async function samples(figure, plot) {
   const duration = Number(plot.dataset.duration);
   const xs = Float64Array.from(upper, (high, i) => ((high * 65536 + lower[i]) * duration) / 4294967295);
   const curves = told.curves.map((ranges) => {
-    const [values, sigma] = ranges.map((range) => valued(rest.shift(), range));
-    return { values, sigma };
+    const [values, reach] = ranges.map((range) => valued(rest.shift(), range));
+    return { values, reach };
   });
   return { xs, curves };
 }

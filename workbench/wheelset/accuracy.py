@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from workbench.case import Case, sign
 from workbench.cosim import Ending, Run, replay
 from workbench.fmu import Vector
+from workbench.lab import BAND
 from workbench.objective import judged_window, low_pass
 from workbench.observers import Estimator
 from workbench.system import System
@@ -23,7 +24,6 @@ from workbench.wheelset.truth import BUILT_UP, Truth, lowest_speed, rolling_spee
 NOISE = 0.03
 
 COVERED = ("Fx", "slip", "omegaW", "omegaR", "muDC", "muWR")  # by bands, where there are any
-_BAND = 1.96  # standard deviations, 95 % of a normal error
 
 _BUILDING_UP = 2.0  # [s] after the first contact
 _SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
@@ -254,7 +254,7 @@ def coverage(stop: KnownStop, name: str) -> dict[str, float]:
         judged[judged_window(stop.case, stop.system)] = True
         judged &= run.claimed.get(quantity, True)
         error = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[judged]
-        reach = _BAND * run.deviation(quantity)[judged]
+        reach = BAND * run.deviation(quantity)[judged]
         if error.size and np.isfinite(reach).all():
             found[quantity] = float(np.mean(error < reach))
     return found

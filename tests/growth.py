@@ -1,7 +1,6 @@
 """Cost of the extended Kalman filter by the number of axles, on trains that are generated for it.
 
-`python -m workbench.published.train.growth 1 2 4` measures trains of 1, 2 and 4 vehicles. Needs the
-extra [compiler].
+`python -m tests.growth 1 2 4` measures trains of 1, 2 and 4 vehicles. Needs the extra [compiler].
 """
 
 import shutil
