@@ -404,6 +404,16 @@ def test_what_is_not_certain_is_not_taken_by_yes(
     assert not list((tmp_path / "out").glob("*/case.toml"))
 
 
+def test_one_channel_is_not_taken_for_two_signals(
+    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["import", str(table()), "--out", str(tmp_path / "out"), "--yes"]
+    assert main([*command, "--column", "omegaW=v_Rolle", "--column", "omegaR=V_ROLLE"]) == 2
+    error = capsys.readouterr().err
+    assert "'v_Rolle'" in error
+    assert "stands for omegaW and for omegaR" in error
+
+
 def test_a_unit_that_alone_is_plausible_is_taken_and_said(
     table: Callable[..., Path], tmp_path: Path, stop: Case, system: System
 ) -> None:

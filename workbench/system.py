@@ -279,10 +279,6 @@ class System:
         """The same system, on models with other names of variables."""
         return replace(self, names={**self.names, **names})
 
-    def closest_signal(self, name: str) -> str:
-        """Hint at a signal whose name is like this one."""
-        return closest(name, [*self.signals, *(one.name for one in self.derived), *self.columns])
-
     def refuse_missing(self, name: str, where: str) -> None:
         """Refuse a name that is no signal of this system.
 

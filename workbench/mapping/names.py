@@ -1,7 +1,7 @@
 """Which channel a user says is which signal, and how alike their names are."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from workbench.errors import InputError
@@ -129,26 +129,6 @@ def alike(channel: str, about: str, signal: Signal) -> int:
         if len(joined) >= _LEAST and joined in "".join(own):
             best = max(best, WITHIN)
     return best
-
-
-def refuse_shared(names: Mapping[str, NamedChannel], where: str) -> None:
-    """Refuse one channel for two signals.
-
-    Raises
-    ------
-    InputError
-        If there is one.
-    """
-    taken: dict[str, str] = {}
-    for signal, one in names.items():
-        if one.channel in taken:
-            raise InputError(
-                where=f"{where} {signal}",
-                found=f"channel '{one.channel}', which is already {taken[one.channel]}",
-                expected="a different channel for each signal",
-                remedy="correct one of the two",
-            )
-        taken[one.channel] = signal
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:

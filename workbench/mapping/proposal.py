@@ -145,8 +145,8 @@ def propose(
     Raises
     ------
     InputError
-        If a named channel is missing, or its unit does not fit; or a group that holds a signal has
-        no time.
+        If a named channel is missing or is named twice, or its unit does not fit; or a group that
+        holds a signal has no time.
     """
     places = _places(files)
     where = ", ".join(str(one.path) for one in files)
@@ -155,6 +155,7 @@ def propose(
         for name, one in given.items()
         if name != TIME
     }
+    _refuse_shared(assigned, where)
     if TIME in given:
         _find(given[TIME], TIME, places, where)
     times = {given[TIME].channel} if TIME in given else set()
@@ -255,6 +256,20 @@ def _as_named(
         certain=True,
         concluded=concluded or bool(one.unit),
     )
+
+
+def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
+    """Refuse one channel that is named for two signals."""
+    taken: dict[int, str] = {}
+    for signal, one in assigned.items():
+        if id(one.channel) in taken:
+            raise InputError(
+                where=f"{where}, channel '{one.label}'",
+                found=f"it stands for {taken[id(one.channel)]} and for {signal}",
+                expected="a channel of its own for each signal",
+                remedy=f"correct one of the two, --column '{signal}=NAME'",
+            )
+        taken[id(one.channel)] = signal
 
 
 def _way(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | None:
