@@ -39,6 +39,7 @@ RECORDINGS = ROOT.parent / "shared" / "recordings"
 SYSTEM = load_system("wheelset")
 KINDS = all_estimators(SYSTEM)
 OBSERVERS = tuple(KINDS)[2:]  # the others are baselines
+PLANTS = ("clean", "cylinder_lag", "fade", "pole_ring", "radius", "speed_friction")
 
 STOPS = tuple(sorted(folder.name for folder in (ROOT / "cases").iterdir()))
 DRY = tuple(name for name in STOPS if "_dry_" in name)
@@ -222,10 +223,18 @@ MISLED = {
 }
 
 
-@pytest.mark.parametrize("name", OBSERVERS)
 @pytest.mark.parametrize(
-    "recordings",
-    ["clean", "cylinder_lag", "fade", "pole_ring", "radius", "speed_friction"],
+    ("recordings", "name"),
+    [
+        # The smoother takes as long as all others together.
+        pytest.param(
+            recordings,
+            name,
+            marks=[pytest.mark.long] * (name == "smoother" and recordings != "fade"),
+        )
+        for recordings in PLANTS
+        for name in OBSERVERS
+    ],
 )
 def test_force_is_followed_whatever_is_wrong_with_the_plant(
     estimators: dict[str, Estimator], name: str, recordings: str

@@ -66,8 +66,8 @@ PLANTED = {
     "time_skew": ("LoggerTimeSkew[speeds]", "skew", 0.025),
     "roller_radius": ("RollerRadius", "delta", -5e-4),
 }
-# One each of pads, cylinders, contact, losses, sensors and what turns; all of them take minutes.
-SHORT = {"fade", "cylinder_lag", "wheel_load", "roller_losses", "fx_gain", "pole_ring"}
+# One each of pads, contact and losses; others of cylinders, sensors and what turns are found below.
+SHORT = {"fade", "wheel_load", "roller_losses"}
 # Dry stops in which pressure only rises and no wheel slides do not show these.
 HIDDEN = {"caliper_hysteresis", "adhesion_recovery", "wheel_inertia"}
 OUTSIDE = {"friction_step": 0.05, "friction_ripple": 0.02, "drive_beat": 0.03}
@@ -232,7 +232,7 @@ def test_a_late_logger_that_nobody_declared_is_no_other_cause(
     assert abs(found.late.skew - 0.012) < 1.96 * found.late.sigma + 5e-4
 
 
-@pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"friction_ripple", "drive_beat"}))
+@pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"drive_beat"}))
 def test_a_cause_outside_the_catalogue_is_not_given_a_name(
     outside: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -294,7 +294,7 @@ SEEN = {
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize("folder", mostly_long(SEEN, {"speed_friction", "pole_ring"}))
+@pytest.mark.parametrize("folder", mostly_long(SEEN, {"speed_friction"}))
 def test_an_independent_simulator_is_seen_through(
     folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -306,6 +306,12 @@ def test_an_independent_simulator_is_seen_through(
     assert one.low - 0.02 * abs(size) <= size <= one.high + 0.02 * abs(size)
     assert found.gain is not None
     assert found.gain.after < 0.25 * found.gain.before
+
+
+def two_stops(folder: str) -> list[Case]:
+    """One in each direction, of different pressures."""
+    cases = read_cases([LABELLED / folder], SYSTEM)
+    return [case for case in cases if case.name[:2] in ("04", "05")]
 
 
 def slow(case: Case) -> Case:
@@ -321,7 +327,14 @@ def uneven(case: Case) -> Case:
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize("sampled", [lambda case: case, slow, uneven], ids=["", "slow", "uneven"])
+@pytest.mark.parametrize(
+    "sampled",
+    [
+        pytest.param(lambda case: case, id="every sample"),
+        pytest.param(slow, marks=pytest.mark.long),
+        uneven,
+    ],
+)
 def test_clean_recordings_of_an_independent_simulator_stay_clean(
     sampled: Callable[[Case], Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -333,24 +346,18 @@ def test_clean_recordings_of_an_independent_simulator_stay_clean(
 def test_a_pole_ring_is_named_from_uneven_samples(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],
 ) -> None:
-    (cause,) = diagnosed(
-        [uneven(case) for case in read_cases([LABELLED / "pole_ring"], SYSTEM)]
-    ).causes
+    (cause,) = diagnosed([uneven(case) for case in two_stops("pole_ring")]).causes
     assert cause.effect.name == "PoleRingEccentricity"
     assert cause.parameters["amplitude"].low <= 2e-3 <= cause.parameters["amplitude"].high
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-@pytest.mark.parametrize("folder", SEEN)
+@pytest.mark.parametrize("folder", mostly_long(SEEN, {"radius"}))
 def test_two_stops_of_an_independent_simulator_are_enough(
     folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
-    """One in each direction, of different pressures."""
     name, parameter, size = SEEN[folder]
-    cases = [
-        case for case in read_cases([LABELLED / folder], SYSTEM) if case.name[:2] in ("04", "05")
-    ]
-    (cause,) = diagnosed(cases).causes
+    (cause,) = diagnosed(two_stops(folder)).causes
     assert cause.effect.name == name
     assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
 
@@ -397,6 +404,7 @@ def test_a_wrong_sensor_on_an_independent_simulator_is_named(
         assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
     diagnosed: Callable[[Sequence[Case]], Diagnosis],

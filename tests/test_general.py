@@ -18,6 +18,7 @@ PROSE = "[Rr]ollers?|[Dd]iscs?|[Ss]lip(s|ping)?|[Bb]rak(e|es|ed|ing)|[Aa]dhesion
 ALLOWED = {"direction", "speed"}  # words of every field
 
 
+@pytest.fixture(scope="module")
 def names(system: System) -> set[str]:
     """Names that the system file and the library of the wheelset give to things."""
     library = read_library(system.library)
@@ -48,8 +49,8 @@ def sources() -> list[Path]:
 
 
 @pytest.mark.parametrize("source", sources(), ids=lambda p: str(p.relative_to(ROOT / "workbench")))
-def test_no_source_names_what_one_machine_has(source: Path, system: System) -> None:
-    words = re.compile(rf"\b({'|'.join(map(re.escape, names(system)))}|{PROSE})\b")
+def test_no_source_names_what_one_machine_has(source: Path, names: set[str]) -> None:
+    words = re.compile(rf"\b({'|'.join(map(re.escape, names))}|{PROSE})\b")
     lines = enumerate(source.read_text().splitlines(), 1)
     assert [(number, line.strip()) for number, line in lines if words.search(line)] == []
 

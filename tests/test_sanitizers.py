@@ -41,8 +41,15 @@ def run_life(fmi: int, sources: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sources / "life"], capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("model", ["MinimalObserver", "Reference"])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("fmi", "model"),
+    [
+        (2, "MinimalObserver"),
+        (3, "MinimalObserver"),
+        (3, "Reference"),
+        pytest.param(2, "Reference", marks=pytest.mark.long),
+    ],
+)
 def test_a_life_with_right_and_wrong_calls_is_clean(fmi: int, model: str, tmp_path: Path) -> None:
     run = run_life(fmi, unpack_sources(fmi, model, tmp_path))
     assert (run.returncode, run.stderr) == (0, "")

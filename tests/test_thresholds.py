@@ -154,7 +154,8 @@ def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:
     assert "1 of 2 sets have a wrong name" in table
 
 
-@pytest.mark.parametrize("gain", [pytest.param(0.015, marks=pytest.mark.long), -0.015])
+@pytest.mark.long
+@pytest.mark.parametrize("gain", [0.015, -0.015])
 def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain: float, tmp_path: Path) -> None:
     """Of three stops: two directions, three speeds."""
     names = ("01_dry_80_1.5", "03_dry_120_3.6", "05_dry_120_2.7_rev")

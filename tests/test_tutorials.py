@@ -131,6 +131,7 @@ def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names
     assert names["error"] == pytest.approx(own(found, names["case"], measure), rel=0.05)
 
 
+@pytest.mark.long
 def test_friction_of_both_seals_grows_with_pressure(run: Callable[..., Names]) -> None:
     names = run("pneumatic_cylinder")
     found = names["found"]
