@@ -28,6 +28,7 @@ from workbench.fmu import Vector
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
 _PARTS = 10
 _HALVED = 4  # times: after that a step is given up
+_TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
 
@@ -314,7 +315,9 @@ class Fit:
             better = fall > -worse
             if tried is not None and better:
                 best, halved = tried, 0
-            if left == 0 or abs(fall) < worse or halved == _HALVED:
+            if abs(fall) < worse or halved == _HALVED:
+                return replace(best, settled=True)
+            if left == 0:
                 break
             if better:
                 best = self.linearise(best, active)
@@ -324,36 +327,26 @@ class Fit:
         return best
 
     def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
-        joint = self.quadratics(replace(lin, inflation=spread))
-        if not common:
-            return self._moved(lin.point, joint, np.zeros(len(joint.shared)))
-        point = lin.point
+        joint, point = self.quadratics(replace(lin, inflation=spread)), lin.point
         at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
-        low, high = np.array([self._reach(point, key) for key in joint.shared]).reshape(-1, 2).T
-        # Of a point that was begun beyond its bounds, the nearest bound.
-        inside = np.clip(at, low, high)
-        return self._moved(point, joint, joint.solve(low - inside, high - inside) + inside - at)
+        reach = [self._reach(point, key) for key in joint.shared]
+        low, high = np.array(reach).reshape(-1, 2).T if common else (at, at)
+        count = len(self.unknowns.local)
+        furthest = np.full(joint.systems[0].P.shape[1], _TURN)
+        furthest[:count] = self.decides.furthest
+        step, locals_ = joint.solve(low - at, high - at, furthest)
+        sizes, levels = dict(point.sizes), dict(point.levels)
+        for key, value, least, greatest in zip(joint.shared, at + step, low, high, strict=True):
+            kind = levels if key in levels else sizes
+            kind[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
+        changes = np.array(locals_)
+        locked = [name for name, parameter in joint.shared if parameter == "amplitude"]
+        phases = {name: point.phases[name] + changes[:, count + j] for j, name in enumerate(locked)}
+        return Point(sizes, levels, point.deviations + changes[:, :count], phases)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""
         return self._simulations.together(job, items)
-
-    def _moved(self, point: Point, joint: Joint, step: Vector) -> Point:
-        sizes, levels = dict(point.sizes), dict(point.levels)
-        for key, change in zip(joint.shared, step, strict=True):
-            kind = levels if key in levels else sizes
-            kind[key] = float(np.clip(kind[key] + change, *self._reach(point, key)))
-        locals_ = [system.local(step) for system in joint.systems]
-        count = len(self.unknowns.local)
-        deviations = point.deviations + np.array([one[:count] for one in locals_])
-        furthest = self.decides.furthest
-        deviations = np.clip(deviations, -furthest, furthest)
-        phases = {}
-        locked = [name for name, parameter in joint.shared if parameter == "amplitude"]
-        for j, name in enumerate(locked):
-            change = np.array([one[count + j] for one in locals_])
-            phases[name] = point.phases[name] + np.clip(change, -0.5, 0.5)
-        return Point(sizes, levels, deviations, phases)
 
     def _reach(self, point: Point, key: Key) -> tuple[float, float]:
         """Least and greatest value after a step of a common unknown.

@@ -42,6 +42,7 @@ class Linearised:
     inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
     away : chi-squared of levels and deviations against what tolerances say of them.
     excess : see `Thresholds`.
+    settled : whether a fit that ended here found no step that is worth one.
     """
 
     point: Point
@@ -51,6 +52,7 @@ class Linearised:
     inflation: Vector
     away: float
     excess: float = Thresholds.excess
+    settled: bool = False
 
     def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
         """The same with more columns, (b*m + 1, p) of each stop."""

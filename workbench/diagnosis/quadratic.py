@@ -96,7 +96,7 @@ def minimum(total: Quadratic) -> Vector:
 
 
 def minimum_within(total: Quadratic, low: Vector, high: Vector) -> Vector:
-    """Where chi-squared is least within bounds of the step, (p,) each, which hold zero.
+    """Where chi-squared is least within bounds of the step, (p,) each.
 
     What would leave them is held there, and the others do their best beside that.
     """
@@ -118,6 +118,7 @@ class RecordingSystem:
     r : (n,); J : (n, p); P : (n, q).
     deviations : (d,) of the present point, of the first unknowns in l; phases are free.
     channels : c; r holds the errors of blocks, each by channel, and last the one of the rest.
+    held : (q,) entries of l that are not free any more; NaN of those that are. None: all are.
     """
 
     r: Vector
@@ -125,37 +126,66 @@ class RecordingSystem:
     P: Matrix
     deviations: Vector
     channels: int
+    held: Vector | None = None
 
     def errors(self, z: Vector) -> Matrix:
         """Whitened errors of the blocks, (b, c), for a step z of the common unknowns."""
         errors: Matrix = self.r + self.J @ z + self.P @ self.local(z)
         return errors[:-1].reshape(-1, self.channels)
 
+    @property
+    def _free(self) -> NDArray[np.bool_]:
+        """(q,) Which entries of l are free."""
+        return np.ones(self.P.shape[1], np.bool_) if self.held is None else np.isnan(self.held)
+
+    def _about(self) -> tuple[Vector, Vector]:
+        """Errors (n,) and deviations (d,) where what is held has its value."""
+        if self.held is None:
+            return self.r, self.deviations
+        moved = np.nan_to_num(self.held)
+        return self.r + self.P @ moved, self.deviations + moved[: self.deviations.size]
+
     def _local(self) -> tuple[Matrix, Matrix, Vector]:
-        """Normal matrix of l, its coupling to z, its gradient."""
-        count, q = self.deviations.size, self.P.shape[1]
-        prior = np.zeros(q)
-        prior[:count] = 1.0
-        normal = self.P.T @ self.P + np.diag(prior + 1e-9)
-        gradient = self.P.T @ self.r
-        gradient[:count] += self.deviations
-        return normal, self.P.T @ self.J, gradient
+        """Normal matrix of what is free of l, its coupling to z, its gradient."""
+        free, (r, deviations) = self._free, self._about()
+        P = self.P[:, free]
+        prior, away = np.zeros((2, free.size))
+        prior[: deviations.size], away[: deviations.size] = 1.0, deviations
+        return P.T @ P + np.diag(prior[free] + 1e-9), P.T @ self.J, P.T @ r + away[free]
 
     def eliminated(self) -> Quadratic:
         """Chi-squared over z alone."""
         normal, coupling, gradient = self._local()
         both = np.column_stack([coupling, gradient])
         solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
+        r, deviations = self._about()
         N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
-        g: Vector = self.J.T @ self.r - coupling.T @ solved[:, -1]
-        c = self.r @ self.r + self.deviations @ self.deviations - gradient @ solved[:, -1]
-        return Quadratic(N, g, float(c), self.r.size)
+        g: Vector = self.J.T @ r - coupling.T @ solved[:, -1]
+        c = r @ r + deviations @ deviations - gradient @ solved[:, -1]
+        return Quadratic(N, g, float(c), r.size)
 
     def local(self, z: Vector) -> Vector:
         """Best l for a step z of the common unknowns."""
         normal, coupling, gradient = self._local()
-        step: Vector = np.asarray(np.linalg.solve(normal, -coupling @ z - gradient), np.float64)
+        step = np.zeros(self.P.shape[1]) if self.held is None else np.nan_to_num(self.held)
+        step[self._free] = np.linalg.solve(normal, -coupling @ z - gradient)
         return step
+
+    def holding(self, z: Vector, furthest: Vector) -> "RecordingSystem":
+        """The same where entries of l that a step z takes beyond bounds are held there.
+
+        Parameters
+        ----------
+        furthest : (q,) from zero, of a deviation or of a step of what is no deviation.
+        """
+        begun = np.zeros(self.P.shape[1])
+        begun[: self.deviations.size] = self.deviations
+        step, free = self.local(z), self._free
+        beyond = free & (np.abs(begun + step) > furthest)
+        if not beyond.any():
+            return self
+        ends = np.clip(begun + step, -furthest, furthest) - begun
+        return replace(self, held=np.where(free & ~beyond, np.nan, np.where(free, ends, step)))
 
 
 def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
@@ -227,6 +257,18 @@ class Joint:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
 
-    def solve(self, low: Vector, high: Vector) -> Vector:
-        """Best step of the common unknowns within bounds, (p,) each."""
-        return minimum_within(self.total(), low, high)
+    def solve(self, low: Vector, high: Vector, furthest: Vector) -> tuple[Vector, list[Vector]]:
+        """Best step of the common unknowns, and of the local ones of each stop, within bounds.
+
+        Parameters
+        ----------
+        low, high : (p,) of the step.
+        furthest : (q,) see `RecordingSystem.holding`.
+        """
+        systems = self.systems
+        while True:
+            step = minimum_within(replace(self, systems=systems).total(), low, high)
+            held = tuple(one.holding(step, furthest) for one in systems)
+            if held == systems:
+                return step, [one.local(step) for one in systems]
+            systems = held

@@ -129,12 +129,13 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
         return []
     left = misfits(begun)
     near = left < fit.decides.behind * left.min()
+    worth = [i for i in np.flatnonzero(near) if not begun[i].linearised.settled]
 
     def finished(one: Fitted) -> Fitted:
         return fitted(fit, one.linearised, one.active)
 
-    ends = iter(fit.together(finished, [begun[i] for i in np.flatnonzero(near)]))
-    every = [next(ends) if worth else one for one, worth in zip(begun, near, strict=True)]
+    ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
+    every = [ends.get(i, one) for i, one in enumerate(begun)]
     return [every[i] for i in np.argsort(misfits(every)) if _gains(fit, best, every[i])]
 
 
