@@ -134,7 +134,7 @@ def sheet(figure: CaseFigure) -> Figure:
                     axes.fill_between(figure.time, *band, color=colour, alpha=0.2, linewidth=0)
             if figure.window:
                 axes.axvspan(*figure.window, color=LIGHT["2"], alpha=0.05, linewidth=0)
-            axes.set_title(panel.title)
+            axes.set_title(panel.title, y=1.0)  # or all labels are measured to place it
             axes.set_ylim(panel.low, panel.high)
         rows[-1].set_xlim(figure.time[0], figure.time[-1])
         rows[-1].set_xlabel("time [s]")
