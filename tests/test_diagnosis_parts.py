@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -20,6 +21,7 @@ from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import (
+    Joint,
     Quadratic,
     RecordingSystem,
     add,
@@ -317,6 +319,34 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     np.testing.assert_allclose(covariance(total.N), full, rtol=1e-6)
     local = systems[2].local(step)
     np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
+
+
+def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> None:
+    rng = np.random.default_rng(4)
+    systems = tuple(
+        RecordingSystem(
+            *(rng.normal(size=40), rng.normal(size=(40, 2)), rng.normal(size=(40, 3)), d),
+            channels=3,
+        )
+        for d in rng.uniform(-1.0, 1.0, size=(4, 3))
+    )
+    nothing = Quadratic(np.zeros((2, 2)), np.zeros(2), 0.0, 0)
+    joint = Joint((("", "a"), ("", "b")), (), (), systems, nothing)
+    far = 0.9 * max(np.abs(one.deviations).max() for one in systems)  # some are beyond it as begun
+    step, local = joint.solve(np.full(2, -9.0), np.full(2, 9.0), np.full(3, far))
+    # The same by an independent solver, all local unknowns side by side.
+    matrix, right = np.zeros((4 * 43, 2 + 4 * 3)), np.zeros(4 * 43)
+    for k, one in enumerate(systems):
+        at, own = slice(43 * k, 43 * k + 40), slice(2 + 3 * k, 5 + 3 * k)
+        matrix[at, :2], matrix[at, own], right[at] = one.J, one.P, one.r
+        matrix[43 * k + 40 : 43 * k + 43, own] = np.eye(3)
+        right[43 * k + 40 : 43 * k + 43] = one.deviations
+    begun = np.concatenate([np.zeros(2), *(one.deviations for one in systems)])
+    reach = np.append([9.0, 9.0], np.full(12, far))
+    best = lsq_linear(matrix, -right, (-reach - begun, reach - begun), tol=1e-13).x
+    assert np.sum(np.abs(best + begun) > reach - 1e-9) > 0
+    # By normal equations, whose condition is some ten: rounding; the solver's own tolerance.
+    np.testing.assert_allclose([*step, *np.concatenate(local)], best, rtol=1e-5, atol=1e-7)
 
 
 def linearised(errors: Matrix) -> Linearised:

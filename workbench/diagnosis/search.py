@@ -129,7 +129,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
         return []
     left = misfits(begun)
     near = left < fit.decides.behind * left.min()
-    worth = [i for i in np.flatnonzero(near) if not begun[i].linearised.settled]
+    worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
 
     def finished(one: Fitted) -> Fitted:
         return fitted(fit, one.linearised, one.active)
