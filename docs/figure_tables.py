@@ -39,17 +39,7 @@ NEXT = (
     "wheel_radius=0.0008",
 )
 # Causes that the catalogue lacks, left out of it or never in it, to ask for a law.
-LEFT_OUT = (
-    "BrakeFade",
-    "SpeedDependentPadFriction",
-    "WheelsetLosses",
-    "friction_step",
-    "force_drift",
-    "CylinderLag",
-    "WheelRadius",
-    "CreepStiffness",
-    "PressureDependentPadFriction",
-)
+LEFT_OUT = ("BrakeFade", "WheelsetLosses", "friction_step", "force_drift", "CreepStiffness")
 # What an independent simulator planted in six dry stops each, by the name of the set.
 LABELLED = {
     "clean": "nothing",
