@@ -26,8 +26,8 @@ help:
 	@echo "make fmus       build the FMUs from modelica/ (Modelica compiler, C cross-compiler);"
 	@echo "                COMPILER=omc: with OpenModelica where it is installed, into build/omc"
 	@echo "make bench      time calls into the FMUs against plain C, results in results/bench"
-	@echo "make figures    write the tables of docs/accuracy.md from the commands that make them;"
-	@echo "                minutes. make figures-long: those of tuning, next and power, too, hours; with"
+	@echo "make figures    write the tables of docs/ from the commands that make them;"
+	@echo "                minutes. make figures-long: those of tuning, next, power and laws, too, hours; with"
 	@echo "                RECORDINGS=FOLDER also those of recordings outside of the repository"
 	@echo "make docs       the documentation as a site for any static host, in build/site; no network"
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
@@ -66,7 +66,7 @@ cases: $(VENV)/run.stamp
 fmus: $(VENV)/dev.stamp
 	$(RUN) -m workbench fmu build --all --compiler $(COMPILER)
 
-# The tables of docs/accuracy.md, from the commands that make them; hours with those of power.
+# The tables of docs/, from the commands that make them; hours with those of power.
 # RECORDINGS: folder of recordings that are not part of the repository, for the tables of these.
 FIGURES := docs/figures.py $(if $(RECORDINGS),--recordings $(RECORDINGS))
 

@@ -1,10 +1,10 @@
 """Machines whose recordings others published: what is diagnosed of them, and their table."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-from figure_tables import Table, verdict
+from figure import Summary, Table
+from figure_tables import verdict
 
 from workbench.units import si_factor
 
@@ -52,7 +52,7 @@ class Machine:
     def _folder(self) -> str:
         return f"{{out}}/cases/{self.system}"
 
-    def errors(self, summary: Mapping[str, Any]) -> tuple[float, float]:
+    def errors(self, summary: Summary) -> tuple[float, float]:
         """Of the nominal and of the extended model [unit]."""
         some = [
             one
@@ -133,7 +133,7 @@ MACHINES = {
 }
 
 
-def machines(*summaries: Mapping[str, Any]) -> Table:
+def machines(*summaries: Summary) -> Table:
     """What is found in each, and what that is worth on recordings that were not fitted."""
     error = "machine, error on recordings that were not fitted"
     rows: Table = [[error, "published", "nominal", "extended", "named"]]

@@ -1,18 +1,15 @@
-"""Tables of `accuracy.md`, each from the summaries that the commands of `figures.py` write."""
+"""Tables of the wheelset, each from the summaries that the commands of `figures.py` write."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
+from figure import Summary, Table
 
 from workbench.lab import said
 from workbench.report.views import label
 from workbench.systems import load_system
 from workbench.wheelset.accuracy import COVERED, ROWS, Worst
 from workbench.wheelset.accuracy_report import cell
-
-Table = list[Sequence[str]]  # the first row is the header
-Summary = Mapping[str, Any]
 
 TUNED = ("disturbance_observer", "parameter_estimator")
 SYSTEM = load_system("wheelset")
@@ -41,6 +38,8 @@ NEXT = (
     "fx_offset=150",
     "wheel_radius=0.0008",
 )
+# Causes that the catalogue lacks, left out of it or never in it, to ask for a law.
+LEFT_OUT = ("BrakeFade", "WheelsetLosses", "friction_step", "force_drift", "CreepStiffness")
 # What an independent simulator planted in six dry stops each, by the name of the set.
 LABELLED = {
     "clean": "nothing",
@@ -124,11 +123,16 @@ def causes(summary: Summary) -> Table:
     return rows
 
 
-def singles(*summaries: Summary) -> Table:
-    """What is said of each labelled set, and what it is worth on recordings that were held out."""
+def labelled(sets: Mapping[str, str], *summaries: Summary) -> Table:
+    """What is said of each set, and what it is worth on recordings that were held out.
+
+    Parameters
+    ----------
+    sets : what was planted, by name.
+    """
     error = "error on held-out stops, times the noise"
     rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
-    for (name, planted), summary in zip(LABELLED.items(), summaries, strict=True):
+    for (name, planted), summary in zip(sets.items(), summaries, strict=True):
         found, gain = summary["causes"], summary["gain"]
         change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
         estimate = "; ".join(map(sizes, found))
@@ -184,6 +188,21 @@ def next_stops(*summaries: Summary) -> Table:
         best = [tried[0]["experiment"], f"{tried[0]['separation']:.1f}"] if parting else ["", ""]
         number = f"{parting or 'none'} of {len(tried)}{sensors}"
         rows.append([f"`{planted}`", verdict(two), number, *best, verdict(three)])
+    return rows
+
+
+def laws(*summaries: Summary) -> Table:
+    """What is said of a cause that the catalogue lacks, and which law is proposed for it."""
+    rows: Table = [["planted", "without a law", "proposed", "where the cause acts"]]
+    rows[0] = [*rows[0], "error on held-out stops, times the noise"]
+    for name, summary in zip(LEFT_OUT, summaries, strict=True):
+        (one,) = summary["sets"]
+        known = "" if one["left_out"] else ", in no catalogue"
+        right = {True: "yes", False: "no", None: ""}[one["slot_right"]] if one["laws"] else ""
+        said = "; ".join(one["named"]) or one["verdict"]
+        error = change("{:.3g}", one["before"], one["after"]) if one["laws"] else ""
+        proposed = "; ".join(one["laws"]) or "nothing"
+        rows.append([f"`{name}`{known}", said, proposed, right, error])
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Tables of `accuracy.md`, written from what the commands found: `make figures`.
+"""Tables of the pages, written from what the commands found: `make figures`.
 
     python docs/figures.py [--long] [--kept] [--recordings FOLDER] [NAME ...]
 
@@ -13,41 +13,19 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import figure_tables as tables
+from figure import Figure, Summary
 from figure_machines import MACHINES, machines
-from figure_tables import LABELLED, NEXT, TUNED, Table
+from figure_tables import LABELLED, LEFT_OUT, NEXT, TUNED
+from figure_train import TRAIN
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "accuracy.md"
+PAGES = ROOT / "docs"
 RESULTS = Path("results", "figures")
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A table and the commands that make it.
-
-    Attributes
-    ----------
-    commands : of the workbench; they read and write below `{out}`, and may ask for `{recordings}`.
-    summaries : files that the commands write, below the folder of results.
-    table : of the summaries, in their order.
-    long : whether they take hours.
-    """
-
-    commands: tuple[str, ...]
-    summaries: tuple[Path, ...]
-    table: Callable[..., Table]
-    long: bool = False
-
-    @property
-    def recorded(self) -> bool:
-        """Whether recordings are needed that are not part of the repository."""
-        return any("{recordings}" in one for one in self.commands)
 
 
 _RIG = ("rig --seed 1 --out {out}/rig", "accuracy {out}/rig --out {out}/accuracy")
@@ -99,7 +77,7 @@ FIGURES = {
     "singles": Figure(
         tuple(f"diagnose {{recordings}}/labelled/{n} --out {{out}}/singles/{n}" for n in LABELLED),
         tuple(Path("singles", name, "summary.json") for name in LABELLED),
-        tables.singles,
+        partial(tables.labelled, LABELLED),
     ),
     "folds": Figure(
         tuple(f"tune {name} --folds 5 --out {{out}}/tune/{name}" for name in TUNED),
@@ -165,6 +143,17 @@ FIGURES = {
         tables.next_stops,
         long=True,
     ),
+    "laws": Figure(
+        tuple(
+            f"power --leave-out-effect --effects {name} --sizes 8 --repeats 1 --clean 0 "
+            f"--out {{out}}/left_out/{name}"
+            for name in LEFT_OUT
+        ),
+        tuple(Path("left_out", name, "left_out/left_out.json") for name in LEFT_OUT),
+        tables.laws,
+        long=True,
+        page="propose.md",
+    ),
     "machines": Figure(
         (
             *dict.fromkeys(one.prepare for one in MACHINES.values()),
@@ -188,10 +177,11 @@ FIGURES = {
         tables.shares,
         long=True,
     ),
+    **TRAIN,
 }
 
 
-def written(name: str, *summaries: Mapping[str, Any]) -> str:
+def written(name: str, *summaries: Summary) -> str:
     """A table with the command that made it, as it stands on the page."""
     header, *rows = FIGURES[name].table(*summaries)
     lines = [header, ["---"] * len(header), *rows]
@@ -218,11 +208,11 @@ def block(name: str) -> re.Pattern[str]:
     )
 
 
-def placed(page: str, name: str, *summaries: Mapping[str, Any]) -> str:
+def placed(page: str, name: str, *summaries: Summary) -> str:
     """The page with a table written anew."""
     found, count = block(name).subn(lambda _: written(name, *summaries), page)
     if count != 1:
-        raise SystemExit(f"{PAGE}: found {count} places for {name}, expected one")
+        raise SystemExit(f"{FIGURES[name].page}: found {count} places for {name}, expected one")
     return found
 
 
@@ -230,7 +220,9 @@ def main() -> None:
     """Run the commands, and write their tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
-    parser.add_argument("--long", action="store_true", help="also what takes hours")
+    parser.add_argument(
+        "--long", action="store_true", help="also what takes many minutes, or hours"
+    )
     parser.add_argument("--kept", action="store_true", help="from results that are there")
     parser.add_argument(
         "--recordings",
@@ -255,8 +247,9 @@ def main() -> None:
     for name in names:
         files = [ROOT / RESULTS / one for one in FIGURES[name].summaries]
         summaries = [json.loads(file.read_text()) for file in files]
-        PAGE.write_text(placed(PAGE.read_text(), name, *summaries))
-        print(f"{PAGE.relative_to(ROOT)}: {name}")
+        page = PAGES / FIGURES[name].page
+        page.write_text(placed(page.read_text(), name, *summaries))
+        print(f"{page.relative_to(ROOT)}: {name}")
 
 
 if __name__ == "__main__":

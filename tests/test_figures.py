@@ -1,8 +1,9 @@
-"""Tables of the page of figures are written from what the commands found."""
+"""Tables of the pages are written from what the commands found."""
 
 from pathlib import Path
 
 import figure_tables as tables
+import figure_train as train
 import figures
 import pytest
 from figure_machines import MACHINES, machines
@@ -26,14 +27,19 @@ FADE = {"fade": {"value": 4.28e-4, "low": 4.07e-4, "high": 4.5e-4, "unit": "1/K"
 SHARE = {"value": 95.0, "low": 75.1, "high": 99.87, "unit": "%", "better": "higher"}
 
 
+def page(name: str) -> Path:
+    """Of a table."""
+    return figures.PAGES / figures.FIGURES[name].page
+
+
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_each_table_has_one_place_on_the_page(name: str) -> None:
-    assert len(figures.block(name).findall(figures.PAGE.read_text())) == 1
+    assert len(figures.block(name).findall(page(name).read_text())) == 1
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_what_is_said_to_be_written_is_of_its_command(name: str) -> None:
-    (text,) = figures.block(name).findall(figures.PAGE.read_text())
+    (text,) = figures.block(name).findall(page(name).read_text())
     if "Written by" in text:
         assert text.endswith(f"\n\n{figures.origin(figures.FIGURES[name].commands)}")
 
@@ -60,7 +66,7 @@ def test_sets_that_are_labelled_have_a_row_each() -> None:
     named = {"verdict": "found", "causes": [cause], "gain": {"before": 55.2, "after": 1.12}}
     nothing = {"verdict": "nothing", "causes": [], "gain": None}
     sets = [named if name == "fade" else nothing for name in tables.LABELLED]
-    _, clean, _, fade, *_ = tables.singles(*sets)
+    _, clean, _, fade, *_ = tables.labelled(tables.LABELLED, *sets)
     assert clean == ["`clean`", "nothing", "nothing", "", ""]
     estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
     planted = "fade 7.0 % per 100 K"
@@ -138,17 +144,79 @@ def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it(
 def test_without_their_recordings_tables_stay(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = figures.PAGE.read_text()
+    before = page("singles").read_text()
     monkeypatch.setattr("sys.argv", ["figures.py", "singles"])
     figures.main()
     assert "singles: stays as it is, for it needs --recordings" in capsys.readouterr().out
-    assert figures.PAGE.read_text() == before
+    assert page("singles").read_text() == before
 
 
 def test_a_table_is_written_in_its_place_and_nothing_else_is_touched() -> None:
-    page = "before\n\n<!-- figures: accuracy -->\n\nold\n\n<!-- figures end -->\n\nafter\n"
-    text = figures.placed(page, "accuracy", WORST)
-    assert text == page.replace("old", figures.written("accuracy", WORST))
-    assert "| force, dry discs | 2 % | 0.18 % |\n" in text
+    text = "before\n\n<!-- figures: accuracy -->\n\nold\n\n<!-- figures end -->\n\nafter\n"
+    found = figures.placed(text, "accuracy", WORST)
+    assert found == text.replace("old", figures.written("accuracy", WORST))
+    assert "| force, dry discs | 2 % | 0.18 % |\n" in found
     with pytest.raises(SystemExit, match="found 0 places for coverage, expected one"):
-        figures.placed(page, "coverage", COVERED)
+        figures.placed(text, "coverage", COVERED)
+
+
+def test_a_safety_level_stands_beside_plain_stops_as_far_as_these_reach() -> None:
+    level = {"decade": 1, "ratio": 0.97051, "low": 0.9672, "high": 0.9743}
+    rare = {**level, "decade": 7, "variation": 0.0232, "plain_stops": 1.96e10}
+    first = {**level, "variation": 0.1284, "plain_stops": 1.1e4}
+    header, *_, last = train.safety({"safety": [first, rare]})
+    assert header[0] == "one stop in"
+    assert last == ["1e7", "0.971 (0.967 to 0.974)", "2.3 %", "2.0e10 stops"]
+    drawn = {"samples": 100_000, "levels": [level]}
+    header, seen, unseen = train.plain({"safety": [first, rare], "plain": drawn})
+    assert header[2] == "100 000 plain stops (95 %)"
+    assert seen == ["1e1", *2 * ["0.9705 (0.9672 to 0.9743)"]]
+    assert unseen[2] == "too few"
+
+
+def test_stops_beyond_the_claim_count_apart_with_their_reasons() -> None:
+    widths = [{"width": width, "outside": ""} for width in (1.0, 1.1, 1.5)]
+    slide = {"width": 9.0, "outside": "an axle slides"}
+    one = {"held": {"of": 3, "stops": 2}, "stops": [*widths, slide, slide]}
+    _, row, *_ = train.predicted(*len(train.PREDICTED) * (one,))
+    assert row[1:] == ["2 of 3", "1.10 (1.00 to 1.50)", "2: an axle slides"]
+
+
+def test_what_monitoring_tells_stands_beside_what_was_planted() -> None:
+    told = {"recordings": 40, "refused": {}, "sentences": ["axle 7: -12 %"]}
+    sound = {"recordings": 6, "refused": {"07": "", "08": ""}, "sentences": []}
+    cause = {"effect": "BrakeFade", "confusable_with": [], "parameters": FADE}
+    _, first, second, third = train.monitored(told, {"causes": [cause]}, sound)
+    assert first[1:] == [train.LOSS, "40 of 40", "axle 7: -12 %"]
+    assert second[3] == "BrakeFade: fade 4.28 (4.07 to 4.5) % per 100 K"
+    assert third[1:] == ["nothing", "6 of 8", "no alarms"]
+
+
+def test_faults_of_all_places_count_together() -> None:
+    right, missed = {"4": {"hits": 1, "of": 1}}, {"4": {"hits": 0, "of": 1}}
+    share = {"hits": 1, "of": 2, "low": 0.0126, "high": 0.987}
+    summary = {
+        "effects": {
+            "WeakPads[1]": {"size": 0.0375, "unit": "1", "right_first": right},
+            "WeakPads[2]": {"size": 0.0375, "unit": "1", "right_first": missed},
+        },
+        "confusion": {"WeakPads[1]": {"WeakPads[1]": 1}, "WeakPads[2]": {"unexplained": 1}},
+        **dict.fromkeys(("right_first", "false_alarms", "coverage"), share),
+        "wrong": [],
+    }
+    _, pads, whole, *_ = train.named(summary)
+    assert pads == ["WeakPads, 15 %", "1 of 2", "1 unexplained"]
+    assert whole == ["all faults", "1 of 2 (1 to 99 %)", "0 a wrong name"]
+
+
+def test_a_law_is_right_where_the_cause_acts() -> None:
+    none = {"left_out": ["A"], "verdict": "unexplained", "named": [], "laws": []}
+    none |= {"slot_right": False, "before": None, "after": None}
+    found = none | {"laws": ["a law"], "slot_right": True, "before": 52.91, "after": 1.32}
+    unknown = found | {"left_out": [], "named": ["B"], "slot_right": None}
+    rest = [none] * (len(tables.LEFT_OUT) - 2)
+    _, first, second, third, *_ = tables.laws(*({"sets": [one]} for one in (found, unknown, *rest)))
+    assert first == ["`BrakeFade`", "unexplained", "a law", "yes", "52.9 → 1.32"]
+    assert second[0].endswith(", in no catalogue")
+    assert (second[1], second[3]) == ("B", "")
+    assert third[2:] == ["nothing", "", ""]

@@ -1,0 +1,201 @@
+"""Tables of the train's pages: its distance, its monitoring, and how often its faults are named."""
+
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from figure import Figure, Summary, Table
+from figure_tables import labelled, sizes, verdict
+
+from workbench.lab import said
+
+# What an independent simulator planted in four stops each, by the name of the set.
+FAULTS = {
+    "pads_axle": "pads of axle 3, -15 %",
+    "isolated_unit": "one of three units of axle 6 isolated, -33 %",
+    "dragging": "brake of axle 5 drags with 1500 N.m",
+    "cylinder_lag_bogie": "cylinders of bogie 3 lag by 0.4 s",
+    "radius_axle": "radius of axle 2, -2.5 mm",
+    "glazing": "15 %",
+}
+# Sets whose stops are predicted, each by the others.
+PREDICTED = {
+    "healthy": "sound train, dry and wet, 80 to 160 km/h",
+    "history": "forty stops of months, in which one axle loses 12 % of its friction",
+    "pads_axle": "four stops of a train whose axle 3 has lost 15 %",
+}
+LOSS = "pads of axle 7 lose 12 %, from stop 15 to 30"
+
+
+def _prepared(name: str) -> str:
+    folder = f"labelled/{name}" if name in FAULTS else name
+    return f"prepare train --from {{recordings}}/train/{folder} --out {{out}}/stops/{name}"
+
+
+def _distance(name: str, told: str, out: str) -> str:
+    return f"distance --system train {{out}}/stops/{name} {told} --out {{out}}/distance/{out}"
+
+
+_SAFETY = _distance("healthy", "--samples 1000", "healthy")
+
+
+def ends(one: Summary, form: str) -> str:
+    """A value with its interval."""
+    value, low, high = (format(one[key], form) for key in ("ratio", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def safety(summary: Summary) -> Table:
+    """The safety level by decade."""
+    rows: Table = [["one stop in", "ratio (95 %)", "variation of the probability"]]
+    rows[0] = [*rows[0], "plain sampling for the same"]
+    for one in summary["safety"]:
+        digits, _, decade = f"{one['plain_stops']:.1e}".partition("e")
+        variation = f"{100.0 * one['variation']:.2g} %"
+        stops = f"{digits}e{int(decade)} stops"
+        rows.append([f"1e{one['decade']}", ends(one, ".3f"), variation, stops])
+    return rows
+
+
+def plain(summary: Summary) -> Table:
+    """The safety level beside that of stops that were drawn by themselves."""
+    drawn = f"{summary['plain']['samples']:,} plain stops (95 %)".replace(",", " ")
+    rows: Table = [["one stop in", "subset simulation (95 %)", drawn]]
+    counted = {one["decade"]: ends(one, ".4f") for one in summary["plain"]["levels"]}
+    for one in summary["safety"]:
+        decade = one["decade"]
+        rows.append([f"1e{decade}", ends(one, ".4f"), counted.get(decade, "too few")])
+    return rows
+
+
+def predicted(*summaries: Summary) -> Table:
+    """How many stops are in the bands of the others, and how wide these are."""
+    width = "width, of that of a known machine, median (least to most)"
+    rows: Table = [["stops, each by the others", "in the 95 % band", width, "beyond the claim"]]
+    for text, summary in zip(PREDICTED.values(), summaries, strict=True):
+        held, stops = summary["held"], summary["stops"]
+        widths = [one["width"] for one in stops if not one["outside"]]
+        low, middle, high = np.quantile(widths, (0.0, 0.5, 1.0))
+        away = [one["outside"] for one in stops if one["outside"]]
+        reasons = f": {'; '.join(sorted(set(away)))}" if away else ""
+        rows.append(
+            [
+                text,
+                f"{held['stops']} of {held['of']}",
+                f"{middle:.2f} ({low:.2f} to {high:.2f})",
+                f"{len(away)}{reasons}",
+            ]
+        )
+    return rows
+
+
+def monitored(history: Summary, cause: Summary, healthy: Summary) -> Table:
+    """What is told of two machines over their recordings."""
+    rows: Table = [["recordings", "planted", "used", "what is told"]]
+    for name, planted, one in (("history", LOSS, history), ("healthy", "nothing", healthy)):
+        used, refused = one["recordings"], len(one["refused"])
+        told = "; ".join(one["sentences"]) or "no alarms"
+        rows.append([f"`{name}`", planted, f"{used} of {used + refused}", told])
+    named = f"{verdict(cause)}: {'; '.join(map(sizes, cause['causes']))}"
+    rows.insert(2, ["its cause, by `--diagnose`", LOSS, "the last eight", named])
+    return rows
+
+
+def _share(one: Summary) -> str:
+    interval = f"{100.0 * one['low']:.0f} to {100.0 * one['high']:.0f} %"
+    return f"{one['hits']} of {one['of']} ({interval})"
+
+
+def named(summary: Summary) -> Table:
+    """How often faults of the virtual train are named, all places of one kind together."""
+    rows: Table = [["planted", "right, with its place or group (95 %)", "said of the others"]]
+    effects = sorted(summary["effects"].items())
+    for kind, some in groupby(effects, lambda item: item[0].partition("[")[0]):
+        places = dict(some)
+        hits, of, others = 0, 0, dict.fromkeys(("nothing", "unexplained", "failed"), 0)
+        for name, one in places.items():
+            hits += sum(share["hits"] for share in one["right_first"].values())
+            of += sum(share["of"] for share in one["right_first"].values())
+            for word in others:
+                others[word] += summary["confusion"][name].get(word, 0)
+        ((multiple, _),) = one["right_first"].items()
+        (size,), unit = said([one["size"] * float(multiple)], one["unit"])
+        text = ", ".join(f"{count} {word}" for word, count in others.items() if count)
+        rows.append([f"{kind}, {size:.3g} {unit}", f"{hits} of {of}", text])
+    sound = summary["false_alarms"]
+    rows += [
+        ["all faults", _share(summary["right_first"]), f"{len(summary['wrong'])} a wrong name"],
+        ["sound trains: false alarms", _share(sound), ""],
+        ["95 % intervals that hold what was planted", _share(summary["coverage"]), ""],
+    ]
+    return rows
+
+
+TRAIN = {
+    "safety": Figure(
+        (_prepared("healthy"), _SAFETY),
+        (Path("distance/healthy/distance.json"),),
+        safety,
+        page="distance.md",
+    ),
+    "plain": Figure(
+        (
+            _prepared("healthy"),
+            _distance("healthy", "--samples 100 --safety 5 --plain 100000", "plain"),
+        ),
+        (Path("distance/plain/distance.json"),),
+        plain,
+        long=True,
+        page="distance.md",
+    ),
+    "predicted": Figure(
+        (
+            *map(_prepared, PREDICTED),
+            _SAFETY,
+            *(
+                _distance(name, "--samples 800 --safety 0", name)
+                for name in PREDICTED
+                if name != "healthy"
+            ),
+        ),
+        tuple(Path("distance", name, "distance.json") for name in PREDICTED),
+        predicted,
+        page="distance.md",
+    ),
+    "monitor": Figure(
+        (
+            "monitor {recordings}/train/history --system train --diagnose "
+            "--out {out}/monitor/history",
+            "monitor {recordings}/train/healthy --system train --out {out}/monitor/healthy",
+        ),
+        (
+            Path("monitor/history/summary.json"),
+            Path("monitor/history/cause/summary.json"),
+            Path("monitor/healthy/summary.json"),
+        ),
+        monitored,
+        long=True,
+        page="monitor.md",
+    ),
+    "faults": Figure(
+        (
+            *map(_prepared, FAULTS),
+            *(f"diagnose --system train {{out}}/stops/{n} --out {{out}}/train/{n}" for n in FAULTS),
+        ),
+        tuple(Path("train", name, "summary.json") for name in FAULTS),
+        partial(labelled, FAULTS),
+        long=True,
+        page="train.md",
+    ),
+    "named": Figure(
+        (
+            "power --system train --clean 30 --sizes 4 --repeats 1 --pairs 0 --resume "
+            "--out {out}/train/power",
+        ),
+        (Path("train/power/power.json"),),
+        named,
+        long=True,
+        page="train.md",
+    ),
+}
