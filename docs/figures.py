@@ -216,8 +216,8 @@ def placed(page: str, name: str, *summaries: Summary) -> str:
     return found
 
 
-def main() -> None:
-    """Run the commands, and write their tables."""
+def main() -> int:
+    """Run the commands, and write their tables; returns 1 if one failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
     parser.add_argument(
@@ -239,18 +239,31 @@ def main() -> None:
         for name in [one for one in names if FIGURES[one].recorded]:
             print(f"{name}: stays as it is, for it needs --recordings")
             names.remove(name)
+    failed: dict[str, str] = {}
     if not options.kept:
-        for command in dict.fromkeys(one for name in names for one in FIGURES[name].commands):
-            places = {"out": RESULTS.as_posix(), "recordings": options.recordings}
-            words = shlex.split(command.format_map(places))
-            subprocess.run([sys.executable, "-m", "workbench", *words], cwd=ROOT, check=True)
+        failed = _failing([one for name in names for one in FIGURES[name].commands], options)
     for name in names:
+        if missing := [one for one in FIGURES[name].commands if one in failed]:
+            print(f"{name}: stays as it is, for {failed[missing[0]]}")
+            continue
         files = [ROOT / RESULTS / one for one in FIGURES[name].summaries]
         summaries = [json.loads(file.read_text()) for file in files]
         page = PAGES / FIGURES[name].page
         page.write_text(placed(page.read_text(), name, *summaries))
         print(f"{page.relative_to(ROOT)}: {name}")
+    return 1 if failed else 0
+
+
+def _failing(commands: Sequence[str], options: argparse.Namespace) -> dict[str, str]:
+    """Run commands, each once; those that fail, and how. One that fails costs its tables only."""
+    failed = {}
+    for command in dict.fromkeys(commands):
+        words = command.format_map({"out": RESULTS.as_posix(), "recordings": options.recordings})
+        told = [sys.executable, "-m", "workbench", *shlex.split(words)]
+        if code := subprocess.run(told, cwd=ROOT, check=False).returncode:
+            failed[command] = f"`workbench {words}` ends with {code}"
+    return failed
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,5 +1,6 @@
 """Tables of the pages are written from what the commands found."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import figure_tables as tables
@@ -149,6 +150,23 @@ def test_without_their_recordings_tables_stay(
     figures.main()
     assert "singles: stays as it is, for it needs --recordings" in capsys.readouterr().out
     assert page("singles").read_text() == before
+
+
+def test_a_command_that_fails_costs_its_own_table(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    before = page("machines").read_text()
+    command = ["figures.py", "machines", "--recordings", str(tmp_path / "none")]
+    monkeypatch.setattr("sys.argv", command)
+    monkeypatch.setitem(
+        figures.FIGURES,
+        "machines",
+        replace(figures.FIGURES["machines"], commands=(MACHINES["cascaded_tanks"].prepare,)),
+    )
+    assert figures.main() == 1
+    out = capfd.readouterr().out
+    assert "machines: stays as it is, for `workbench prepare cascaded_tanks" in out
+    assert page("machines").read_text() == before
 
 
 def test_a_table_is_written_in_its_place_and_nothing_else_is_touched() -> None:
