@@ -110,7 +110,7 @@ def test_summary_keeps_its_contract(results: Path) -> None:
 
 def test_the_table_of_the_documentation_is_that_of_the_command(results: Path) -> None:
     summary = json.loads((results / "summary.json").read_text())
-    (text,) = figures.block("simulate").findall(figures.PAGE.read_text())
+    (text,) = figures.block("simulate").findall((figures.PAGES / "accuracy.md").read_text())
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
     header, *made = figures.tables.errors(summary)
     assert rows[0] == list(header)
