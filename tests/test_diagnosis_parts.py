@@ -33,7 +33,7 @@ from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
 from workbench.diagnosis.simulator import Evidence, Simulated, Simulator, Variation, delay
 from workbench.diagnosis.thresholds import SOUND
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 from workbench.modelica import read_library
 from workbench.systems import load_system
@@ -469,4 +469,15 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
         # a thousandth. The wheel load does a thousandth of what friction does: there, a hundredth.
         share = {"Fz": 0.02}.get(name, 1e-3)
         np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
+    simulator.close()
+
+
+def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
+    samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
+    simulator = Simulator(Simulated(MINIMAL, SYSTEM, (samples,)))
+    # An inertia less than none: the wheel runs away from what presses it on, yet stays a number.
+    runaway = {**point, "JW": -55.0}
+    assert np.isfinite(simulator.at(0, runaway).errors).all()
+    with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):
+        simulator.derivatives(0, runaway, [Variation(("JW",))])
     simulator.close()

@@ -20,7 +20,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.slots import read_slots
 from workbench.modelica import read_library
-from workbench.proposing.places import places
+from workbench.proposing.places import LawInfluence, places
 from workbench.proposing.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.recording import Vector
 from workbench.report.power_checks import format_left_out
@@ -238,6 +238,24 @@ def test_a_law_acts_as_its_class_does(folder: Path, tmp_path: Path) -> None:
         (half,) = simulations.responses(points, [column, column], [0.5 * np.ones((level.size, 2))])
         assert_allclose(half, 0.5 * np.hstack([direct, direct]), rtol=1e-9, atol=1e-9)
         assert np.ptp(level) > 0.1
+
+
+def test_heat_that_is_lost_follows_its_closed_form(folder: Path) -> None:
+    """Power that rises evenly: P = c t, of which c T (t - T (1 - exp(-t/T))) is left."""
+    system = load_system(folder)
+    library = read_library(system.library)
+    base = system.models[OBSERVER].name
+    (outlet,) = places(library, base, read_slots(library, base))
+    time = np.linspace(0.0, 30.0, 3001)
+    watched = {f"{outlet.slot.name}.h": -4.0 * time}
+    (level,) = (one for one in outlet.inputs if one.name == "h")
+    for span in (10.0, 100.0):
+        left = LawInfluence("work", (level,), span).course(outlet, watched, time)
+        exact = 4.0 * span * (time - span * (1.0 - np.exp(-time / span)))
+        # The mean of both ends of a step, which is a thousandth of the time constant: its square.
+        assert_allclose(left, exact, rtol=0.0, atol=1e-6 * exact.max())
+    kept = LawInfluence("work", (level,)).course(outlet, watched, time)
+    assert_allclose(kept, 2.0 * time**2, rtol=1e-12)
 
 
 def test_slots_tell_where_a_law_may_act(folder: Path) -> None:

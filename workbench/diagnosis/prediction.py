@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from workbench.diagnosis.samples import Samples
 from workbench.diagnosis.steps import Steps, step, steps
 from workbench.diagnosis.tangent import Tangent, advance, renew, share, tangent, tell
+from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix
 from workbench.kernel import checked, compiled, instance, place, read, set_inputs, set_states
 from workbench.system import System
@@ -253,6 +254,8 @@ class Predictor:
             along,
         )
         checked(status, fmu)
+        if not np.isfinite(along.states).all():  # once lost, they stay so
+            raise FMUError(f"{fmu.path.name}: derivatives of {samples.name} grow beyond all bounds")
         return errors, along
 
     def _led(self, samples: Samples) -> _Led:

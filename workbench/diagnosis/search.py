@@ -11,6 +11,7 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.thresholds import Thresholds
 from workbench.diagnosis.trial import Option, Prospect, Trial, shapes, tried
+from workbench.errors import FMUError
 from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
@@ -131,12 +132,13 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     near = left < fit.decides.behind * left.min()
     worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
 
-    def finished(one: Fitted) -> Fitted:
-        return fitted(fit, one.linearised, one.active)
+    def finished(one: Fitted) -> Fitted | None:
+        return _differentiable(fit, one.linearised, one.active)
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
-    every = [ends.get(i, one) for i, one in enumerate(begun)]
-    return [every[i] for i in np.argsort(misfits(every)) if _gains(fit, best, every[i])]
+    every = [end for i, one in enumerate(begun) if (end := ends.get(i, one)) is not None]
+    order = np.argsort(misfits(every)) if every else ()
+    return [every[i] for i in order if _gains(fit, best, every[i])]
 
 
 def misfits(fits: Sequence[Fitted]) -> Vector:
@@ -166,7 +168,21 @@ def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) ->
     start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
     if start is None:
         return None
-    return fitted(fit, start, (*before.active, rival.effect), rounds, spread)
+    return _differentiable(fit, start, (*before.active, rival.effect), rounds, spread)
+
+
+def _differentiable(
+    fit: Fit,
+    start: Linearised,
+    active: tuple[Effect, ...],
+    rounds: int = ROUNDS,
+    spread: Vector | None = None,
+) -> Fitted | None:
+    """As `fitted`; None where that leads to no derivative, as an inertia less than none does."""
+    try:
+        return fitted(fit, start, active, rounds, spread)
+    except FMUError:
+        return None
 
 
 def examine(

@@ -97,7 +97,7 @@ def _told(found: Proposal) -> dict[str, Any]:
     laws = [one.law for one in found.forms.values()] if found.laws else []
     gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
     return {
-        "laws": [found.forms[law.effect.name].text for law in found.laws],
+        "laws": [found.said(law) for law in found.laws],
         "slots": list(dict.fromkeys(law.place.slot.name for law in laws)),
         "before": None if gain is None else gain.before,
         "after": None if gain is None else gain.after,

@@ -31,6 +31,7 @@ from workbench.modelica import Library
 from workbench.proposing.forms import WrittenForm, candidates
 from workbench.proposing.free import FittedLaw, estimated
 from workbench.proposing.outcome import Proposal, description_length
+from workbench.proposing.places import Law
 from workbench.proposing.scan import LawProspect, Scan
 from workbench.proposing.writing import PACKAGE, extended_library, package
 from workbench.system import OBSERVER, System
@@ -85,7 +86,11 @@ def propose(
     about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
     scan = Scan(system, library, cases, workers, report, about)
     able = _likeliest(scan.prospects)
-    estimates = estimated(system, library, cases, workers, report, able, about) if able else []
+    every = estimated(system, library, cases, workers, report, able, about) if able else []
+    fitted: dict[tuple[str, ...], FittedLaw] = {}
+    for one in every:
+        fitted.setdefault(_called(one.law), one)
+    estimates = list(fitted.values())
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
     decides = thresholds(len(scan.prospects), left=system.comparison.left)
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
@@ -111,7 +116,11 @@ def propose(
 
 
 def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
-    """The best law of each place and of what it depends on, however it is carried."""
+    """The best law of each place and of what it depends on, however it is carried.
+
+    Of heat there are all, with every time constant: which is right, small changes about what is
+    known hardly tell.
+    """
     best: dict[tuple[str, ...], LawProspect] = {}
     for one in prospects:
         influence = one.law.influence
@@ -124,7 +133,17 @@ def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     for one in best.values():
         of_place.setdefault(one.law.place.name, []).append(one)
     kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
-    return sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
+    first = sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
+    wanted = {_called(one.law) for one in first}
+    return [one for one in prospects if _called(one.law) in wanted]
+
+
+def _called(law: Law) -> tuple[str, ...]:
+    """What a law is called; one of heat however it is carried, and lost."""
+    if law.influence is None:
+        return law.place.name, law.carrier.expression
+    carrier = "" if law.influence.kind == "work" else law.carrier.expression
+    return law.place.name, carrier, law.influence.name
 
 
 def _forms(estimate: FittedLaw) -> list[WrittenForm]:

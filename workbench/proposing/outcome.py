@@ -100,12 +100,12 @@ class Proposal:
             alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
         )
         return (
-            f"{MARK.capitalize()}{part}: {'; and '.join(map(self._said, self.laws))}{beside}. On "
+            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. On "
             f"held-out recordings the error falls from {first_error:.1f} to {gain.after:.1f} times "
             f"the noise. As a free function it is {where}."
         )
 
-    def _said(self, cause: Cause) -> str:
+    def said(self, cause: Cause) -> str:
         """A law in words, with those that are as good."""
         alike = [
             f"{one.law.short}, {one.form.text}"

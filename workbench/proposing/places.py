@@ -14,6 +14,8 @@ from workbench.modelica.classes import Component
 from workbench.units import check_unit, quotient
 
 CLOCK = "clock"  # of a generated class [s]
+LOST = "lost"  # of a generated class: time constant with which heat is lost [s]
+_LOSES = (10.0, 3.0, 1.0)  # such time constants, by the longest recording: a tenth goes, to most
 _VARIES = 1e-3  # share of its size by which a quantity has to vary, to be an influence
 
 
@@ -74,8 +76,8 @@ class LawInfluence:
     ----------
     kind : "value", "size" or "rate" of an input, "time", or "work", the integral of the size of a
         power.
-    factors : inputs, whose product it is.
-    span : [s] over which a rate is taken.
+    factors : inputs, and an output that is a coefficient, whose product it is.
+    span : [s] over which a rate is taken; time constant with which work is lost, 0 if it is kept.
     """
 
     kind: str
@@ -87,6 +89,11 @@ class LawInfluence:
         """Part of a Modelica name."""
         parts = (self.kind, *(one.name for one in self.factors))
         return "".join(part[0].upper() + part[1:] for part in parts)
+
+    @property
+    def cools(self) -> bool:
+        """Whether it is heat that is lost again."""
+        return self.kind == "work" and self.span > 0.0
 
     @property
     def unit(self) -> str:
@@ -104,7 +111,8 @@ class LawInfluence:
             return "time since the beginning"
         what = " x ".join(f"{one.name} ({one.text})" for one in self.factors)
         before = {"size": "the size of ", "rate": "the rate of ", "work": "heat, the work of "}
-        return before.get(self.kind, "") + what
+        lost = f", lost with a time constant of {self.span:g} s" if self.cools else ""
+        return before.get(self.kind, "") + what + lost
 
     @property
     def short(self) -> str:
@@ -136,7 +144,8 @@ class LawInfluence:
         if self.kind == "rate":
             return f"({self.factors[0].name} - {CLOCK})/{self.span!r}"
         if self.kind == "work":
-            return f"noEvent(abs({'*'.join(one.name for one in self.factors)}))"
+            power = f"noEvent(abs({'*'.join(one.name for one in self.factors)}))"
+            return f"{power} - {CLOCK}/{LOST}" if self.cools else power
         return ""
 
     def course(self, place: Place, watched: Mapping[str, Vector], time: Vector) -> Vector:
@@ -150,16 +159,22 @@ class LawInfluence:
         if self.kind == "size":
             return np.abs(product)
         if self.kind == "rate":
-            late = np.zeros_like(product)
-            kept = np.exp(-np.diff(time) / self.span)
-            for k, share in enumerate(kept):
-                middle = 0.5 * (product[k] + product[k + 1])
-                late[k + 1] = middle + share * (late[k] - middle)
-            slope: Vector = (product - late) / self.span
+            slope: Vector = (product - _followed(product, time, self.span)) / self.span
             return slope
-        rate = np.abs(product)
-        done: Vector = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time)))
+        power = np.abs(product)
+        if self.cools:
+            return self.span * _followed(power, time, self.span)
+        done: Vector = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time)))
         return done
+
+
+def _followed(course: Vector, time: Vector, span: float) -> Vector:
+    """What follows a course, from zero, with a time constant [s], (n,)."""
+    late = np.zeros_like(course)
+    for k, share in enumerate(np.exp(-np.diff(time) / span)):
+        middle = 0.5 * (course[k] + course[k + 1])
+        late[k + 1] = middle + share * (late[k] - middle)
+    return late
 
 
 @dataclass(frozen=True)
@@ -254,9 +269,10 @@ def laws(
     span : [s] over which rates are taken.
     """
     every = [watched for _, watched in recordings]
+    longest = max(float(np.ptp(time)) for time, _ in recordings)
     for carrier in _carriers(place, every):
         yield Law(place, carrier, None)
-        for influence in _influences(place, every, span):
+        for influence in _influences(place, every, span, longest):
             courses = [influence.course(place, watched, time) for time, watched in recordings]
             if _varies(courses):
                 yield Law(place, carrier, influence)
@@ -284,7 +300,7 @@ def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Itera
 
 
 def _influences(
-    place: Place, recordings: Sequence[Mapping[str, Vector]], span: float
+    place: Place, recordings: Sequence[Mapping[str, Vector]], span: float, longest: float
 ) -> Iterator[LawInfluence]:
     for one in place.inputs:
         own = [place.at(watched, one.name) for watched in recordings]
@@ -301,4 +317,8 @@ def _influences(
         for group in combinations(known, count):
             product = ".".join(f"({one.unit})" for one in group)
             if quotient(product, "W") in ("1", "rad"):
-                yield LawInfluence("work", group)
+                # What has no unit is the coefficient of that power, such as one of friction.
+                factors = (*group, place.output) if place.output.unit == "1" else group
+                yield LawInfluence("work", factors)
+                for times in _LOSES:
+                    yield LawInfluence("work", factors, float(f"{times * longest:.2g}"))

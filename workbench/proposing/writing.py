@@ -7,7 +7,7 @@ from pathlib import Path
 from workbench.diagnosis.extension import USED, copied, written
 from workbench.files import write_whole
 from workbench.modelica import Library, read_library
-from workbench.proposing.places import CLOCK, LawInfluence, Place
+from workbench.proposing.places import CLOCK, LOST, LawInfluence, Place
 
 PACKAGE = "Proposed"  # of the classes, within the library
 
@@ -65,8 +65,13 @@ def clock(influence: LawInfluence | None) -> tuple[tuple[str, ...], tuple[str, .
         return (), ()
     unit = influence.factors[0].unit if influence.kind == "rate" else influence.unit
     known = ", ".join(filter(None, (unit_of(unit), "start=0.0", "fixed=true")))
-    declared = f'Real {CLOCK}({known}) "Of {influence.text}";'
-    return (declared,), (f"der({CLOCK}) = {influence.rate};",)
+    declared = [f'Real {CLOCK}({known}) "Of {influence.text}";']
+    if influence.cools:
+        value = number(influence.span)
+        declared.insert(
+            0, f'parameter Real {LOST}(unit="s") = {value} "Time constant of what is lost";'
+        )
+    return tuple(declared), (f"der({CLOCK}) = {influence.rate};",)
 
 
 def package(library: Library, classes: Iterable[Written]) -> str:
