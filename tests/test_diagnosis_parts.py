@@ -11,7 +11,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import choose, read_effects
+from workbench.diagnosis import choose, given_values, read_effects
 from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.clocks import in_time
 from workbench.diagnosis.evidence import Simulations
@@ -31,8 +31,11 @@ from workbench.diagnosis.quadratic import (
 )
 from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
+from workbench.diagnosis.search import extended, joined
+from workbench.diagnosis.selection import anew
 from workbench.diagnosis.simulator import Evidence, Simulated, Simulator, Variation, delay
 from workbench.diagnosis.thresholds import SOUND
+from workbench.diagnosis.trial import Prospect
 from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 from workbench.modelica import read_library
@@ -481,3 +484,21 @@ def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
     with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):
         simulator.derivatives(0, runaway, [Variation(("JW",))])
     simulator.close()
+
+
+def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None:
+    """An effect is given up, and not the diagnosis, where a step leads beyond what a model can."""
+    inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
+    with Simulations(
+        everything, SYSTEM, given_values(everything, SYSTEM), [noisy(6)], 1
+    ) as simulations:
+        fit = Fit(simulations, [inertia])
+        nominal = anew(fit, fit.unknowns.start(), ())
+        # Half the inertia is a machine; less than none is not, though its motion stays finite.
+        half, none = (
+            Prospect(inertia, {}, size, 0.1, {}, 0.0, np.zeros(1), np.zeros(0))
+            for size in (-0.5, -1.5)
+        )
+        assert extended(fit, nominal, half, rounds=1) is not None
+        assert fit.tried(joined(nominal.point, none)) is not None
+        assert extended(fit, nominal, none, rounds=1) is None

@@ -133,7 +133,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
 
     def finished(one: Fitted) -> Fitted | None:
-        return _differentiable(fit, one.linearised, one.active)
+        return _differentiable(partial(fitted, fit, one.linearised, one.active))
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
     every = [end for i, one in enumerate(begun) if (end := ends.get(i, one)) is not None]
@@ -168,19 +168,14 @@ def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) ->
     start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
     if start is None:
         return None
-    return _differentiable(fit, start, (*before.active, rival.effect), rounds, spread)
+    active = (*before.active, rival.effect)
+    return _differentiable(partial(fitted, fit, start, active, rounds, spread))
 
 
-def _differentiable(
-    fit: Fit,
-    start: Linearised,
-    active: tuple[Effect, ...],
-    rounds: int = ROUNDS,
-    spread: Vector | None = None,
-) -> Fitted | None:
-    """As `fitted`; None where that leads to no derivative, as an inertia less than none does."""
+def _differentiable(fitting: Callable[[], Fitted]) -> Fitted | None:
+    """A fit; None where it leads to no derivative, as an inertia less than none does."""
     try:
-        return fitted(fit, start, active, rounds, spread)
+        return fitting()
     except FMUError:
         return None
 

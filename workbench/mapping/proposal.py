@@ -8,7 +8,6 @@ import numpy as np
 
 from workbench.errors import InputError, closest
 from workbench.foreign import FileChannel, Group, RecordedFile
-from workbench.foreign.spelling import Conversion, conversion, spelled
 from workbench.mapping.clock import Clock, read_clock
 from workbench.mapping.names import (
     EXACT,
@@ -20,24 +19,10 @@ from workbench.mapping.names import (
     is_asked,
     listed,
 )
+from workbench.mapping.units import conversion_to, fitting_units, unit_in_name
 from workbench.recording import Vector
 from workbench.system import System
 from workbench.system_parts import Signal
-
-# Units that recorders use and may leave out, by the SI unit of what they measure.
-_USUAL = {
-    "Pa": ("Pa", "kPa", "MPa", "mbar", "bar", "psi"),
-    "rad/s": ("rad/s", "rpm", "rev/s", "deg/s"),
-    "rad": ("rad", "deg", "rev"),
-    "m/s": ("m/s", "km/h", "mph"),
-    "m": ("m", "mm"),
-    "N": ("N", "kN"),
-    "N.m": ("N.m", "kN.m"),
-    "V": ("V", "mV"),
-    "A": ("A", "mA"),
-    "K": ("K", "degC"),
-}
-_TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,9 +215,9 @@ def _as_named(
     unit = one.unit or place.channel.unit
     concluded = not unit
     if not unit:
-        fitting = _fitting(place.channel, signal, system)
+        fitting = fitting_units(place.channel, signal, system)
         unit = fitting[0] if len(fitting) == 1 else ""
-    way = _way(unit, signal, system) if unit else None
+    way = conversion_to(unit, signal, system) if unit else None
     if way is None:
         raise InputError(
             where=f"{where}, channel '{place.channel.name}'",
@@ -272,36 +257,6 @@ def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
         taken[id(one.channel)] = signal
 
 
-def _way(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | None:
-    """How values in a unit become a signal, and by which formula; None: in no way."""
-    direct = conversion(unit, signal.unit)
-    if direct is not None:
-        return direct, ""
-    other = signal.recorded_as
-    found = conversion(unit, other.unit) if other is not None else None
-    if other is None or found is None:
-        return None
-    (slope,) = other.formula.slopes((signal.name,), system.values)
-    return Conversion(found.factor / slope, found.zero / slope), other.formula.text
-
-
-def _fitting(channel: FileChannel, signal: Signal, system: System) -> list[str]:
-    """Usual units in which values without a unit have the signal's typical size."""
-    others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
-    fitting: list[str] = []
-    for unit in dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others)):
-        way = _way(unit, signal, system)
-        if way is None:
-            continue
-        values = way[0].factor * channel.values + way[0].zero
-        size = float(np.nanmax(np.abs(values), initial=0.0))
-        low, high = signal.plausible
-        typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL
-        if typical and np.nanmin(values) >= low and np.nanmax(values) <= high:
-            fitting.append(unit)
-    return fitting
-
-
 def _unit_reason(reason: str, unit: str, concluded: bool) -> str:
     return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
 
@@ -311,15 +266,15 @@ def _candidate(
 ) -> tuple[Assigned | None, str]:
     """A channel as a signal, or None and why it cannot be."""
     channel = place.channel
-    unit = channel.unit or _suffix(channel.name, signal, system)
+    unit = channel.unit or unit_in_name(channel.name, signal, system)
     concluded = not unit
     if concluded:
-        fitting = _fitting(channel, signal, system)
+        fitting = fitting_units(channel, signal, system)
         if len(fitting) != 1:
             fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
             return None, f"'{channel.name}' has no unit and is plausible {fits}"
         unit = fitting[0]
-    way = _way(unit, signal, system)
+    way = conversion_to(unit, signal, system)
     if way is None:
         return None, f"'{channel.name}' is in [{unit}]"
     scale, formula = way
@@ -344,13 +299,6 @@ def _candidate(
         concluded=concluded,
         alone=not likeness,
     ), ""
-
-
-def _suffix(name: str, signal: Signal, system: System) -> str:
-    """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
-    _, _, last = name.replace(" ", "_").rpartition("_")
-    unit = spelled(last)
-    return unit if len(last) > 1 and last != name and _way(unit, signal, system) else ""
 
 
 def _by_name(

@@ -270,12 +270,12 @@ def laws(
     """
     every = [watched for _, watched in recordings]
     longest = max(float(np.ptp(time)) for time, _ in recordings)
+    able: list[LawInfluence | None] = [None]
+    for influence in _influences(place, every, span, longest):
+        if _varies([influence.course(place, watched, time) for time, watched in recordings]):
+            able.append(influence)
     for carrier in _carriers(place, every):
-        yield Law(place, carrier, None)
-        for influence in _influences(place, every, span, longest):
-            courses = [influence.course(place, watched, time) for time, watched in recordings]
-            if _varies(courses):
-                yield Law(place, carrier, influence)
+        yield from (Law(place, carrier, influence) for influence in able)
 
 
 def _varies(recordings: Sequence[Vector]) -> bool:

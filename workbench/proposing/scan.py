@@ -99,7 +99,7 @@ class Scan:
             path = Path(scratch) / "Probes.fmu"
             text = source(extended, base, "Probes", effects, {}, {}, "With probes")
             report(f"compiling probes in {len(where)} places")
-            build(extended, "Probes", _watching(text, names), path, every_platform=False)
+            build(extended, "Probes", watching(text, names), path, every_platform=False)
             given = given_values(path, system)
             with Simulations(path, system, given, cases, workers, report=report) as simulations:
                 self._fit = Fit(simulations, effects)
@@ -172,7 +172,7 @@ class Scan:
         ]
 
 
-def _watching(text: str, names: Sequence[str]) -> str:
+def watching(text: str, names: Sequence[str]) -> str:
     """A model with outputs for what is within its slots."""
     outputs = [f"  output Real watched{k} = {name};\n" for k, name in enumerate(names)]
     head, end, tail = text.rpartition("end ")

@@ -1,0 +1,102 @@
+"""Laws of heat that is kept, or lost again: they are offered, and their classes hold that heat."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+from workbench.case import Case
+from workbench.diagnosis import given_values, read_effects
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.extension import build, source
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.slots import read_slots
+from workbench.fmu import FMU
+from workbench.modelica import Library, read_library
+from workbench.proposing.forms import WrittenForm, candidates
+from workbench.proposing.places import CLOCK, Place, laws, places
+from workbench.proposing.scan import watching
+from workbench.proposing.splines import Knots
+from workbench.proposing.writing import extended_library
+from workbench.recording import Vector
+from workbench.system import OBSERVER, System
+
+LONGEST = 40.0  # [s]
+
+
+@pytest.fixture(scope="module")
+def library(system: System) -> Library:
+    assert system.library is not None
+    return read_library(system.library)
+
+
+@pytest.fixture(scope="module")
+def pads(library: Library, system: System) -> Place:
+    """Where the pads' friction coefficient acts."""
+    base = system.models[OBSERVER].name
+    every = places(library, base, read_slots(library, base))
+    return next(one for one in every if one.slot.name == "padFriction")
+
+
+def braking(pads: Place) -> tuple[Vector, dict[str, Vector]]:
+    """Times and what is watched at the pads, in a stop."""
+    time = np.linspace(0.0, LONGEST, 401)
+    courses = {"Fperp": 3e4 * (1.0 - np.exp(-time)), "v": 20.0 - 0.5 * time}
+    inputs = {one.name: courses.get(one.name, 0.0 * time) for one in pads.inputs}
+    watched = {**inputs, "mu": 0.35 + 0.0 * time}
+    return time, {f"padFriction.{name}": course for name, course in watched.items()}
+
+
+def of_heat(pads: Place) -> dict[float, WrittenForm]:
+    """Laws in proportion to heat, that multiply the coefficient, by time constant [s]."""
+    found = {}
+    for law in laws(pads, [braking(pads)], 0.25):
+        if law.influence is not None and law.influence.kind == "work":
+            first = next(candidates(law, Knots(0.0, 1e7), 1.0))
+            found.setdefault(law.influence.span, first)
+    return found
+
+
+def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads: Place) -> None:
+    """All of its power: force, speed and the coefficient itself."""
+    found = of_heat(pads)
+    # From heat that a stop keeps to heat of which most is gone at its end.
+    assert set(found) == {0.0, 10.0 * LONGEST, 3.0 * LONGEST, LONGEST}
+    for one in found.values():
+        assert one.law.influence is not None
+        assert [part.name for part in one.law.influence.factors] == ["Fperp", "v", "mu"]
+
+
+@pytest.mark.parametrize("span", [0.0, LONGEST])
+def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
+    span: float, library: Library, pads: Place, system: System, dry_case: Case, tmp_path: Path
+) -> None:
+    """What the model integrates, beside the integral over samples of what was watched."""
+    base = system.models[OBSERVER].name
+    law = of_heat(pads)[span]
+    extended = extended_library(library, [law.written], tmp_path)
+    (own,) = [one for one in read_effects(extended, base) if one.name == law.written.name]
+    names = [f"padFriction.{name}" for name in ("Fperp", "v", "mu")]
+    text = watching(source(extended, base, "Heat", [own], {}, {}, "A law of heat"), names)
+    path = tmp_path / "Heat.fmu"
+    build(extended, "Heat", text, path, every_platform=False)
+    with FMU(path) as fmu:
+        (clock,) = (name for name in fmu.states if name.endswith(CLOCK))
+    with Simulations(path, system, given_values(path, system), [dry_case], 1) as simulations:
+        unknowns = Fit(simulations, [own]).unknowns
+        points = unknowns.values(unknowns.start())
+        (table,) = simulations.along(points, ["watched0", "watched1", "watched2", clock])
+        (recording,) = simulations.recordings
+    moving = slice(0, int(np.flatnonzero(recording.told)[-1]))
+    *seen, held = table[moving].T
+    assert law.law.influence is not None
+    course = dict(zip(names, seen, strict=True))
+    heat = law.law.influence.course(pads, course, recording.time[moving])
+    assert heat.max() > 1e6  # of a stop from 120 km/h; [J]
+    # The trapezoidal rule over 5 ms, where the pressure rises in some tenths of a second.
+    assert_allclose(held, heat, rtol=0.0, atol=1e-4 * heat.max())
