@@ -11,11 +11,11 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.case import Case, read_cases
-from workbench.diagnosis import choose, given_values, read_effects
+from workbench.diagnosis import build_everything, choose, given_values, read_effects
 from workbench.diagnosis.cleaning import outliers
 from workbench.diagnosis.clocks import in_time
 from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, source, variables
+from workbench.diagnosis.extension import build, sizes_by_component, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.motion import motion
@@ -40,6 +40,7 @@ from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, CoSimulation, Matrix, Vector
 from workbench.modelica import read_library
 from workbench.systems import load_system
+from workbench.template import write_system
 
 ROOT = Path(__file__).parent.parent
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
@@ -502,3 +503,56 @@ def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None
         assert extended(fit, nominal, half, rounds=1) is not None
         assert fit.tried(joined(nominal.point, none)) is not None
         assert extended(fit, nominal, none, rounds=1) is None
+
+
+def test_states_of_effects_that_are_absent_change_no_derivative(everything: Path) -> None:
+    """Derivatives with all states, and with those alone that anything depends on."""
+    fade = next(effect for effect in EFFECTS if effect.name == "BrakeFade")
+    present = {variables(fade, "fade")[0]: 4e-4, "muWR": 0.4}
+    columns = [Variation((name,)) for name in ("muDC", "Fz", "JW")]
+    samples = ready(simulated(everything, present))
+    simulator = Simulator(Simulated(everything, SYSTEM, (samples,)))
+    values = {delay("Fx"): 0.002, **present}
+    every = simulator.derivatives(0, values, columns)
+    less = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
+    # What the others add to the motion is zero, but for rounding; the fade is there.
+    apart = np.abs(less - every).max(axis=0)
+    assert (apart < 1e-10 * np.abs(every).max(axis=0)).all()
+    simulator.close()
+
+
+RISING = """
+  model RisingLeak "a leak that grows with time"
+    extends PartialOutlet;
+    parameter Real rate(unit="m3/s2", min=0.0, max=1e-2) = 0.0 "Of its growth";
+    Real leak(unit="m3/s", start=0.0, fixed=true) "What leaks";
+  equation
+    der(leak) = rate;
+    actual = nominal + leak;
+    annotation (__Workbench(effect(size="rate", matters=1e-6, separation="time")));
+  end RisingLeak;
+
+  model Observer"""
+
+
+def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path: Path) -> None:
+    """Reference: central differences, of an effect that acts by its own state alone."""
+    write_system(tmp_path)
+    modelica = tmp_path / "package.mo"
+    modelica.write_text(modelica.read_text().replace("\n  model Observer", RISING, 1))
+    system = load_system(tmp_path)
+    cases = read_cases([tmp_path / "recordings"], system)[:1]
+    library = read_library(system.library)
+    effects = read_effects(library, "Observer")
+    path = tmp_path / "AllEffects.fmu"
+    build_everything(system, library, effects, path)
+    name = "outlet.risingLeak.rate"
+    with Simulations(path, system, given_values(path, system), cases, 1) as simulations:
+        unknowns = Fit(simulations, effects).unknowns
+        (values,) = unknowns.values(unknowns.start())
+        sizes = sizes_by_component(effects)
+        (by,) = simulations.derivatives([values], [Variation((name,))], sizes)
+        sides = simulations.at([{**values, name: 1e-9}]) + simulations.at([{**values, name: -1e-9}])
+    central = (sides[0].residual - sides[1].residual) / 2e-9
+    np.testing.assert_allclose(by[:, 0], central, rtol=0, atol=1e-3 * np.abs(central).max())
+    assert np.abs(central).max() > 0.0

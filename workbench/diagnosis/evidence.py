@@ -175,10 +175,19 @@ class Simulations:
         self,
         points: Sequence[Mapping[str, float]],
         columns: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]] | None = None,
     ) -> list[Matrix]:
-        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p)."""
+        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p).
+
+        Parameters
+        ----------
+        sizes : see `Simulator.derivatives`.
+        """
         found = self._gathered(
-            {k: (Simulator.derivatives, self._at[k], points[k], columns) for k in self._order}
+            {
+                k: (Simulator.derivatives, self._at[k], points[k], columns, None, sizes)
+                for k in self._order
+            }
         )
         return [found[k] for k in range(len(self.recordings))]
 

@@ -39,6 +39,15 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     return tuple(f"{slot}.{component(effect.kind)}.{parameter}{element}" for slot in effect.slots)
 
 
+def sizes_by_component(effects: Iterable[Effect]) -> dict[str, list[str]]:
+    """Variables of the FMU that are the sizes of a component: without them it is nominal."""
+    found: dict[str, list[str]] = {}
+    for effect in (one for one in effects if not one.late):
+        for name in (name for size in effect.sizes for name in variables(effect, size)):
+            found.setdefault(name.rpartition(".")[0], []).append(name)
+    return found
+
+
 def parameter_of(effect: Effect, variable: str) -> str:
     """Parameter of an effect that a variable of the FMU is, empty if it is none."""
     parameter = variable.rpartition(".")[2].partition("[")[0]

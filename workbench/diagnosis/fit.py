@@ -15,7 +15,7 @@ from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
 from workbench.diagnosis.clocks import own_clocks
 from workbench.diagnosis.evidence import Item, Result, Simulations
-from workbench.diagnosis.extension import variables
+from workbench.diagnosis.extension import sizes_by_component, variables
 from workbench.diagnosis.linearised import Linearised, Point, between, lasting, slowness
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
@@ -198,7 +198,8 @@ class Fit:
         if not missing:
             return lin
         values = self.unknowns.values(lin.point)
-        more = self._simulations.derivatives(values, list(missing.values()))
+        sizes = sizes_by_component(self.unknowns.effects.values())
+        more = self._simulations.derivatives(values, list(missing.values()), sizes)
         return self.hide(lin.extended(missing, more))
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:

@@ -20,7 +20,16 @@ from workbench.diagnosis.steps import Steps, step, steps
 from workbench.diagnosis.tangent import Tangent, advance, renew, share, tangent, tell
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix
-from workbench.kernel import checked, compiled, instance, place, read, set_inputs, set_states
+from workbench.kernel import (
+    checked,
+    compiled,
+    inlined,
+    instance,
+    place,
+    read,
+    set_inputs,
+    set_states,
+)
 from workbench.system import System
 
 _LONGEST = 1.2  # sample times, of a step: what is stepped explicitly has to be stable
@@ -47,7 +56,7 @@ class _Led(NamedTuple):
     seen: NDArray[np.intp]
 
 
-@compiled
+@inlined
 def _lead(model, led, share, error, states, errors):  # type: ignore[no-untyped-def]
     """Correct the states by prediction errors (c,), and derivatives (n, p) by theirs (c, p).
 
@@ -77,7 +86,7 @@ def _lead(model, led, share, error, states, errors):  # type: ignore[no-untyped-
                 states[led.corrected[i], q] += led.gain[i, j] * errors[j, q]
 
 
-@compiled
+@inlined
 def _restart(model, led, error, states, errors):  # type: ignore[no-untyped-def]
     """Set states as measured, by errors (c,), and derivatives (n, p) by theirs (c, p)."""
     for i in range(led.restarted.size):
@@ -117,7 +126,7 @@ def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work
                 status = step(model, work, interval / count)
                 if varied and not status:
                     share(tangent, k, i / count)
-                    status = advance(model, tangent, work.stiff, interval / count)
+                    status = advance(model, tangent, interval / count)
                 if status:
                     return status
             for j in range(u.shape[1]):
@@ -218,6 +227,7 @@ class Predictor:
         values: Mapping[str, float],
         columns: Sequence[Variation],
         courses: Matrix | None = None,
+        absent: Sequence[str] = (),
     ) -> tuple[Matrix, Tangent]:
         """Prediction errors along one recording, and their derivatives by p columns.
 
@@ -226,6 +236,7 @@ class Predictor:
         Parameters
         ----------
         courses : (n, p) factors by which the columns act at each sample, if they change in time.
+        absent : components of the FMU whose states nothing depends on.
         """
         fmu, values = self._fmu, {**self.begin(samples), **values}
         for column in columns:
@@ -237,7 +248,7 @@ class Predictor:
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         work = self._steps()
         varied = [column.variables for column in columns]
-        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff.size, courses)
+        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, courses, absent)
         status = _predict(
             self._model,
             samples.time[:end],

@@ -122,6 +122,7 @@ class Simulator:
         values: Mapping[str, float],
         columns: Sequence[Variation],
         courses: Matrix | None = None,
+        sizes: Mapping[str, Sequence[str]] | None = None,
     ) -> Matrix:
         """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
 
@@ -129,6 +130,8 @@ class Simulator:
         ----------
         courses : (n, p) factors by which the columns act at each sample, if they change in time;
             what is read at rest does not change then.
+        sizes : variables by the component of the FMU that is nominal while they are zero: then
+            nothing depends on its states.
         """
         one, fmu = self._in_time(number, values), self._fmu
         jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
@@ -138,7 +141,9 @@ class Simulator:
         for part in _compatible(columns, clocks):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
-            _, found = self._predictor.derivatives(one, self._known(values), varied, shares)
+            absent = self._absent(values, varied, sizes or {})
+            given = one, self._known(values), varied, shares, absent
+            _, found = self._predictor.derivatives(*given)
             by = self._whitened(number, self._late(number, found.errors, values))
             jacobian[:-1, part] = by.reshape(-1, len(part))
             if self._rest is not None and courses is None:
@@ -149,6 +154,20 @@ class Simulator:
                     slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
                 jacobian[-1, part] = -slopes / one.rest_noise
         return jacobian
+
+    def _absent(
+        self,
+        values: Mapping[str, float],
+        varied: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]],
+    ) -> list[str]:
+        """Components of which no size is varied, or other than zero."""
+        acting = {name for column in varied for name in column.variables}
+        return [
+            name
+            for name, own in sizes.items()
+            if not any(one in acting or values.get(one, self._fmu.defaults[one]) for one in own)
+        ]
 
     def _by_clocks(
         self, number: int, values: Mapping[str, float], columns: Sequence[Variation]

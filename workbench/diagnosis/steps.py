@@ -19,6 +19,7 @@ from workbench.kernel import (
     differentiate,
     evaluate,
     implicit,
+    inlined,
     linearise,
     place,
     set_inputs,
@@ -88,7 +89,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
     )
 
 
-@compiled
+@inlined
 def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
     """Make the matrix of a step of h [s], with the Jacobian here or the one that is kept."""
     n, p = model.x.size, work.stiff.size
@@ -110,7 +111,7 @@ def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
     return solve(work.system)
 
 
-@compiled
+@inlined
 def _solve(work, h, k):  # type: ignore[no-untyped-def]
     """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
     stiff, picked, p = work.stiff, work.picked, work.stiff.size
@@ -156,7 +157,7 @@ def _begun(model, work, h, anew):  # type: ignore[no-untyped-def]
     return set_states(model) or evaluate(model)
 
 
-@compiled
+@inlined
 def _bent(model, work, h):  # type: ignore[no-untyped-def]
     """Whether rates at the first stage differ from what the Jacobian says of them.
 

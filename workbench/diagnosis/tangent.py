@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.fmu import FMU, Matrix, References, Vector
-from workbench.kernel import Instance, compiled, differentiate, direction, solve
+from workbench.kernel import Instance, differentiate, direction, inlined, solve
 
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -30,7 +30,9 @@ class Tangent(NamedTuple):
     courses : (k, p) factors by which parameters act at each sample, one row or none: they are 1.
     shares : (p,) those of the present point.
     alike : (p,) whether a column is of the same parameters as the one before it.
-    states : (n, p) derivatives of the states.
+    used : states that others depend on, stiff : those of them that are stepped implicitly.
+    told : numbers of the outputs, behind those of the states.
+    states : (n, p) derivatives of the states that are used, zero of the others.
     errors : (k, c, p) derivatives of the prediction errors of each sample.
     turn : (1,) which of two points is the present one; the other is where a step begins.
     by_columns : (2, p, n + c) derivatives of the rates and the predicted outputs by the columns.
@@ -44,6 +46,9 @@ class Tangent(NamedTuple):
     courses: Matrix
     shares: Vector
     alike: NDArray[np.bool_]
+    used: NDArray[np.intp]
+    stiff: NDArray[np.intp]
+    told: NDArray[np.intp]
     states: Matrix
     errors: NDArray[np.float64]
     turn: NDArray[np.intp]
@@ -65,8 +70,9 @@ def tangent(
     model: Instance,
     columns: Sequence[Sequence[str]],
     samples: int,
-    stiff: int,
+    stiff: NDArray[np.intp],
     courses: Matrix | None = None,
+    absent: Sequence[str] = (),
 ) -> Tangent:
     """Prepare derivatives for a run.
 
@@ -74,9 +80,13 @@ def tangent(
     ----------
     columns : variables of the FMU that each column varies together, of a state its start.
     samples : of the run.
-    stiff : number of states that are stepped implicitly.
+    stiff : states that are stepped implicitly.
     courses : (samples, p) of parameters that act by a factor that changes in time, if any does.
+    absent : components of the FMU whose states nothing depends on.
     """
+    within = tuple(f"{one}." for one in absent)
+    used = [i for i, name in enumerate(fmu.states) if not name.startswith(within)]
+    own = np.array([i for i in stiff if i in used], np.intp)
     n, p, c = len(fmu.states), len(columns), model.y.size
     acting = [[name for name in column if name not in fmu.states] for column in columns]
     names = [name for column in acting for name in column]
@@ -88,6 +98,7 @@ def tangent(
         np.zeros((0, p)) if courses is None else np.ascontiguousarray(courses),
         np.ones(p) if courses is None else courses[0].copy(),
         np.array([q > 0 and acting[q] == acting[q - 1] for q in range(p)], np.bool_),
+        *(np.array(used, np.intp), own, np.arange(n, n + c)),
         np.reshape(begin, (n, p)),
         np.zeros((samples if p else 1, c, p)),
         np.zeros(1, np.intp),
@@ -96,12 +107,12 @@ def tangent(
         *(np.zeros((2, n * (n + c)), np.intp), np.zeros((2, n * (n + c)), np.intp)),
         np.zeros((2, n * (n + c))),
         *(np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p))),
-        np.zeros((stiff, stiff + p)),
+        np.zeros((own.size, own.size + p)),
         np.zeros(n + c),
     )
 
 
-@compiled
+@inlined
 def renew(model, tangent):  # type: ignore[no-untyped-def]
     """Take the derivatives of the model at the present point; returns a status.
 
@@ -111,16 +122,17 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
     unknowns = n + tangent.errors.shape[1]
     now, found = 1 - tangent.turn[0], 0
     tangent.turn[0] = now
-    for j in range(n):
+    for j in tangent.used:
         if differentiate(model, j, unknowns):
             return 1
-        for i in range(unknowns):
-            slope = model.jacobian[j, i]
-            if slope != 0.0:
-                tangent.rows[now, found] = i
-                tangent.by[now, found] = j
-                tangent.slopes[now, found] = slope
-                found += 1
+        for rows in (tangent.used, tangent.told):
+            for i in rows:
+                slope = model.jacobian[j, i]
+                if slope != 0.0:
+                    tangent.rows[now, found] = i
+                    tangent.by[now, found] = j
+                    tangent.slopes[now, found] = slope
+                    found += 1
     tangent.entries[now] = found
     for q in range(p):
         first = tangent.edges[q]
@@ -137,7 +149,7 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
     return 0
 
 
-@compiled
+@inlined
 def share(tangent, k, part):  # type: ignore[no-untyped-def]
     """Take the factors of parameters at a part of the way from sample k - 1 to sample k."""
     if tangent.courses.shape[0] > 0:
@@ -146,14 +158,19 @@ def share(tangent, k, part):  # type: ignore[no-untyped-def]
             tangent.shares[q] = before + part * (tangent.courses[k, q] - before)
 
 
-@compiled
-def _product(tangent, at, states, first, result):  # type: ignore[no-untyped-def]
-    """Derivatives of rates or outputs from number `first` on, by way of the states and directly."""
+@inlined
+def _product(tangent, at, states, rows, first, result):  # type: ignore[no-untyped-def]
+    """Derivatives of some rates or outputs, by way of the states and directly.
+
+    Parameters
+    ----------
+    rows : their numbers, of which `first` is the first row of the result.
+    """
     p, size = states.shape[1], result.shape[0]
     by_columns = tangent.by_columns[at]
-    for i in range(size):
+    for i in rows:
         for q in range(p):
-            result[i, q] = by_columns[q, first + i]
+            result[i - first, q] = by_columns[q, i]
     for k in range(tangent.entries[at]):
         i, j, slope = tangent.rows[at, k] - first, tangent.by[at, k], tangent.slopes[at, k]
         if 0 <= i < size:
@@ -161,9 +178,10 @@ def _product(tangent, at, states, first, result):  # type: ignore[no-untyped-def
                 result[i, q] += slope * states[j, q]
 
 
-@compiled
-def _solved(model, tangent, stiff, h, k):  # type: ignore[no-untyped-def]
+@inlined
+def _solved(model, tangent, h, k):  # type: ignore[no-untyped-def]
     """Solve (I - gamma h A) x = k in place; A has columns by the stiff states, else zeros."""
+    stiff = tangent.stiff
     a, system, s = model.jacobian, tangent.system, stiff.size
     if s == 0:
         return 0
@@ -175,7 +193,7 @@ def _solved(model, tangent, stiff, h, k):  # type: ignore[no-untyped-def]
             system[r, s + q] = k[stiff[r], q]
     status = solve(system)
     for c in range(s):
-        for i in range(k.shape[0]):
+        for i in tangent.used:
             slope = _GAMMA * h * a[stiff[c], i]
             if slope != 0.0:
                 for q in range(k.shape[1]):
@@ -186,47 +204,51 @@ def _solved(model, tangent, stiff, h, k):  # type: ignore[no-untyped-def]
     return status
 
 
-@compiled
-def advance(model, tangent, stiff, h):  # type: ignore[no-untyped-def]
+@inlined
+def advance(model, tangent, h):  # type: ignore[no-untyped-def]
     """Advance the derivatives of the states over a step of h [s] that ended here; a status.
 
     The method of `steps.step`, for equations that are linear.
     """
     if renew(model, tangent):
         return 1
-    n, p = tangent.states.shape
-    now, before, size = tangent.turn[0], 1 - tangent.turn[0], n * p
-    S, K1, K2, M = tangent.states, tangent.first, tangent.second, tangent.moved
-    s, k1, k2, moved = S.reshape(size), K1.reshape(size), K2.reshape(size), M.reshape(size)
-    rates = tangent.rates.reshape(size)
-    _product(tangent, before, S, 0, K1)
-    for i in range(size):
-        moved[i] = s[i] + h * k1[i]
-    for i in stiff:
+    p, used = tangent.states.shape[1], tangent.used
+    now, before = tangent.turn[0], 1 - tangent.turn[0]
+    s, k1, k2 = tangent.states, tangent.first, tangent.second
+    moved, rates = tangent.moved, tangent.rates
+    _product(tangent, before, s, used, 0, k1)
+    for i in used:
         for q in range(p):
-            M[i, q] = S[i, q]
-    _product(tangent, now, M, 0, tangent.rates)
-    for i in range(size):
-        k2[i] = _GAMMA * (rates[i] - k1[i])
-        k1[i] += k2[i]
-    status = _solved(model, tangent, stiff, h, K1)
-    for i in range(size):
-        moved[i] = s[i] + h * k1[i]
-    _product(tangent, now, M, 0, tangent.rates)
-    for i in range(size):
-        k2[i] = rates[i] - 2.0 * k1[i] - k2[i]
-    status = status or _solved(model, tangent, stiff, h, K2)
-    for i in range(size):
-        s[i] += h * (1.5 * k1[i] + 0.5 * k2[i])
+            moved[i, q] = s[i, q] + h * k1[i, q]
+    for i in tangent.stiff:
+        for q in range(p):
+            moved[i, q] = s[i, q]
+    _product(tangent, now, moved, used, 0, rates)
+    for i in used:
+        for q in range(p):
+            k2[i, q] = _GAMMA * (rates[i, q] - k1[i, q])
+            k1[i, q] += k2[i, q]
+    status = _solved(model, tangent, h, k1)
+    for i in used:
+        for q in range(p):
+            moved[i, q] = s[i, q] + h * k1[i, q]
+    _product(tangent, now, moved, used, 0, rates)
+    for i in used:
+        for q in range(p):
+            k2[i, q] = rates[i, q] - 2.0 * k1[i, q] - k2[i, q]
+    status = status or _solved(model, tangent, h, k2)
+    for i in used:
+        for q in range(p):
+            s[i, q] += h * (1.5 * k1[i, q] + 0.5 * k2[i, q])
     return status
 
 
-@compiled
+@inlined
 def tell(tangent, k):  # type: ignore[no-untyped-def]
     """Derivatives of the prediction errors of sample k, where the model was differentiated."""
     errors = tangent.errors[k]
     n = tangent.states.shape[0]
-    _product(tangent, tangent.turn[0], tangent.states, n, errors)
+    _product(tangent, tangent.turn[0], tangent.states, tangent.told, n, errors)
     for i in range(errors.shape[0]):
         for q in range(errors.shape[1]):
             errors[i, q] = -errors[i, q]

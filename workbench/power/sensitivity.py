@@ -102,13 +102,14 @@ class Remembering(Simulations):
         self,
         points: Sequence[Mapping[str, float]],
         columns: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]] | None = None,
     ) -> list[Matrix]:
         """Derivatives of every recording's errors by the columns."""
         point = _key(points)
         keys = [(point, one.variables, _key([one.setting])) for one in columns]
         new = [i for i, key in enumerate(keys) if key not in self._columns]
         if new:
-            made = super().derivatives(points, [columns[i] for i in new])
+            made = super().derivatives(points, [columns[i] for i in new], sizes)
             for j, i in enumerate(new):
                 self._columns[keys[i]] = [one[:, j : j + 1] for one in made]
         found = [self._columns[key] for key in keys]
