@@ -20,6 +20,7 @@ from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, source
 from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.selection import anew
 from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
 from workbench.system import OBSERVER, System
@@ -184,6 +185,23 @@ def test_nothing_is_found_without_a_measured_force(
     clean: list[Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
     assert diagnosed([case.without(["Fx"]) for case in clean]).verdict == "nothing"
+
+
+def test_recordings_by_one_clock_say_so_but_for_its_own_deviation(
+    clean: list[Case], everything: Path, tmp_path: Path
+) -> None:
+    """Three sets: chance has no side, and a bias that one set hides shows in their mean."""
+    clock = next(one for one in catalogue(SYSTEM, LIBRARY) if "omegaW" in one.late)
+    ratios = []
+    for cases in (clean, *(recorded(tmp_path / str(seed), Effects(), seed) for seed in (32, 33))):
+        with Simulations(everything, SYSTEM, {}, cases, 1) as simulations:
+            fit = Fit(simulations, [clock])
+            nominal = anew(fit, fit.unknowns.start(), ())
+            lin = fit.linearise(nominal.linearised, (), [(clock, {})])
+            late = fit.quadratics(lin, [(clock.name, "skew")]).total()
+        deviation = np.sqrt(np.diag(np.linalg.inv(late.N)))[-1]
+        ratios.append(-np.linalg.solve(late.N, late.g)[-1] / deviation)
+    assert abs(np.mean(ratios)) < 4.0 / np.sqrt(len(ratios))
 
 
 def test_fade_is_found_without_a_measured_force(

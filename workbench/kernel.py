@@ -13,11 +13,39 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
 from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
+
+
+class _Law(CPUDispatcher):  # type: ignore[misc]
+    """A function that compiled code calls as it is, and Python by way of a wrapper.
+
+    A wrapper takes apart what it is given, some hundred arrays of an observer: it took longer to
+    compile than the law, and most laws are called by others alone.
+
+    Attributes
+    ----------
+    wrapped : the function as Python calls it.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        bare = {"nopython": True, "no_cpython_wrapper": True, **options}
+        super().__init__(function, targetoptions=bare)
+        _keep(self, function, "law")
+        self.wrapped = njit(**options)(function)
+        _keep(self.wrapped, function, "wrapped")
+
+    def __call__(self, *given: Any) -> Any:
+        return self.wrapped(*given)
+
+
+def _keep(dispatcher: Any, function: Callable[..., Any], form: str) -> None:
+    with suppress(RuntimeError):  # a function without a file is compiled in each process
+        dispatcher._cache = CodeCache(function, form)
 
 
 def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
@@ -28,14 +56,7 @@ def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
     nobody.
     """
     options = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "inline": inline}
-
-    def compile_(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(**options)(function)
-        with suppress(RuntimeError):  # a function without a file is compiled in each process
-            dispatcher._cache = CodeCache(function)
-        return dispatcher
-
-    return compile_
+    return lambda function: _Law(function, options)
 
 
 compiled = _compiler(inline="never")

@@ -59,13 +59,23 @@ def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Ef
     )
 
 
-def late_signals(system: System) -> dict[str, tuple[str, ...]]:
-    """Signals that are late together, by the name of what says by how much [s]."""
-    return {variables(one, SKEW)[0]: one.late for one in (*clocks(system), *own_clocks(system))}
+def late_signals(system: System) -> dict[str, dict[str, float]]:
+    """By the name of what says how late a clock is [s]: signals it moves, 1 later or -1 earlier.
+
+    A motion follows the first output with that one's noise, and would follow the noise of other
+    samples if that were moved: where its clock is late, all others are early.
+    """
+    first = system.outputs[0].name
+    found = {}
+    for one in (*clocks(system), *own_clocks(system)):
+        others = [name for name in system.signals if name not in one.late]
+        moving = dict.fromkeys(others, -1.0) if first in one.late else dict.fromkeys(one.late, 1.0)
+        found[variables(one, SKEW)[0]] = moving
+    return found
 
 
 def lateness(
-    signals_of: Mapping[str, tuple[str, ...]], values: Mapping[str, float]
+    signals_of: Mapping[str, Mapping[str, float]], values: Mapping[str, float]
 ) -> dict[str, float]:
     """By how much signals are late [s], of those that are.
 
@@ -76,8 +86,8 @@ def lateness(
     """
     late: dict[str, float] = {}
     for name, signals in signals_of.items():
-        for signal in signals if values.get(name, 0.0) != 0.0 else ():
-            late[signal] = late.get(signal, 0.0) + values[name]
+        for signal, way in signals.items() if values.get(name, 0.0) != 0.0 else ():
+            late[signal] = late.get(signal, 0.0) + way * values[name]
     return late
 
 
