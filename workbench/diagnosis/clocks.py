@@ -40,9 +40,15 @@ def clocks(system: System) -> tuple[Effect, ...]:
     return tuple(_clock(system, KIND, *one) for one in system.clocks.items())
 
 
+def reference(system: System) -> str:
+    """The signal by whose clock a model runs: that which leads its motion, if one does."""
+    leading = system.comparison.leading
+    return system.outputs[0].name if leading is None else leading.output
+
+
 def own_clocks(system: System) -> tuple[Effect, ...]:
-    """A clock of each signal, against that of the first output, whatever the loggers."""
-    others = [name for name in system.signals if name != system.outputs[0].name]
+    """A clock of each signal, against that of the reference, whatever the loggers."""
+    others = [name for name in system.signals if name != reference(system)]
     return tuple(_clock(system, OWN, name, (name,)) for name in others)
 
 
@@ -62,11 +68,10 @@ def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Ef
 def late_signals(system: System) -> dict[str, dict[str, float]]:
     """By the name of what says how late a clock is [s]: signals it moves, 1 later or -1 earlier.
 
-    A motion follows the first output with that one's noise, and would follow the noise of other
-    samples if that were moved: where its clock is late, all others are early.
+    A motion follows what leads it with the noise of each sample, which would be another if that
+    were moved: where the clock of the reference is late, all others are early.
     """
-    first = system.outputs[0].name
-    found = {}
+    first, found = reference(system), {}
     for one in (*clocks(system), *own_clocks(system)):
         others = [name for name in system.signals if name not in one.late]
         moving = dict.fromkeys(others, -1.0) if first in one.late else dict.fromkeys(one.late, 1.0)

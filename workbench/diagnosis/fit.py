@@ -13,7 +13,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.catalogue import Effect, variant
-from workbench.diagnosis.clocks import own_clocks
+from workbench.diagnosis.clocks import own_clocks, reference
 from workbench.diagnosis.evidence import Item, Result, Simulations
 from workbench.diagnosis.extension import sizes_by_component, variables
 from workbench.diagnosis.linearised import Linearised, Point, between, lasting, slowness
@@ -80,7 +80,7 @@ class Fit:
     @property
     def reference(self) -> str:
         """The signal against which clocks of others are late."""
-        return self._simulations.system.outputs[0].name
+        return reference(self._simulations.system)
 
     @property
     def own_clocks(self) -> tuple[Effect, ...]:

@@ -43,11 +43,7 @@ def by_themselves(fit: Fit, base: Fitted, best: Fitted, *, clean: bool) -> Late 
     """
     clocks = fit.own_clocks
     other = fit.beside(clocks)
-    decides = fit.decides
-    needed = decides.needed if len(best.active) < 2 else 0.0
-    if len(best.active) > 1 and all(fit.unknowns.unit(one, one.size) == "s" for one in best.active):
-        # Several times, such as a sensor's delay beside a clock: what is as good as they are.
-        needed = -max(decides.form, decides.form_share * beyond(base, best))
+    needed = fit.decides.needed if len(best.active) < 2 else 0.0
     if clean and len(best.active) < 2 and _fall(other, clocks, best) < needed:
         return None
     sizes = {(clock.name, clock.size): 0.0 for clock in clocks}
