@@ -51,14 +51,14 @@ def derivatives(tank: FMU, columns: list[tuple[str, ...]], inflow: float, count:
     stiff, h = np.array([1]), END / count
     tank.start({})
     model, work = instance(tank, ["q"], [], ["y"]), steps(tank, stiff, 1)
-    along = tangent(tank, model, columns, count + 1, stiff.size)
+    along = tangent(tank, model, columns, count + 1, stiff)
     model.x[:], model.u[0], work.to[0] = tank.get_states(), inflow, inflow
     tank.set(tank.variables(["q"]), model.u)
     assert renew(model, along) == 0
     tell(along, 0)
     for k in range(count):
         assert step(model, work, h) == 0
-        assert advance(model, along, stiff, h) == 0
+        assert advance(model, along, h) == 0
         tell(along, k + 1)
     return -along.errors[:, 0, :]  # an error is what was measured without what is predicted
 
