@@ -187,7 +187,7 @@ def test_nothing_is_found_without_a_measured_force(
     assert diagnosed([case.without(["Fx"]) for case in clean]).verdict == "nothing"
 
 
-def test_recordings_by_one_clock_say_so_but_for_its_own_deviation(
+def test_stops_by_one_clock_show_none_that_is_late(
     clean: list[Case], everything: Path, tmp_path: Path
 ) -> None:
     """Three sets: chance has no side, and a bias that one set hides shows in their mean."""

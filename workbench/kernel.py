@@ -7,6 +7,7 @@ may also be called from ordinary Python.
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,24 +27,26 @@ class _Law(CPUDispatcher):  # type: ignore[misc]
 
     A wrapper takes apart what it is given, some hundred arrays of an observer: it took longer to
     compile than the law, and most laws are called by others alone.
-
-    Attributes
-    ----------
-    wrapped : the function as Python calls it.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         bare = {"nopython": True, "no_cpython_wrapper": True, **options}
         super().__init__(function, targetoptions=bare)
-        _keep(self, function, "law")
-        self.wrapped = njit(**options)(function)
-        _keep(self.wrapped, function, "wrapped")
+        self._options = options
+        _keep_code(self, function, "law")
+
+    @cached_property
+    def wrapped(self) -> Any:
+        """The function as Python calls it."""
+        dispatcher = njit(**self._options)(self.py_func)
+        _keep_code(dispatcher, self.py_func, "wrapped")
+        return dispatcher
 
     def __call__(self, *given: Any) -> Any:
         return self.wrapped(*given)
 
 
-def _keep(dispatcher: Any, function: Callable[..., Any], form: str) -> None:
+def _keep_code(dispatcher: Any, function: Callable[..., Any], form: str) -> None:
     with suppress(RuntimeError):  # a function without a file is compiled in each process
         dispatcher._cache = CodeCache(function, form)
 

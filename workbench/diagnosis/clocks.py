@@ -48,8 +48,8 @@ def reference(system: System) -> str:
 
 def own_clocks(system: System) -> tuple[Effect, ...]:
     """A clock of each signal, against that of the reference, whatever the loggers."""
-    others = [name for name in system.signals if name != reference(system)]
-    return tuple(_clock(system, OWN, name, (name,)) for name in others)
+    first = reference(system)
+    return tuple(_clock(system, OWN, one, (one,)) for one in system.signals if one != first)
 
 
 def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
