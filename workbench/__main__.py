@@ -14,6 +14,7 @@ from workbench.commands.output import Output
 from workbench.commands.pdf import browser, print_page
 from workbench.confinement import confine
 from workbench.errors import FMUError, InputError, WorkerError
+from workbench.pool import preload
 from workbench.supervision import run_program, supervised
 
 _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(run_confined())"
@@ -57,6 +58,8 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         printing = getattr(options, "pdf", False)
         if printing:
             browser()  # one that is missing is told before the work
+        if getattr(options, "workers", 1) > 1:
+            preload(options.work)  # workers import while this process does
         done = import_module(options.work).run(options, output)
         if printing and done.page is not None:
             output.result(f"printed: {print_page(done.page)}")

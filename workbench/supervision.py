@@ -5,6 +5,7 @@ process beside it says so, ends what was started, and removes temporary files.
 """
 
 import ctypes
+import gc
 import os
 import signal
 import subprocess
@@ -97,6 +98,7 @@ def _worked(work: Callable[[], int], tell: int) -> int:
     with suppress(OSError, ValueError):  # whoever read it has gone
         sys.stdout.flush()
     os.write(tell, bytes([status & 0xFF]))
+    gc.freeze()  # all that is left goes with the process: a last search for garbage takes 0.2 s
     return status
 
 

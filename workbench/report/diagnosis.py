@@ -1,9 +1,9 @@
 """Files of a diagnosis: summary.json, data and figures, the page."""
 
 import json
-import signal
-from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import pandas as pd
 from workbench.diagnosis import Outcome, Residuals
 from workbench.diagnosis.best_estimate import bands, best_estimate
 from workbench.files import write_json, write_whole
+from workbench.pool import Pool
 from workbench.report.answers import diagnosed, with_answer
 from workbench.report.diagnosis_figures import (
     at_blocks,
@@ -44,28 +45,28 @@ def write_diagnosis(
     related : see `write_diagnosis_page`.
     """
     figures = recording_figures(outcome)
-    best = best_estimate(outcome, figures[0].name)
-    content = {
-        **outcome.to_dict(),
-        "smoothed": best and {"recording": best.case.name, "models": bands(best)},
-        "provenance": provenance,
-    }
-    summary = with_answer(diagnosed(content), content)
-    write_json(out / "summary.json", summary)
-    effects = [cause["effect"] for cause in summary["causes"]]
-    # Ctrl-C is this process's affair.
-    ignored = (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=ignored) as pool:
-        drawn = [pool.submit(draw_case, figure, _pictures(out, figure.name)) for figure in figures]
+    with Pool(workers, nullcontext, None) as pool:
+
+        def draw(drawing: Callable[..., None], *shown: Any, name: str) -> Future[None]:
+            return pool.submit(_drawn, drawing, shown, [out / f"{name}.png", out / f"{name}.svg"])
+
+        drawn = [draw(draw_case, figure, name=figure.name) for figure in figures]
+        best = best_estimate(outcome, figures[0].name)
+        content = {
+            **outcome.to_dict(),
+            "smoothed": best and {"recording": best.case.name, "models": bands(best)},
+            "provenance": provenance,
+        }
+        summary = with_answer(diagnosed(content), content)
+        write_json(out / "summary.json", summary)
         names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
+        effects = [cause["effect"] for cause in summary["causes"]]
         drawn += [
-            pool.submit(
-                draw_confusability, names, cosines, effects, _pictures(out, "confusability")
-            ),
-            pool.submit(draw_dependences, summary["dependences"], _pictures(out, "dependences")),
+            draw(draw_confusability, names, cosines, effects, name="confusability"),
+            draw(draw_dependences, summary["dependences"], name="dependences"),
         ]
         if summary["gain"] is not None:
-            drawn.append(pool.submit(draw_gain, summary["gain"], _pictures(out, "gain")))
+            drawn.append(draw(draw_gain, summary["gain"], name="gain"))
         for one in outcome.residuals:
             _write_recording(one, lasting_blocks(outcome.system), out / f"{one.name}.csv")
         _write_tables(summary, out)
@@ -85,8 +86,11 @@ def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) ->
     write_diagnosis_page(outcome.system, summary, figures, best, out, related)
 
 
-def _pictures(out: Path, name: str) -> list[Path]:
-    return [out / f"{name}.png", out / f"{name}.svg"]
+def _drawn(
+    _: None, drawing: Callable[..., None], shown: Sequence[Any], pictures: Sequence[Path]
+) -> None:
+    """Draw what is shown, in a worker."""
+    drawing(*shown, pictures)
 
 
 def _write_recording(one: Residuals, span: int, path: Path) -> None:
