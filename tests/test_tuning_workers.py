@@ -1,5 +1,6 @@
 """A search ends at the same gains with less work, other workers, after deaths and interruptions."""
 
+import asyncio
 import errno
 import json
 import os
@@ -284,6 +285,38 @@ def test_a_cluster_whose_workers_are_gone_says_so(
                 remote.submit(pid).result(timeout=120)
         finally:
             remote.close()
+
+
+def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    problem: Problem,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Dask hands over the answers of all clients of a process in one thread, which the end of the
+    interpreter waits for; a client may wait for ever there for a result that it knows is made."""
+    import distributed
+
+    from workbench.tuning.cluster import DaskPool
+
+    async def never(client: object, futures: object) -> None:
+        await asyncio.Event().wait()
+
+    address, process = scheduler
+    with worker(address):
+        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)
+        try:
+            monkeypatch.setattr(distributed.Client, "_gather", never)
+            owed = remote.submit(pid)
+            deadline = time.monotonic() + 60.0
+            while remote._tasks[owed].done.status != "finished" and time.monotonic() < deadline:
+                time.sleep(0.05)
+            process.kill()
+            with pytest.raises(NoWorkersError, match="does not answer"):
+                owed.result(timeout=120)
+        finally:
+            remote.close()
+    handing_over = distributed.Future._cb_executor
+    assert handing_over.submit(pid, None).result(timeout=30) == os.getpid()
 
 
 def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(

@@ -164,8 +164,8 @@ class DaskPool(Generic[State]):
         if done is not task.done:
             return  # another worker does it by now
         try:
-            error = done.exception()
-            result = done.result() if error is None else None
+            error = self._told(done.exception)
+            result = self._told(done.result) if error is None else None
         except CancelledError:
             return  # the scheduler was gone: the watch sends the task again, or tells that
         match error:
@@ -175,6 +175,17 @@ class DaskPool(Generic[State]):
                 self._settle(task, WorkerError(f"a task ended its workers ({error})"))
             case _:
                 self._settle(task, error)
+
+    def _told(self, ask: Callable[..., Any]) -> Any:
+        """What the cluster answers, as long as there may be an answer.
+
+        Of a scheduler that went away a client may wait for ever, in the one thread that hands over
+        the answers of all clients of a process, and that the interpreter's end waits for.
+        """
+        while not (self._lost or self._closed.is_set()):
+            with suppress(TimeoutError):
+                return ask(timeout=_ANSWER)
+        raise CancelledError
 
     def _settle(self, task: _Task, result: Any) -> None:
         """Answer a task, once, unless nobody waits for it any more."""
