@@ -109,18 +109,13 @@ class _File:
 
 
 class CodeCache(caching.FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function in our folder; numba's own setting is left to the user.
-
-    Parameters
-    ----------
-    form : in which the function is compiled, of several.
-    """
+    """numba's cache of a function in our folder; numba's own setting is left to the user."""
 
     _impl_class = _CodeCache
 
-    def __init__(self, function: Any, form: str) -> None:
+    def __init__(self, function: Any) -> None:
         super().__init__(function)
         stamp = self._impl.locator.get_source_stamp()
         state = f"{numba.__version__} {llvmlite.__version__} {stamp}"
-        path = Path(self._cache_path, f"{self._impl.filename_base}.{form}.code")
+        path = Path(self._cache_path, f"{self._impl.filename_base}.code")
         self._cache_file = _File(path, state)

@@ -20,10 +20,11 @@ from numba.extending import intrinsic
 from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
+from workbench.linking import PartCompiler, WholeCompiler
 
 
 class _Law(CPUDispatcher):  # type: ignore[misc]
-    """A function that compiled code calls as it is, and Python by way of a wrapper.
+    """A function that compiled code takes up, and Python calls by way of a wrapper.
 
     A wrapper takes apart what it is given, some hundred arrays of an observer: it took longer to
     compile than the law, and most laws are called by others alone.
@@ -31,24 +32,19 @@ class _Law(CPUDispatcher):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         bare = {"nopython": True, "no_cpython_wrapper": True, **options}
-        super().__init__(function, targetoptions=bare)
+        super().__init__(function, targetoptions=bare, pipeline_class=PartCompiler)
         self._options = options
-        _keep_code(self, function, "law")
 
     @cached_property
     def wrapped(self) -> Any:
-        """The function as Python calls it."""
-        dispatcher = njit(**self._options)(self.py_func)
-        _keep_code(dispatcher, self.py_func, "wrapped")
+        """The function as Python calls it; its code is kept between runs."""
+        dispatcher = njit(**self._options, pipeline_class=WholeCompiler)(self.py_func)
+        with suppress(RuntimeError):  # a function without a file is compiled in each process
+            dispatcher._cache = CodeCache(self.py_func)
         return dispatcher
 
     def __call__(self, *given: Any) -> Any:
         return self.wrapped(*given)
-
-
-def _keep_code(dispatcher: Any, function: Callable[..., Any], form: str) -> None:
-    with suppress(RuntimeError):  # a function without a file is compiled in each process
-        dispatcher._cache = CodeCache(function, form)
 
 
 def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
