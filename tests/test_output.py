@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -121,6 +121,14 @@ def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> N
         (tmp_path / name).write_text("")
     with claimed(tmp_path):
         assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.part", "other"]
+
+
+def test_the_rest_of_a_file_whose_worker_was_ended_is_removed(tmp_path: Path) -> None:
+    """As SIGTERM does while workers draw."""
+    with suppress(SystemExit), claimed(tmp_path):
+        (tmp_path / "figure.png.123.part").write_text("")
+        raise SystemExit(143)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:

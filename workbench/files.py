@@ -27,7 +27,8 @@ _PART = re.compile(r".*\.[0-9]+\.part")
 def claimed(folder: Path) -> Iterator[None]:
     """A folder for results that no other run writes to, proven before the work begins.
 
-    It is made as needed. What a killed run left of a half-written file is removed.
+    It is made as needed. What a killed run, or a worker that is ended, left of a half-written file
+    is removed.
 
     Raises
     ------
@@ -40,11 +41,19 @@ def claimed(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
         with _told(folder):
-            for left in folder.iterdir():
-                if _PART.fullmatch(left.name):
-                    left.unlink()
+            _remove_parts(folder)
             _prove_room(folder)
-        yield
+        try:
+            yield
+        finally:
+            with suppress(OSError):  # a folder that has gone
+                _remove_parts(folder)
+
+
+def _remove_parts(folder: Path) -> None:
+    for left in folder.iterdir():
+        if _PART.fullmatch(left.name):
+            left.unlink()
 
 
 @contextmanager
