@@ -80,7 +80,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     Raises
     ------
     InputError
-        If there are no two columns of samples.
+        If there are no two columns of samples, or their names do not reach as far as they do.
     """
     data = [i for i, row in enumerate(rows) if _is_data(row)]
     width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
@@ -97,8 +97,34 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     names, units, used = _header(rows[:first], width)
     head = tuple(" ".join(filter(None, row)) for row in rows[: first - used])
     kept = [i for i in samples if i >= first]
-    return Cells(
-        [list(rows[i][:width]) for i in kept], [lines[i] for i in kept], head, names, units
+    found = [list(rows[i][:width]) for i in kept]
+    if used:
+        _refuse_narrow(names, units, found, f"{where}, above line {lines[first]}")
+    else:
+        names = [f"column {i + 1}" for i in range(width)]
+    filled = (tuple((row + [""] * width)[:width]) for row in (names, units))
+    return Cells(found, [lines[i] for i in kept], head, *filled)
+
+
+def _refuse_narrow(
+    names: Sequence[str], units: Sequence[str], samples: Sequence[Sequence[str]], where: str
+) -> None:
+    """Refuse a header that does not reach as far as the samples: which name is whose is not known.
+
+    R writes row numbers without a name; numbers with decimal commas between commas are two cells.
+    """
+    named = len(_trimmed(names))
+    held = max(len(_trimmed(row)) for row in samples)
+    if named >= held and (not units or len(units) >= named):
+        return
+    raise InputError(
+        where=where,
+        found=f"{named} names over {held} columns of samples"
+        if named < held
+        else f"{len(units)} units below {named} names",
+        expected="as many cells in each row, so that each column has its own name and unit",
+        remedy="name every column, that of row numbers, too; between commas, write decimal points "
+        "or put numbers into quotation marks",
     )
 
 
@@ -119,10 +145,8 @@ def _is_data(row: Sequence[str]) -> bool:
     return count >= min(2, max(1, len(row) - 1)) and 3 * count > len(held)
 
 
-def _header(
-    above: Sequence[Sequence[str]], width: int
-) -> tuple[tuple[str, ...], tuple[str, ...], int]:
-    """Names and units of the columns, and how many rows above the samples these are."""
+def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str], int]:
+    """Names and units as they stand above the samples, and how many rows these and others are."""
     rows: list[list[str]] = []
     used = 0
     for row in reversed(above):
@@ -133,15 +157,15 @@ def _header(
         if len(_trimmed(cells)) > width or len(_trimmed(cells)) < max(2, width // 2):
             used -= 1
             break
-        rows.insert(0, (cells + [""] * width)[:width])
+        rows.insert(0, cells)
         if len(rows) == 3:
             break
     if not rows:
-        return tuple(f"column {i + 1}" for i in range(width)), ("",) * width, 0
+        return [], [], 0
     at = next((i for i in range(1, len(rows)) if _are_units(rows[i])), None)
-    chosen = rows[-1] if at is None else rows[at - 1]
-    units = [""] * width if at is None else [spelled(cell) for cell in rows[at]]
-    return tuple(chosen), tuple(units), used
+    if at is None:
+        return rows[-1], [], used
+    return rows[at - 1], [spelled(cell) for cell in rows[at]], used
 
 
 def _are_units(cells: Sequence[str]) -> bool:

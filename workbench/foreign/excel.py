@@ -37,7 +37,7 @@ def read(path: Path, raw: bytes) -> Contents:
         except InputError as error:
             refusal = error
             if filled:
-                notes.append(f"sheet '{title}' holds no table of samples")
+                notes.append(f"sheet '{title}' was left out: {error.found}")
             continue
         groups.append(group)
         notes += [f"sheet '{title}': {note}" for note in own]
