@@ -1,11 +1,31 @@
 """Recorders' files that can be read in two ways: no number of them is taken in silence."""
 
+import datetime
 from pathlib import Path
 
+import numpy as np
+import openpyxl
 import pytest
+from nptdms import ChannelObject, TdmsWriter
+from numpy.testing import assert_allclose
+from scipy.io import savemat
 
 from workbench.errors import InputError
 from workbench.foreign import read_foreign
+from workbench.mapping import NamedChannel, propose
+from workbench.mapping.clock import Clock
+from workbench.system import System
+from workbench.systems import load_system
+from workbench.template import write_system
+
+
+@pytest.fixture(scope="module")
+def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A tank with an inflow and a level, sampled each 0.5 s."""
+    folder = tmp_path_factory.mktemp("systems") / "tank"
+    write_system(folder)
+    return load_system(folder)
+
 
 # --- names above samples ---
 
@@ -37,3 +57,60 @@ def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
     rows = [f"{i};{i}.5;;" for i in range(60)]
     (group,) = read_foreign(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert [one.name for one in group.channels] == ["time", "h"]
+
+
+# --- times ---
+
+
+def clock(path: Path, system: System, **columns: NamedChannel) -> Clock:
+    """The one clock of a file."""
+    (found,) = propose([read_foreign(path)], system, columns).clocks.values()
+    return found
+
+
+MINUTE = np.arange(0.0, 60.0, 0.5)  # s
+
+
+def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path: Path, tank: System) -> None:
+    said = {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE, "time_unit": "ms"}
+    savemat(tmp_path / "a.mat", {"h": said})
+    assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE, rtol=1e-12)
+
+
+def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path: Path, tank: System) -> None:
+    savemat(tmp_path / "a.mat", {"h": {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE}})
+    found = clock(tmp_path / "a.mat", tank)
+    assert (found.unit, found.certain) == ("ms", False)
+    said = clock(tmp_path / "a.mat", tank, time=NamedChannel("time", "ms"))
+    assert_allclose(said.times, MINUTE, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "step"), [("ms", 500.0), ("s", 0.5), ("", 0.5)])
+def test_steps_of_a_waveform_are_in_its_own_unit(
+    tmp_path: Path, tank: System, unit: str, step: float
+) -> None:
+    stated = {"unit_string": "mm", "wf_increment": step, "wf_start_offset": 2 * step}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        written = ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})
+        file.write_segment([written])
+    assert_allclose(clock(tmp_path / "a.tdms", tank).times, 1.0 + MINUTE, rtol=1e-12)
+
+
+def test_a_waveform_over_no_time_has_no_times(tmp_path: Path, tank: System) -> None:
+    stated = {"unit_string": "mm", "wf_increment": 0.5, "wf_xunit_string": "Hz"}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment([ChannelObject("G", "h", MINUTE, stated)])
+    with pytest.raises(InputError, match="found no time"):
+        clock(tmp_path / "a.tdms", tank)
+
+
+def test_durations_of_a_workbook_count_in_no_unit_of_their_column(
+    tmp_path: Path, tank: System
+) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(["Zeit [min]", "h [mm]"])
+    for t in MINUTE:
+        book.active.append([datetime.timedelta(hours=23.995, seconds=t), t])
+    book.save(tmp_path / "a.xlsx")
+    for named in ({}, {"time": NamedChannel("Zeit", "min")}):
+        assert_allclose(clock(tmp_path / "a.xlsx", tank, **named).times, MINUTE, atol=1e-9)

@@ -11,6 +11,7 @@ from workbench.errors import InputError
 from workbench.foreign.cells import find_table, read_group
 from workbench.foreign.contents import Contents, Group
 
+_HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
 
 
@@ -66,8 +67,8 @@ def _text(cell: Any) -> str:
             return cell.isoformat(sep=" ")
         case time():
             return cell.isoformat()
-        case timedelta():
-            return repr(cell.total_seconds())
+        case timedelta():  # a stamp, in whatever unit its column is said to be
+            return f"{cell // _HOUR}:{datetime.min + cell % _HOUR:%M:%S.%f}"
         case date():
             return cell.isoformat()
     return str(cell)

@@ -84,7 +84,9 @@ def read_clock(
 
 
 def _named(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
-    unit = named.unit or channel.unit or _unstated(channel.values, system)
+    # Stamps are in seconds, whatever the name of their column says.
+    own = channel.unit if channel.stamp else named.unit or channel.unit
+    unit = own or _unstated(channel.values, system)
     found = conversion(unit, "s") if unit else None
     if found is None:
         raise InputError(
