@@ -114,3 +114,51 @@ def test_durations_of_a_workbook_count_in_no_unit_of_their_column(
     book.save(tmp_path / "a.xlsx")
     for named in ({}, {"time": NamedChannel("Zeit", "min")}):
         assert_allclose(clock(tmp_path / "a.xlsx", tank, **named).times, MINUTE, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "rate"),
+    [
+        (["Filterfrequenz: 50 Hz", "Abtastrate: 2 Hz"], 2.0),
+        (["Abtastrate: 2 Hz; Grenzfrequenz: 50 Hz"], 2.0),
+        (["Carrier frequency: 4.8 kHz", "dt = 5e-1 s"], 2.0),
+        (["Sampling interval: 500 ms", "Messrate: 2 Hz"], 2.0),
+    ],
+)
+def test_a_rate_of_something_else_is_none_of_the_samples(
+    tmp_path: Path, tank: System, head: list[str], rate: float
+) -> None:
+    path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
+    assert_allclose(clock(path, tank).times, np.arange(60) / rate)
+
+
+@pytest.mark.parametrize(
+    ("head", "match"),
+    [
+        (["Filterfrequenz: 50 Hz"], "no time among"),
+        (["Messzeit: 30 s"], "no time among"),
+        (["Sample rate: 1,000 Hz"], "'1,000', which can be read with decimal commas or with"),
+        (["Sample rate: 2.000 Hz"], "'2.000', which can be read with decimal points or with"),
+        (["Abtastrate: 1 000 Hz"], "'1 000' in the preamble, which may be one number or two"),
+        (["Abtastrate: 2 Hz", "Messrate: 5 Hz"], "'Abtastrate: 2 Hz' and 'Messrate: 5 Hz'"),
+    ],
+)
+def test_a_rate_in_doubt_is_refused_until_it_is_said(
+    tmp_path: Path, tank: System, head: list[str], match: str
+) -> None:
+    path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
+    with pytest.raises(InputError, match=f"{match}.*--sample-rate '200 Hz'"):
+        clock(path, tank)
+    (said,) = propose([read_foreign(path)], tank, {}, step=0.5).clocks.values()
+    assert_allclose(said.times, MINUTE[:60])
+
+
+@pytest.mark.parametrize("said", [None, 0.5])
+def test_one_rate_is_not_that_of_vectors_of_two_lengths(
+    tmp_path: Path, tank: System, said: float | None
+) -> None:
+    savemat(tmp_path / "a.mat", {"fs": 2.0, "h_mm": MINUTE, "inflow": MINUTE[::4], "gains": [1, 2]})
+    columns = {"inflow": NamedChannel("inflow", "l/s")}
+    with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
+        propose([read_foreign(tmp_path / "a.mat")], tank, columns, said)
+    assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)

@@ -29,6 +29,7 @@ class Clock:
     start : of their zero [s since 1970], NaN where that is not known.
     unit : that the channel was read in.
     reason : why these are the times, for people; `certain`: nothing was concluded.
+    counted : whether samples are counted at a rate, and have no times of their own.
     """
 
     channel: str
@@ -37,6 +38,7 @@ class Clock:
     unit: str
     reason: str
     certain: bool
+    counted: bool = False
 
 
 def read_clock(
@@ -56,7 +58,7 @@ def read_clock(
     """
     count = np.arange(group.channels[0].values.size, dtype=np.float64)
     if step is not None:
-        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True)
+        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
     if named is not None:
         found = next((one for one in group.channels if one.name == named.channel), None)
         if found is not None:
@@ -70,9 +72,17 @@ def read_clock(
     for clock in sorted(clocks, key=lambda one: not one.certain):
         if _increases(clock.times):
             return clock
+    if group.step_doubt:
+        raise InputError(
+            where=where,
+            found=group.step_doubt,
+            expected="one time between samples",
+            remedy="say it, --sample-rate '200 Hz'",
+        )
     if math.isfinite(group.step):
         times = count * group.step
-        return Clock("", times, math.nan, "s", f"every {group.step:g} s, as the file says", False)
+        said = f"every {group.step:g} s, as the file says"
+        return Clock("", times, math.nan, "s", said, False, True)
     if clocks:
         return _going_on(clocks[0], where)
     raise InputError(

@@ -165,6 +165,7 @@ def propose(
             group = files[one.file].groups[one.group]
             at = str(files[one.file].path) + (f", '{group.name}'" if group.name else "")
             clocks[one.file, one.group] = read_clock(group, given.get(TIME), step, system, at)
+    _refuse_one_rate(clocks, files)
     taken = {id(one.channel) for one in assigned.values()}
     timed = {clock.channel for clock in clocks.values()}
     left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
@@ -255,6 +256,22 @@ def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
                 remedy=f"correct one of the two, --column '{signal}=NAME'",
             )
         taken[id(one.channel)] = signal
+
+
+def _refuse_one_rate(
+    clocks: Mapping[tuple[int, int], Clock], files: Sequence[RecordedFile]
+) -> None:
+    """Refuse one rate for channels of one file that have unlike numbers of samples."""
+    for index, file in enumerate(files):
+        own = [clock for (i, _), clock in clocks.items() if i == index and clock.counted]
+        sizes = dict.fromkeys(str(clock.times.size) for clock in own)
+        if len(sizes) > 1:
+            raise InputError(
+                where=str(file.path),
+                found=f"one rate for channels of {' and '.join(sizes)} samples",
+                expected="channels that were sampled together, or times of their own",
+                remedy="export each with its times, or name channels of one length by --column",
+            )
 
 
 def _unit_reason(reason: str, unit: str, concluded: bool) -> str:
