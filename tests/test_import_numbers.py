@@ -162,3 +162,28 @@ def test_one_rate_is_not_that_of_vectors_of_two_lengths(
     with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
         propose([read_foreign(tmp_path / "a.mat")], tank, columns, said)
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
+
+
+# --- names, units ---
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("Füllstandsollwert", "Sollfüllstand", "Füllstand-Soll", "FüllstandVorgabe"),
+        *("h_Anforderung", "h_sp", "h_req", "h dmd", "level_setpoint", "levelDemand"),
+    ],
+)
+def test_a_value_that_is_asked_for_is_no_measurement(
+    tmp_path: Path, tank: System, name: str
+) -> None:
+    rows = [f"{i};1.5;{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
+    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow"}
+
+
+@pytest.mark.parametrize("name", ["Rollenmessung h", "Radsatz-Rolle h", "h console"])
+def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, name: str) -> None:
+    rows = [f"{i};1.5;{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
+    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow", "h"}
