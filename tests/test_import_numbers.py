@@ -164,7 +164,41 @@ def test_one_rate_is_not_that_of_vectors_of_two_lengths(
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
 
 
+def test_a_rate_that_is_stated_goes_before_a_unit_that_is_concluded(
+    tmp_path: Path, tank: System
+) -> None:
+    """In ms the count would be sampled as is usual."""
+    rows = [f"{500 * i};{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", ["Abtastrate: 2 Hz", "Zeit;h [mm]", *rows])
+    assert_allclose(clock(path, tank).times, MINUTE[:60])
+
+
+@pytest.mark.parametrize("named", [{}, {"time": NamedChannel("Zeit")}], ids=["found", "named"])
+def test_times_that_may_be_seconds_or_minutes_are_asked_for(
+    tmp_path: Path, tank: System, named: dict[str, NamedChannel]
+) -> None:
+    rows = [f"{i * 2 / 60:.6f};{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", ["Zeit;h [mm]", *rows])
+    with pytest.raises(InputError, match=r"without a unit.*--column 'time=\w+ \[UNIT\]'"):
+        clock(path, tank, **named)
+    said = clock(path, tank, time=NamedChannel("Zeit", "min"))
+    assert_allclose(said.times, 2.0 * np.arange(60), atol=1e-4)
+
+
 # --- names, units ---
+
+
+@pytest.mark.parametrize("said", [{}, {"inflow": NamedChannel("inflow")}], ids=["found", "named"])
+def test_a_unit_that_nobody_says_is_to_be_confirmed(
+    tmp_path: Path, tank: System, said: dict[str, NamedChannel]
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [s];inflow;h [m]", *(f"{i};5;1" for i in range(60))])
+    proposal = propose([read_foreign(path)], tank, said)
+    assert not proposal.certain
+    (doubt,) = proposal.doubts
+    assert doubt.endswith("--column 'inflow=inflow [l/s]' confirms [l/s]")
+    confirmed = {"inflow": NamedChannel("inflow", "l/s")}
+    assert propose([read_foreign(path)], tank, confirmed).certain
 
 
 @pytest.mark.parametrize(

@@ -116,12 +116,7 @@ def _confirmed(
     if proposal.certain:
         return proposal, conditions
     if yes or output.json:  # a program is asked nothing
-        alone = [
-            f"{name}: nothing but its unit speaks for it, --column '{name}={one.label}' confirms it"
-            for name, one in proposal.assigned.items()
-            if one.alone
-        ]
-        return _complete(files, proposal, alone), conditions
+        return _complete(files, proposal, proposal.doubts), conditions
     columns = dict(known.columns)
     for answer in _answers(files, proposal):
         if answer.partition("=")[0].strip() in (TIME, *system.signals):

@@ -8,7 +8,8 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.foreign import RecordedFile
-from workbench.mapping.proposal import Assigned, ProposedMapping
+from workbench.mapping.matching import Assigned
+from workbench.mapping.proposal import ProposedMapping
 from workbench.recording import Vector
 from workbench.system import System
 from workbench.system_parts import Signal

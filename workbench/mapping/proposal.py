@@ -1,72 +1,17 @@
-"""Channels are proposed for signals: by name, by unit, and by what values are plausible."""
+"""Channels are proposed for signals, as the user names them, then as names and units tell."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from workbench.errors import InputError, closest
-from workbench.foreign import FileChannel, Group, RecordedFile
+from workbench.foreign import RecordedFile
 from workbench.mapping.clock import Clock, read_clock
-from workbench.mapping.names import (
-    EXACT,
-    TIME,
-    WITHIN,
-    WORDS,
-    NamedChannel,
-    alike,
-    is_asked,
-    listed,
-)
-from workbench.mapping.units import conversion_to, fitting_units, unit_in_name
-from workbench.recording import Vector
+from workbench.mapping.matching import Assigned, Place, by_name, by_unit, unconfirmed, unit_reason
+from workbench.mapping.names import TIME, NamedChannel, listed
+from workbench.mapping.units import conversion_to, fitting_units
 from workbench.system import System
 from workbench.system_parts import Signal
-
-
-@dataclass(frozen=True, eq=False)
-class Assigned:
-    """A channel that is taken for a signal.
-
-    Attributes
-    ----------
-    file : it stands in, counted from 0.
-    group : in that file, counted from 0.
-    label : the channel's name, with its group where several have it.
-    unit : that its values are in.
-    factor, zero : SI value is `factor*value + zero`.
-    formula : what the recorder has in place of the signal; empty: the signal itself.
-    reason : why this one, for people.
-    certain : whether name and unit are the system's own, so that nobody need be asked.
-    concluded : whether the file does not say the unit.
-    alone : whether nothing but its unit speaks for it.
-    """
-
-    file: int
-    group: int
-    channel: FileChannel
-    label: str
-    unit: str
-    factor: float
-    zero: float
-    formula: str
-    reason: str
-    certain: bool
-    concluded: bool = False
-    alone: bool = False
-
-    @property
-    def values(self) -> Vector:
-        """(n,) SI, not finite in gaps."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-            return self.factor * self.channel.values + self.zero
-
-    @property
-    def named(self) -> NamedChannel:
-        """As it is stored; what the file says of the unit is left to it."""
-        unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
-        return NamedChannel(self.label, unit, self.factor < 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +38,15 @@ class ProposedMapping:
         return not self.problems and own and all(one.certain for one in self.clocks.values())
 
     @property
+    def doubts(self) -> list[str]:
+        """What somebody must confirm, in words: nobody has said it, nor does a file."""
+        found = [f"{name}: {one.doubt}" for name, one in self.assigned.items() if one.doubt]
+        times = {one.channel: one.unit for one in self.clocks.values() if not one.certain}
+        return found + [
+            f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
+        ]
+
+    @property
     def named(self) -> dict[str, NamedChannel]:
         """As it is stored."""
         found = {name: one.named for name, one in self.assigned.items()}
@@ -102,15 +56,6 @@ class ProposedMapping:
                     TIME, NamedChannel(clock.channel, "" if clock.certain else clock.unit)
                 )
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Place:
-    file: int
-    group: int
-    holder: Group
-    channel: FileChannel
-    label: str
 
 
 def propose(
@@ -152,8 +97,8 @@ def propose(
         and all(one.channel is not other.channel for other in assigned.values())
     ]
     doubts: dict[str, str] = {}
-    _by_name(assigned, doubts, free, system)
-    _by_unit(assigned, doubts, free, system)
+    by_name(assigned, doubts, free, system)
+    by_unit(assigned, doubts, free, system)
     problems = tuple(
         f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
         for one in (*system.inputs, *system.outputs)
@@ -173,7 +118,7 @@ def propose(
     return ProposedMapping(assigned, clocks, shown, problems)
 
 
-def _places(files: Sequence[RecordedFile]) -> list[_Place]:
+def _places(files: Sequence[RecordedFile]) -> list[Place]:
     """All channels, each with a name that no other has, if groups have names."""
     found = [
         (i, j, group, channel)
@@ -183,12 +128,12 @@ def _places(files: Sequence[RecordedFile]) -> list[_Place]:
     ]
     counts = Counter(channel.name for *_, channel in found)
     return [
-        _Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
+        Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
         for i, j, group, one in found
     ]
 
 
-def _find(one: NamedChannel, signal: str, places: Sequence[_Place], where: str) -> _Place:
+def _find(one: NamedChannel, signal: str, places: Sequence[Place], where: str) -> Place:
     """The place that a user names."""
     name = one.channel
     found = [place for place in places if place.channel.name == name]
@@ -209,15 +154,15 @@ def _find(one: NamedChannel, signal: str, places: Sequence[_Place], where: str) 
 
 
 def _as_named(
-    one: NamedChannel, signal: Signal, places: Sequence[_Place], system: System, where: str
+    one: NamedChannel, signal: Signal, places: Sequence[Place], system: System, where: str
 ) -> Assigned:
     """The channel that a user names for a signal."""
     place = _find(one, signal.name, places, where)
-    unit = one.unit or place.channel.unit
-    concluded = not unit
-    if not unit:
+    unit = stated = one.unit or place.channel.unit
+    if not stated:
         fitting = fitting_units(place.channel, signal, system)
         unit = fitting[0] if len(fitting) == 1 else ""
+    concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system) if unit else None
     if way is None:
         raise InputError(
@@ -238,9 +183,10 @@ def _as_named(
         turn * scale.factor,
         turn * scale.zero,
         formula,
-        _unit_reason("named", unit, concluded),
-        certain=True,
+        unit_reason("named", unit, concluded),
+        certain=not concluded,
         concluded=concluded or bool(one.unit),
+        doubt=unconfirmed(signal.name, place.label, unit) if concluded else "",
     )
 
 
@@ -272,109 +218,3 @@ def _refuse_one_rate(
                 expected="channels that were sampled together, or times of their own",
                 remedy="export each with its times, or name channels of one length by --column",
             )
-
-
-def _unit_reason(reason: str, unit: str, concluded: bool) -> str:
-    return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
-
-
-def _candidate(
-    place: _Place, signal: Signal, system: System, likeness: int
-) -> tuple[Assigned | None, str]:
-    """A channel as a signal, or None and why it cannot be."""
-    channel = place.channel
-    unit = channel.unit or unit_in_name(channel.name, signal, system)
-    concluded = not unit
-    if concluded:
-        fitting = fitting_units(channel, signal, system)
-        if len(fitting) != 1:
-            fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
-            return None, f"'{channel.name}' has no unit and is plausible {fits}"
-        unit = fitting[0]
-    way = conversion_to(unit, signal, system)
-    if way is None:
-        return None, f"'{channel.name}' is in [{unit}]"
-    scale, formula = way
-    values = scale.factor * channel.values + scale.zero
-    low, high = signal.possible
-    if not np.isfinite(values).any():
-        return None, f"'{channel.name}' holds no numbers"
-    if np.nanmin(values) < low or np.nanmax(values) > high:
-        return None, f"'{channel.name}' in [{unit}] goes beyond what is possible"
-    reason = "name and unit" if likeness else "the only one of its unit"
-    return Assigned(
-        place.file,
-        place.group,
-        channel,
-        place.label,
-        unit,
-        scale.factor,
-        scale.zero,
-        formula,
-        _unit_reason(reason, unit, concluded),
-        certain=likeness == EXACT and channel.name == signal.name and bool(channel.unit),
-        concluded=concluded,
-        alone=not likeness,
-    ), ""
-
-
-def _by_name(
-    assigned: dict[str, Assigned],
-    doubts: dict[str, str],
-    places: Sequence[_Place],
-    system: System,
-) -> None:
-    """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
-    found: dict[int, list[tuple[Signal, Assigned]]] = {EXACT: [], WORDS: [], WITHIN: []}
-    for signal in system.signals.values():
-        for place in places:
-            likeness = alike(place.channel.name, place.channel.about, signal)
-            if likeness and is_asked(place.channel.name) and not signal.exact:
-                doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
-            elif likeness:
-                one, doubt = _candidate(place, signal, system, likeness)
-                if one is not None:
-                    found[likeness].append((signal, one))
-                else:
-                    doubts[signal.name] = doubt
-    settled = set(assigned)
-    for level in found.values():
-        taken = {id(one.channel) for one in assigned.values()}
-        left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
-        for signal, one in left:
-            rivals = [o.label for s, o in left if s is signal]
-            claims = [s.name for s, o in left if o.channel is one.channel]
-            settled.add(signal.name)
-            if len(rivals) == len(claims) == 1:
-                assigned[signal.name] = one
-            elif len(rivals) > 1:
-                doubts[signal.name] = f"it may be {' or '.join(map(repr, rivals))}"
-            else:
-                doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
-
-
-def _by_unit(
-    assigned: dict[str, Assigned],
-    doubts: Mapping[str, str],
-    places: Sequence[_Place],
-    system: System,
-) -> None:
-    """Assign the only channel that has the unit of the only signal that lacks one."""
-    taken = {id(one.channel) for one in assigned.values()}
-    lacking = [
-        one
-        for one in (*system.inputs, *system.outputs)
-        if one.name not in assigned and one.name not in doubts
-    ]
-    fitting = [
-        (signal, one)
-        for signal in lacking
-        for place in places
-        if id(place.channel) not in taken
-        and place.channel.unit
-        and not is_asked(place.channel.name)
-        and (one := _candidate(place, signal, system, 0)[0]) is not None
-    ]
-    for signal, one in fitting:
-        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1:
-            assigned[signal.name] = one
