@@ -10,6 +10,7 @@ from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from scipy.io import savemat
 
+from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.foreign import read_foreign
 from workbench.mapping import NamedChannel, propose
@@ -221,3 +222,61 @@ def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, na
     rows = [f"{i};1.5;{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
     assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow", "h"}
+
+
+ROWS = [f"{i};5;{i}" for i in range(60)]
+
+
+def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(
+    tmp_path: Path, tank: System
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h [Zoll]", *ROWS])
+    (problem,) = propose([read_foreign(path)], tank, {}).problems
+    assert problem == "h: 'h' is in [Zoll], a unit that is not known"
+    match = r"\[Zoll\], a unit that is not known.*convert the values, or name one .*'h=h \[UNIT\]'"
+    with pytest.raises(InputError, match=match):
+        propose([read_foreign(path)], tank, {"h": NamedChannel("h")})
+
+
+def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
+    tmp_path: Path, tank: System, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [ms];inflow [l/s];h [Zoll]", *ROWS])
+    command = [
+        "import",
+        str(path),
+        "--system",
+        str(tank.source.parent),
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    columns = ("time=t [s]", "h=h [mm]", "inflow=inflow [l/s]")
+    assert main([*command, *(part for one in columns for part in ("--column", one))]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "as named" in line]
+    assert [line.partition("channel ")[2] for line in told] == [
+        "'h': taken in [mm], as named, and the file states [Zoll]",
+        "'t': taken in [s], as named, and the file states [ms]",
+    ]
+
+
+def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
+    tmp_path: Path, system: System
+) -> None:
+    """A recording may be without the creep force, but its channel is seen."""
+    names = "t [s];Bremsdruck [bar];Antriebsmoment [kNm];v_Rad [m/s];v_Rolle [m/s]"
+    rows = [f"{0.01 * i:.2f};1.5;1.5;20.5;20.5;1.5" for i in range(60)]
+    told = {}
+    for force in ("F_long [kN]", "Längskraft [kp2]", "Temperatur [degC]"):
+        path = table(tmp_path / "a.csv", [f"{names};{force}", *rows])
+        proposal = propose([read_foreign(path)], system, {})
+        assert not proposal.problems
+        assert "Fx" not in proposal.assigned
+        told[force] = proposal.unmatched
+    assert told == {
+        "F_long [kN]": (
+            "Fx: it may be 'F_long'; nothing but its unit speaks for it, "
+            "--column 'Fx=F_long' confirms it",
+        ),
+        "Längskraft [kp2]": ("Fx: 'Längskraft' is in [kp2], a unit that is not known",),
+        "Temperatur [degC]": (),
+    }

@@ -187,7 +187,7 @@ def _shown(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Sys
             f"  {name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} {signal.shown} "
             f"({one.reason})"
         )
-    lines += [f"  ? {problem}" for problem in proposal.problems]
+    lines += [f"  ? {one}" for one in (*proposal.problems, *proposal.unmatched)]
     if proposal.left:
         lines.append(f"  left out   {listed(proposal.left)}")
     return "\n".join(lines)

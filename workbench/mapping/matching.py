@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.foreign import FileChannel, Group
+from workbench.foreign.spelling import is_unit
 from workbench.mapping.names import EXACT, WITHIN, WORDS, NamedChannel, alike, is_asked
 from workbench.mapping.units import conversion_to, fitting_units, unit_in_name
 from workbench.recording import Vector
@@ -78,6 +79,22 @@ def unit_reason(reason: str, unit: str, concluded: bool) -> str:
     return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
 
 
+def match(
+    named: Mapping[str, Assigned], places: Sequence[Place], system: System
+) -> tuple[dict[str, Assigned], dict[str, str]]:
+    """Channels by signal, those that are named and those that names and units tell; and doubts.
+
+    Doubts say why a signal has no channel. One that a recording may be without is not assigned by
+    its unit alone: its doubt says what it may be.
+    """
+    assigned, doubts = dict(named), dict[str, str]()
+    _by_name(assigned, doubts, places, system)
+    assigned |= _by_unit((*system.inputs, *system.outputs), assigned, doubts, places, system)
+    for name, one in _by_unit(system.judged, assigned, doubts, places, system).items():
+        doubts[name] = f"it may be '{one.label}'; {one.doubt}"
+    return assigned, doubts
+
+
 def _candidate(
     place: Place, signal: Signal, system: System, likeness: int
 ) -> tuple[Assigned | None, str]:
@@ -93,7 +110,8 @@ def _candidate(
     concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system)
     if way is None:
-        return None, f"'{channel.name}' is in [{unit}]"
+        known = "" if is_unit(unit) else ", a unit that is not known"
+        return None, f"'{channel.name}' is in [{unit}]{known}"
     scale, formula = way
     values = scale.factor * channel.values + scale.zero
     low, high = signal.possible
@@ -124,7 +142,7 @@ def _candidate(
     ), ""
 
 
-def by_name(
+def _by_name(
     assigned: dict[str, Assigned],
     doubts: dict[str, str],
     places: Sequence[Place],
@@ -159,28 +177,27 @@ def by_name(
                 doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
 
 
-def by_unit(
-    assigned: dict[str, Assigned],
+def _by_unit(
+    signals: Sequence[Signal],
+    assigned: Mapping[str, Assigned],
     doubts: Mapping[str, str],
     places: Sequence[Place],
     system: System,
-) -> None:
-    """Assign the only channel that has the unit of the only signal that lacks one."""
+) -> dict[str, Assigned]:
+    """The only channel that has its unit, for each signal that alone lacks one of it."""
     taken = {id(one.channel) for one in assigned.values()}
-    lacking = [
-        one
-        for one in (*system.inputs, *system.outputs)
-        if one.name not in assigned and one.name not in doubts
-    ]
     fitting = [
         (signal, one)
-        for signal in lacking
+        for signal in signals
+        if signal.name not in assigned and signal.name not in doubts
         for place in places
         if id(place.channel) not in taken
         and place.channel.unit
         and not is_asked(place.channel.name)
         and (one := _candidate(place, signal, system, 0)[0]) is not None
     ]
-    for signal, one in fitting:
-        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1:
-            assigned[signal.name] = one
+    return {
+        signal.name: one
+        for signal, one in fitting
+        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1
+    }

@@ -1,13 +1,14 @@
 """Channels are proposed for signals, as the user names them, then as names and units tell."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from workbench.errors import InputError, closest
 from workbench.foreign import RecordedFile
+from workbench.foreign.spelling import conversion, is_unit
 from workbench.mapping.clock import Clock, read_clock
-from workbench.mapping.matching import Assigned, Place, by_name, by_unit, unconfirmed, unit_reason
+from workbench.mapping.matching import Assigned, Place, match, unconfirmed, unit_reason
 from workbench.mapping.names import TIME, NamedChannel, listed
 from workbench.mapping.units import conversion_to, fitting_units
 from workbench.system import System
@@ -24,12 +25,16 @@ class ProposedMapping:
     clocks : of each group with an assigned channel, by file and group.
     left : channels that nobody takes.
     problems : why a signal that is needed has no channel, in words.
+    unmatched : why a channel is not taken for a signal that a recording may be without, in words.
+    contradictions : units that were named and that files contradict, in words.
     """
 
     assigned: Mapping[str, Assigned]
     clocks: Mapping[tuple[int, int], Clock]
     left: tuple[str, ...]
     problems: tuple[str, ...]
+    unmatched: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
     @property
     def certain(self) -> bool:
@@ -96,26 +101,24 @@ def propose(
         and not one.channel.stamp
         and all(one.channel is not other.channel for other in assigned.values())
     ]
-    doubts: dict[str, str] = {}
-    by_name(assigned, doubts, free, system)
-    by_unit(assigned, doubts, free, system)
+    assigned, doubts = match(assigned, free, system)
     problems = tuple(
         f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
         for one in (*system.inputs, *system.outputs)
         if one.name not in assigned
     )
-    clocks: dict[tuple[int, int], Clock] = {}
-    for one in assigned.values():
-        if (one.file, one.group) not in clocks:
-            group = files[one.file].groups[one.group]
-            at = str(files[one.file].path) + (f", '{group.name}'" if group.name else "")
-            clocks[one.file, one.group] = read_clock(group, given.get(TIME), step, system, at)
-    _refuse_one_rate(clocks, files)
+    unmatched = tuple(
+        f"{one.name}: {doubts[one.name]}"
+        for one in system.judged
+        if one.name in doubts and one.name not in assigned
+    )
+    clocks = _clocks(assigned, files, given.get(TIME), step, system)
     taken = {id(one.channel) for one in assigned.values()}
     timed = {clock.channel for clock in clocks.values()}
     left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
     shown = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in left)
-    return ProposedMapping(assigned, clocks, shown, problems)
+    contradictions = tuple(_contradictions(given, assigned, files, clocks, system))
+    return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
 
 def _places(files: Sequence[RecordedFile]) -> list[Place]:
@@ -165,13 +168,7 @@ def _as_named(
     concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system) if unit else None
     if way is None:
-        raise InputError(
-            where=f"{where}, channel '{place.channel.name}'",
-            found=f"[{unit}], no unit of {signal.label}" if unit else "no unit in the file",
-            expected=f"one that can become {signal.unit}"
-            + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
-            remedy=f"give it, --column '{signal.name}={place.channel.name} [{signal.shown}]'",
-        )
+        raise _no_unit_of(signal, place, unit, stated_by_user=bool(one.unit), where=where)
     turn = -1.0 if one.reversed else 1.0
     scale, formula = way
     return Assigned(
@@ -190,6 +187,28 @@ def _as_named(
     )
 
 
+def _no_unit_of(
+    signal: Signal, place: Place, unit: str, *, stated_by_user: bool, where: str
+) -> InputError:
+    """A unit that cannot become that of a signal; where one is stated, no other is proposed."""
+    name = f"--column '{signal.name}={place.label}"
+    if not unit:
+        found, remedy = "no unit in the file", f"give it, {name} [UNIT]'"
+    elif not is_unit(unit):
+        found = f"[{unit}], a unit that is not known"
+        remedy = f"convert the values, or name one that is the same, {name} [UNIT]'"
+    else:
+        found = f"[{unit}], no unit of {signal.label}"
+        remedy = "correct the unit" if stated_by_user else "name another channel"
+    return InputError(
+        where=f"{where}, channel '{place.channel.name}'",
+        found=found,
+        expected=f"one that can become {signal.unit}"
+        + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
+        remedy=remedy,
+    )
+
+
 def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
     """Refuse one channel that is named for two signals."""
     taken: dict[int, str] = {}
@@ -204,10 +223,25 @@ def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
         taken[id(one.channel)] = signal
 
 
-def _refuse_one_rate(
-    clocks: Mapping[tuple[int, int], Clock], files: Sequence[RecordedFile]
-) -> None:
-    """Refuse one rate for channels of one file that have unlike numbers of samples."""
+def _clocks(
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    named: NamedChannel | None,
+    step: float | None,
+    system: System,
+) -> dict[tuple[int, int], Clock]:
+    """Times of each group with an assigned channel, by file and group.
+
+    Raises
+    ------
+    InputError
+        If a group has none, or one rate is that of unlike numbers of samples in one file.
+    """
+    clocks: dict[tuple[int, int], Clock] = {}
+    for i, j in dict.fromkeys((one.file, one.group) for one in assigned.values()):
+        group = files[i].groups[j]
+        at = str(files[i].path) + (f", '{group.name}'" if group.name else "")
+        clocks[i, j] = read_clock(group, named, step, system, at)
     for index, file in enumerate(files):
         own = [clock for (i, _), clock in clocks.items() if i == index and clock.counted]
         sizes = dict.fromkeys(str(clock.times.size) for clock in own)
@@ -218,3 +252,30 @@ def _refuse_one_rate(
                 expected="channels that were sampled together, or times of their own",
                 remedy="export each with its times, or name channels of one length by --column",
             )
+    return clocks
+
+
+def _contradictions(
+    given: Mapping[str, NamedChannel],
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    clocks: Mapping[tuple[int, int], Clock],
+    system: System,
+) -> Iterator[str]:
+    """Units that a user names, and that the files contradict: one of the two is wrong."""
+    for name in (one for one in given if one in assigned):
+        one, signal = assigned[name], system.signals[name]
+        ways = [conversion_to(unit, signal, system) for unit in (one.unit, one.channel.unit)]
+        if one.channel.unit and ways[0] != ways[1]:
+            yield _contradiction(files[one.file], one.label, one.unit, one.channel.unit)
+    for (i, j), clock in clocks.items():
+        stated = {one.name: one.unit for one in files[i].groups[j].channels}.get(clock.channel)
+        if stated and conversion(clock.unit, "s") != conversion(stated, "s"):
+            yield _contradiction(files[i], clock.channel, clock.unit, stated)
+
+
+def _contradiction(file: RecordedFile, channel: str, unit: str, stated: str) -> str:
+    return (
+        f"{file.path}, channel '{channel}': taken in [{unit}], as named, and the file states "
+        f"[{stated}]"
+    )
