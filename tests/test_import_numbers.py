@@ -13,6 +13,7 @@ from scipy.io import savemat
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.foreign import read_foreign
+from workbench.foreign.spelling import conversion, spelled
 from workbench.mapping import NamedChannel, propose
 from workbench.mapping.clock import Clock
 from workbench.system import System
@@ -280,3 +281,37 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
         "Längskraft [kp2]": ("Fx: 'Längskraft' is in [kp2], a unit that is not known",),
         "Temperatur [degC]": (),
     }
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),
+    [
+        ("cm", "m", 0.01),
+        ("dm", "m", 0.1),
+        ("daN", "N", 10.0),
+        ("daNm", "N.m", 10.0),
+        ("kgf", "N", 9.80665),
+        ("kp", "N", 9.80665),  # as it was called in German
+        ("kgf/cm²", "Pa", 98066.5),  # 1 at, the technical atmosphere
+        ("kp/cm^2", "Pa", 98066.5),
+        ("lbf.ft", "N.m", 1.3558179483314004),  # NIST SP 811, appendix B.8
+        ("ft·lb", "N.m", 1.3558179483314004),
+        ("ft-lbf", "N.m", 1.3558179483314004),
+    ],
+)
+def test_units_of_workshops_are_known(unit: str, si: str, factor: float) -> None:
+    found = conversion(spelled(f"[{unit}]"), si)
+    assert found is not None
+    assert found.factor == pytest.approx(factor, rel=1e-15)
+    assert found.zero == 0.0
+
+
+def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
+    tmp_path: Path, system: System
+) -> None:
+    names = "t [s],BCP [psi],Torque,Wheel speed [mph],Roller speed [mph]"
+    rows = [f"{0.01 * i:.2f},20.5,3000.5,45.5,45.5" for i in range(60)]
+    (problem,) = propose(
+        [read_foreign(table(tmp_path / "a.csv", [names, *rows]))], system, {}
+    ).problems
+    assert problem == "tauR: 'Torque' has no unit and is plausible as N.m or lbf.ft"
