@@ -14,6 +14,7 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.foreign import read_foreign
 from workbench.foreign.spelling import conversion, spelled
+from workbench.foreign.stamps import iso
 from workbench.mapping import NamedChannel, propose
 from workbench.mapping.clock import Clock
 from workbench.system import System
@@ -185,6 +186,24 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(
         clock(path, tank, **named)
     said = clock(path, tank, time=NamedChannel("Zeit", "min"))
     assert_allclose(said.times, 2.0 * np.arange(60), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "day", ["01-Mar-2024", "1 March 2024", "01-MAR-2024", "1. März 2024", "01.03.2024"]
+)
+def test_months_may_be_written_by_their_names(tmp_path: Path, tank: System, day: str) -> None:
+    """The first as MATLAB writes it."""
+    rows = [f"{day} 08:15:{t:06.3f};{t}" for t in MINUTE]
+    found = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
+    assert_allclose(found.times, MINUTE, atol=1e-9)
+    assert iso(found.start) == "2024-03-01T08:15:00.000000"
+
+
+@pytest.mark.parametrize("day", ["01-Mon-2024", "31-Feb-2024", "Mar-2024", "01-Mar-24 x"])
+def test_what_is_no_day_of_a_month_is_no_time(tmp_path: Path, tank: System, day: str) -> None:
+    rows = [f"{day} 08:15:{t:06.3f};{t};{t}" for t in MINUTE]
+    with pytest.raises(InputError, match="found no time"):
+        clock(table(tmp_path / "a.csv", ["Time;h [mm];v", *rows]), tank)
 
 
 # --- names, units ---
