@@ -142,7 +142,7 @@ def test_a_rate_of_something_else_is_none_of_the_samples(
         (["Messzeit: 30 s"], "no time among"),
         (["Sample rate: 1,000 Hz"], "'1,000', which can be read with decimal commas or with"),
         (["Sample rate: 2.000 Hz"], "'2.000', which can be read with decimal points or with"),
-        (["Abtastrate: 1 000 Hz"], "'1 000' in the preamble, which may be one number or two"),
+        (["Abtastrate: 1 000 Hz"], "a preamble with '1 000', which may be one number or two"),
         (["Abtastrate: 2 Hz", "Messrate: 5 Hz"], "'Abtastrate: 2 Hz' and 'Messrate: 5 Hz'"),
     ],
 )

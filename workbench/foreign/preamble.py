@@ -63,9 +63,9 @@ def stated_step(head: Sequence[str]) -> tuple[float, str]:
 def _number(text: str) -> tuple[float, str]:
     """A number, NaN if it can be read in two ways; and these, in words."""
     if plain(text) != text:
-        return math.nan, f"'{text}' in the preamble, which may be one number or two"
+        return math.nan, f"a preamble with '{text}', which may be one number or two"
     try:
         reading = reading_of([[text]], "", commas=True)
     except InputError as error:
-        return math.nan, error.found
+        return math.nan, f"a preamble with {error.found}"
     return float(values_of([text], reading)[0]), ""

@@ -89,17 +89,17 @@ def read_clock(
 
 def _no_time(group: Group, system: System, where: str) -> InputError:
     """What a group has in place of times."""
-    found = f"no time among {listed([one.name for one in group.channels])}"
+    found, name = f"no time among {listed([one.name for one in group.channels])}", "NAME"
     for one in group.channels:
         if not one.unit and is_time(one.name):
             units = _unstated(one.values, system)
             likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
-            found = f"'{one.name}' without a unit, {likely}"
+            found, name = f"'{one.name}' without a unit, {likely}", one.name
     return InputError(
         where=where,
         found=found,
         expected="a channel of times, or a known rate",
-        remedy=f"name it, --column '{TIME}=NAME [UNIT]', or give --sample-rate '200 Hz'",
+        remedy=f"name it, --column '{TIME}={name} [UNIT]', or give --sample-rate '200 Hz'",
     )
 
 
