@@ -334,3 +334,20 @@ def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
         [read_foreign(table(tmp_path / "a.csv", [names, *rows]))], system, {}
     ).problems
     assert problem == "tauR: 'Torque' has no unit and is plausible as N.m or lbf.ft"
+
+
+def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(
+    tmp_path: Path, tank: System
+) -> None:
+    """Two recordings on two sheets: one of them is named."""
+    book = openpyxl.Workbook()
+    for sheet in (book.active, book.create_sheet("two")):
+        sheet.append(["t [s]", "inflow [l/s]", "h [mm]"])
+        for t in MINUTE:
+            sheet.append([t, 5.0, t])
+    book.save(tmp_path / "a.xlsx")
+    held = read_foreign(tmp_path / "a.xlsx")
+    left = propose([held], tank, {}).left
+    assert "two/h [mm]" in left
+    named = {name: NamedChannel(f"two/{name}") for name in ("inflow", "h")}
+    assert propose([held], tank, named).certain

@@ -115,8 +115,8 @@ def propose(
     clocks = _clocks(assigned, files, given.get(TIME), step, system)
     taken = {id(one.channel) for one in assigned.values()}
     timed = {clock.channel for clock in clocks.values()}
-    left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
-    shown = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in left)
+    left = [p for p in places if id(p.channel) not in taken and p.channel.name not in timed]
+    shown = tuple(f"{p.label} [{p.channel.unit}]" if p.channel.unit else p.label for p in left)
     contradictions = tuple(_contradictions(given, assigned, files, clocks, system))
     return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
