@@ -388,6 +388,11 @@ def test_an_answer_confirms_and_corrects_at_once(
         ({"v_Rad": "v_Rad [m/s]"}, "wheel and roller roll along"),
         ({"v_Rad": "v_Rad"}, "'v_Rad' has no unit and is plausible as"),
         ({"Zeit": "Messwert"}, "no time among"),
+        (
+            {"Bremsdruck": "Bremsdruck"},
+            "pB: no unit in the file, --column 'pB=Bremsdruck [bar]' confirms",
+        ),
+        ({"Zeit": "Zeit"}, "time: no unit in the file, --column 'time=Zeit [s]' confirms"),
     ],
 )
 def test_what_is_not_certain_is_not_taken_by_yes(
@@ -414,11 +419,16 @@ def test_one_channel_is_not_taken_for_two_signals(
     assert "stands for omegaW and for omegaR" in error
 
 
-def test_a_unit_that_alone_is_plausible_is_taken_and_said(
-    table: Callable[..., Path], tmp_path: Path, stop: Case, system: System
+def test_a_unit_that_alone_is_plausible_is_asked_about_and_said(
+    table: Callable[..., Path],
+    tmp_path: Path,
+    stop: Case,
+    system: System,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(builtins, "input", lambda: "")
     path = table(Bremsdruck="Bremsdruck")
-    assert main(["import", str(path), "--out", str(tmp_path / "out"), "--yes"]) == 0
+    assert main(["import", str(path), "--out", str(tmp_path / "out")]) == 0
     (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
     assert one["channels"]["pB"]["unit"] == "bar"
     assert not one["channels"]["pB"]["unit_stated"]
@@ -430,7 +440,8 @@ def test_a_unit_that_a_further_file_states_is_not_overruled(
 ) -> None:
     """The first file has no unit, and bar is confirmed; the second says kPa and is asked about."""
     out = str(tmp_path / "out")
-    assert main(["import", str(table(Bremsdruck="Bremsdruck")), "--out", out, "--yes"]) == 0
+    first = ["import", str(table(Bremsdruck="Bremsdruck")), "--out", out, "--yes"]
+    assert main([*first, "--column", "pB=Bremsdruck [bar]"]) == 0
     other = table("b.csv", Bremsdruck="Bremsdruck [kPa]")
     assert main(["import", str(other), "--out", out, "--yes"]) == 0
     assert "Bremsdruck [kPa]" in capsys.readouterr().out

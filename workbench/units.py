@@ -24,6 +24,9 @@ _EXAMPLES = {
 _DEFINITIONS = f"""\
 micro- = 1e-6 = \u00b5- = \u03bc- = u-
 milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+deci- = 1e-1 = d-
+deca- = 1e1 = da-
 hecto- = 1e2 = h-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-

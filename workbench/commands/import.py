@@ -116,12 +116,7 @@ def _confirmed(
     if proposal.certain:
         return proposal, conditions
     if yes or output.json:  # a program is asked nothing
-        alone = [
-            f"{name}: nothing but its unit speaks for it, --column '{name}={one.label}' confirms it"
-            for name, one in proposal.assigned.items()
-            if one.alone
-        ]
-        return _complete(files, proposal, alone), conditions
+        return _complete(files, proposal, proposal.doubts), conditions
     columns = dict(known.columns)
     for answer in _answers(files, proposal):
         if answer.partition("=")[0].strip() in (TIME, *system.signals):
@@ -192,7 +187,7 @@ def _shown(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Sys
             f"  {name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} {signal.shown} "
             f"({one.reason})"
         )
-    lines += [f"  ? {problem}" for problem in proposal.problems]
+    lines += [f"  ? {one}" for one in (*proposal.problems, *proposal.unmatched)]
     if proposal.left:
         lines.append(f"  left out   {listed(proposal.left)}")
     return "\n".join(lines)

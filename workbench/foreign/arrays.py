@@ -22,8 +22,8 @@ def read_groups(content: Mapping[str, Any]) -> tuple[list[Group], list[str]]:
     """Groups of nested arrays and texts, and notes on what was left out.
 
     Vectors of one length are a group; a structure with a time and values is a channel with its own
-    times (`data`, `time`, `unit`); any other structure is a group of its own. A text `NAME_unit` is
-    the unit of NAME, a list `units` those of all vectors in their order.
+    times (`data`, `time`, `unit`, `time_unit`); any other structure is a group of its own. A text
+    `NAME_unit` is the unit of NAME, a list `units` those of all vectors in their order.
 
     Parameters
     ----------
@@ -92,34 +92,33 @@ def _units(content: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def _entry(content: Mapping[str, Any], names: tuple[str, ...]) -> Any:
-    return next((value for key, value in content.items() if key.lower() in names), None)
+def _entry(content: Mapping[str, Any], names: tuple[str, ...]) -> tuple[str, Any]:
+    """Key and value of the first entry that has one of some names."""
+    return next(((key, one) for key, one in content.items() if key.lower() in names), ("", None))
 
 
 def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
     """A structure with times and values of one channel, such as a time series."""
-    times, values = _entry(content, _TIMES), _entry(content, _VALUES)
-    if not isinstance(times, np.ndarray) or not isinstance(values, np.ndarray):
-        return None
-    if times.size != values.size or times.size < 2:
-        return None
+    key, times = _entry(content, _TIMES)
     channel = _single(name, content)
-    if channel is None:
+    if channel is None or not isinstance(times, np.ndarray):
         return None
-    clock = FileChannel("time", "s", _flat(times))
-    return Group(name, (channel,), time=clock)
+    if times.size != channel.values.size or times.size < 2:
+        return None
+    clock = FileChannel(key, _units(content).get(key, ""), _flat(times))
+    return Group(name, (clock, channel))
 
 
 def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     """A structure with values of one channel, and its unit."""
-    values = _entry(content, _VALUES)
+    key, values = _entry(content, _VALUES)
     if not isinstance(values, np.ndarray) or values.size != max(values.shape, default=0):
         return None
-    unit = _entry(content, ("unit", "units", "einheit"))
-    about = _entry(content, _TEXTS)
+    _, unit = _entry(content, ("unit", "units", "einheit"))
+    _, about = _entry(content, _TEXTS)
     return FileChannel(
         name,
-        spelled(unit) if isinstance(unit, str) else "",
+        spelled(unit) if isinstance(unit, str) else _units(content).get(key, ""),
         _flat(values),
         about if isinstance(about, str) else "",
     )

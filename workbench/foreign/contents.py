@@ -41,12 +41,14 @@ class Group:
     time : what the file itself says when its samples were taken, in s; None: one of the channels
         may be the time.
     step : time between two samples that the file states [s]; NaN: it states none.
+    step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
     """
 
     name: str
     channels: tuple[FileChannel, ...]
     time: FileChannel | None = None
     step: float = math.nan
+    step_doubt: str = ""
 
     def renamed(self, name: str) -> "Group":
         """The same group with another name."""

@@ -11,6 +11,7 @@ from workbench.errors import InputError
 from workbench.foreign.cells import find_table, read_group
 from workbench.foreign.contents import Contents, Group
 
+_HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
 
 
@@ -37,7 +38,7 @@ def read(path: Path, raw: bytes) -> Contents:
         except InputError as error:
             refusal = error
             if filled:
-                notes.append(f"sheet '{title}' holds no table of samples")
+                notes.append(f"sheet '{title}' was left out: {error.found}")
             continue
         groups.append(group)
         notes += [f"sheet '{title}': {note}" for note in own]
@@ -66,8 +67,8 @@ def _text(cell: Any) -> str:
             return cell.isoformat(sep=" ")
         case time():
             return cell.isoformat()
-        case timedelta():
-            return repr(cell.total_seconds())
+        case timedelta():  # a stamp, in whatever unit its column is said to be
+            return f"{cell // _HOUR}:{datetime.min + cell % _HOUR:%M:%S.%f}"
         case date():
             return cell.isoformat()
     return str(cell)

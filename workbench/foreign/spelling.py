@@ -23,6 +23,12 @@ _SPELLINGS = {
     "℃": "degC", "°F": "degF", "degF": "degF", "deg F": "degF", "Kelvin": "K",
     "Grad": "deg", "Grad/s": "deg/s", "degrees": "deg", "radians": "rad", "rad/sec": "rad/s",
     "m/sec": "m/s", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "Newton": "N", "metre": "m",
+    "ft.lb": "lbf.ft", "ft*lb": "lbf.ft", "ft-lb": "lbf.ft", "ft lb": "lbf.ft", "ftlb": "lbf.ft",
+    "ft.lbf": "lbf.ft", "ft*lbf": "lbf.ft", "ft-lbf": "lbf.ft", "ft lbf": "lbf.ft",
+    "lb.ft": "lbf.ft", "lb*ft": "lbf.ft", "lb-ft": "lbf.ft", "lb ft": "lbf.ft", "lbft": "lbf.ft",
+    "lbf*ft": "lbf.ft", "lbf-ft": "lbf.ft", "lbf ft": "lbf.ft", "lbfft": "lbf.ft",
+    "kp": "kgf", "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
+    "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2",
     "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%",
 }  # fmt: skip
 _POWERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": "."})
@@ -34,6 +40,9 @@ _OTHER = {
     "psi": ("Pa", 6894.757293168361, 0.0),  # 0.45359237 kg * 9.80665 m/s2 / (25.4 mm)^2
     "mph": ("m/s", 0.44704, 0.0),
     "lbf": ("N", 4.4482216152605, 0.0),
+    "lbf.ft": ("N.m", 4.4482216152605 * 0.3048, 0.0),
+    "kgf": ("N", 9.80665, 0.0),
+    "kgf/cm2": ("Pa", 98066.5, 0.0),
     "in": ("m", 0.0254, 0.0),
     "ft": ("m", 0.3048, 0.0),
     "ns": ("s", 1e-9, 0.0),

@@ -14,10 +14,17 @@ _CLOCK = (
     r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)([.,:](?P<f>\d{1,12}))?)?(\s*(?P<half>[AaPp])[Mm])?"
 )
 _ZONE = r"\s*(?P<zone>Z|z|UTC|GMT|[+-]\d\d(:?\d\d)?)?"
+_MONTHS = {  # English and German, by the letters that tell
+    **{"jan": 1, "feb": 2, "mar": 3, "mär": 3, "apr": 4, "may": 5, "mai": 5, "jun": 6, "jul": 7},
+    **{"aug": 8, "sep": 9, "oct": 10, "okt": 10, "nov": 11, "dec": 12, "dez": 12},
+}
 _DAY = re.compile(
     r"((?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
+    rf"|(?P<of>\d{{1,2}})[-/.\s]{{1,2}}(?P<called>{'|'.join(_MONTHS)})[^\W\d]{{0,6}}\.?[-/\s]"
+    r"(?P<in>\d{4})"
     r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})[-/.](?P<last>\d{4}|\d\d))"
-    rf"([T\s]+{_CLOCK}{_ZONE})?"
+    rf"([T\s]+{_CLOCK}{_ZONE})?",
+    re.IGNORECASE,
 )
 _OF_DAY = re.compile(_CLOCK + _ZONE)
 _OF_HOUR = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})")  # as spreadsheets save it
@@ -100,7 +107,9 @@ def _day_first(matches: Sequence[re.Match[str] | None]) -> bool | None:
 
 def _since_epoch(match: re.Match[str], day_first: bool) -> int:
     """Whole seconds since 1970."""
-    if match["year"]:
+    if match["called"]:
+        day = date(int(match["in"]), _MONTHS[match["called"].casefold()], int(match["of"]))
+    elif match["year"]:
         day = date(int(match["year"]), int(match["month"]), int(match["day"]))
     else:
         one, two, year = int(match["one"]), int(match["two"]), int(match["last"])

@@ -11,7 +11,7 @@ from nptdms import TdmsFile
 from nptdms.log import log_manager
 
 from workbench.foreign.contents import Contents, FileChannel, Group
-from workbench.foreign.spelling import named, spelled
+from workbench.foreign.spelling import conversion, named, spelled
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
@@ -47,8 +47,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         stated: Mapping[str, Any] = one.properties
         unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
         values = one[:]
-        step = float(stated.get("wf_increment", 0.0) or 0.0)
-        offset = float(stated.get("wf_start_offset", 0.0) or 0.0) if step > 0.0 else 0.0
+        step, offset = _counted(stated)
         begun = stated.get("wf_start_time")
         start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan
         if values.dtype.kind == "M":
@@ -71,6 +70,16 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
             clock = FileChannel("time", "s", times, start=start if start >= 0.0 else np.nan)
         groups.append(Group(held.name, tuple(channels), time=clock))
     return groups
+
+
+def _counted(stated: Mapping[str, Any]) -> tuple[float, float]:
+    """Step and begin of a waveform [s]; zeros where it is none, or none over time."""
+    step = float(stated.get("wf_increment", 0.0) or 0.0)
+    # Without a unit LabVIEW means seconds; a spectrum has Hz.
+    scale = conversion(spelled(str(stated.get("wf_xunit_string", "") or "s")), "s")
+    if scale is None or not step > 0.0:
+        return 0.0, 0.0
+    return scale.factor * step, scale.factor * float(stated.get("wf_start_offset", 0.0) or 0.0)
 
 
 def _since_1970(moment: Any) -> float:

@@ -12,9 +12,9 @@ from workbench.mapping.names import TIME, NamedChannel, is_time, listed
 from workbench.recording import Vector
 from workbench.system import System
 
-# Units of time that recorders leave out; each is at least a thousand times the one before, so that
-# at most one makes steps like those of usual recordings, within a factor of the root of a thousand.
-_UNSTATED = ("ns", "us", "ms", "s", "d")
+# Units of time that recorders leave out, and how far from those of usual recordings steps may be in
+# the one that is meant. Where several are as likely, as seconds and minutes often are, none is.
+_UNSTATED = ("ns", "us", "ms", "s", "min", "h", "d")
 _LIKE = math.sqrt(1000.0)
 
 
@@ -29,6 +29,7 @@ class Clock:
     start : of their zero [s since 1970], NaN where that is not known.
     unit : that the channel was read in.
     reason : why these are the times, for people; `certain`: nothing was concluded.
+    counted : whether samples are counted at a rate, and have no times of their own.
     """
 
     channel: str
@@ -37,6 +38,7 @@ class Clock:
     unit: str
     reason: str
     certain: bool
+    counted: bool = False
 
 
 def read_clock(
@@ -56,7 +58,7 @@ def read_clock(
     """
     count = np.arange(group.channels[0].values.size, dtype=np.float64)
     if step is not None:
-        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True)
+        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
     if named is not None:
         found = next((one for one in group.channels if one.name == named.channel), None)
         if found is not None:
@@ -67,34 +69,56 @@ def read_clock(
     # Stamps are often coarser than a counted time beside them.
     channels = sorted(group.channels, key=lambda one: one.stamp)
     clocks = [clock for one in channels if (clock := _candidate(one, group, system))]
-    for clock in sorted(clocks, key=lambda one: not one.certain):
-        if _increases(clock.times):
+    for clock in clocks:
+        if clock.certain and _increases(clock.times):
             return clock
+    if group.step_doubt:
+        raise InputError(
+            where=where,
+            found=group.step_doubt,
+            expected="one time between samples",
+            remedy="say it, --sample-rate '200 Hz'",
+        )
     if math.isfinite(group.step):
-        times = count * group.step
-        return Clock("", times, math.nan, "s", f"every {group.step:g} s, as the file says", False)
+        said = f"every {group.step:g} s, as the file says"
+        return Clock("", count * group.step, math.nan, "s", said, False, True)
     if clocks:
-        return _going_on(clocks[0], where)
-    raise InputError(
+        return _going_on(next((c for c in clocks if _increases(c.times)), clocks[0]), where)
+    raise _no_time(group, system, where)
+
+
+def _no_time(group: Group, system: System, where: str) -> InputError:
+    """What a group has in place of times."""
+    found, name = f"no time among {listed([one.name for one in group.channels])}", "NAME"
+    for one in group.channels:
+        if not one.unit and is_time(one.name):
+            units = _unstated(one.values, system)
+            likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
+            found, name = f"'{one.name}' without a unit, {likely}", one.name
+    return InputError(
         where=where,
-        found=f"no time among {listed([one.name for one in group.channels])}",
+        found=found,
         expected="a channel of times, or a known rate",
-        remedy=f"name it, --column '{TIME}=NAME [s]', or give --sample-rate '200 Hz'",
+        remedy=f"name it, --column '{TIME}={name} [UNIT]', or give --sample-rate '200 Hz'",
     )
 
 
 def _named(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
-    unit = named.unit or channel.unit or _unstated(channel.values, system)
+    # Stamps are in seconds, whatever the name of their column says.
+    own = channel.unit if channel.stamp else named.unit or channel.unit
+    likely = [own] if own else _unstated(channel.values, system)
+    unit = likely[0] if len(likely) == 1 else ""
     found = conversion(unit, "s") if unit else None
     if found is None:
         raise InputError(
             where=f"{where}, '{channel.name}'",
             found=f"times in [{unit}]" if unit else "times without a unit",
             expected="a unit of time",
-            remedy=f"give it, --column '{TIME}={channel.name} [ms]'",
+            remedy=f"give it, --column '{TIME}={channel.name} [UNIT]'",
         )
     times = found.factor * channel.values
-    return Clock(channel.name, times, channel.start, unit, "named", True)
+    reason = "named" if own else f"named; {_concluded(unit)}"
+    return Clock(channel.name, times, channel.start, unit, reason, bool(own))
 
 
 def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | None:
@@ -106,25 +130,26 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
         times = found.factor * channel.values
         return Clock(channel.name, times, math.nan, channel.unit, "name and unit", True)
     if not channel.unit and is_time(channel.name):
-        unit = _unstated(channel.values, system)
-        scale = conversion(unit, "s") if unit else None
+        likely = _unstated(channel.values, system)
+        scale = conversion(likely[0], "s") if len(likely) == 1 else None
         if scale is not None:
             times = scale.factor * channel.values
-            reason = f"no unit in the file; in {unit} it is sampled as is usual"
-            return Clock(channel.name, times, math.nan, unit, reason, False)
+            return Clock(channel.name, times, math.nan, likely[0], _concluded(likely[0]), False)
     return None
 
 
-def _unstated(values: Vector, system: System) -> str:
-    """The unit in which times step as usual recordings do; empty if there is none."""
+def _concluded(unit: str) -> str:
+    return f"no unit in the file; in {unit} it is sampled as is usual"
+
+
+def _unstated(values: Vector, system: System) -> list[str]:
+    """The units in which times step as those of usual recordings."""
     held = values[np.isfinite(values)]
     steps = np.diff(held)
     usual = float(np.median(steps)) if steps.size else 0.0
-    for unit in _UNSTATED:
-        factor = conversion(unit, "s")
-        if factor and 1.0 / _LIKE < usual * factor.factor / system.sample_time < _LIKE:
-            return unit
-    return ""
+    scales = {unit: conversion(unit, "s") for unit in _UNSTATED}
+    ratios = {u: usual * s.factor / system.sample_time for u, s in scales.items() if s}
+    return [unit for unit, ratio in ratios.items() if 1.0 / _LIKE < ratio < _LIKE]
 
 
 def _increases(times: Vector) -> bool:

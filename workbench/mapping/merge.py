@@ -8,7 +8,8 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.foreign import RecordedFile
-from workbench.mapping.proposal import Assigned, ProposedMapping
+from workbench.mapping.matching import Assigned
+from workbench.mapping.proposal import ProposedMapping
 from workbench.recording import Vector
 from workbench.system import System
 from workbench.system_parts import Signal
@@ -26,7 +27,7 @@ class Measured:
     signals : (n,) each, by name.
     start : of time zero [s since 1970], NaN where that is not known.
     notes : what was interpolated and left out, in words.
-    doubts : why its files may be damaged, in words.
+    doubts : why its files may be damaged, or units wrong, in words.
     """
 
     time: Vector
@@ -98,7 +99,8 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     signals = {name: values[known] for name, values in signals.items()}
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
     zero = min(begun, default=math.nan)
-    doubts = tuple(f"{one.path}: {doubt}" for one in files for doubt in one.doubts)
+    damaged = [f"{one.path}: {doubt}" for one in files for doubt in one.doubts]
+    doubts = *damaged, *proposal.contradictions
     return Measured(time[known], signals, zero, tuple(notes), doubts)
 
 

@@ -15,10 +15,10 @@ _TIME_WORDS = frozenset(
     "time t zeit timestamp zeitstempel datum date datetime uhrzeit temps tiempo tempo elapsed "  # noqa: SIM905
     "clock utc messzeit relativzeit reltime".split()
 )
-# A value that is asked for is no measurement.
-_ASKED = frozenset(
-    "soll sollwert set setpoint command commanded cmd demand demanded target request requested "  # noqa: SIM905
-    "reference ref vorgabe consigne".split()
+# A value that is asked for is no measurement: words, and what tells within one, as in German.
+_ASKED = frozenset(("set", "sp", "cmd", "req", "dmd", "ref", "reference"))
+_ASKED_WITHIN = re.compile(
+    "soll|vorgabe|anforderung|setpoint|demand|command|request|target|consigne"
 )
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 _LEAST = 4  # letters of a word that tells within another one: "druck" in "Bremsdruck"
@@ -111,7 +111,8 @@ def is_time(name: str) -> bool:
 
 def is_asked(name: str) -> bool:
     """Whether a name is one of a value that is asked for, not measured."""
-    return bool(_ASKED.intersection(words(name)))
+    own = words(name)
+    return bool(_ASKED.intersection(own)) or any(map(_ASKED_WITHIN.search, own))
 
 
 def alike(channel: str, about: str, signal: Signal) -> int:

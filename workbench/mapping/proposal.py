@@ -1,72 +1,18 @@
-"""Channels are proposed for signals: by name, by unit, and by what values are plausible."""
+"""Channels are proposed for signals, as the user names them, then as names and units tell."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from workbench.errors import InputError, closest
-from workbench.foreign import FileChannel, Group, RecordedFile
+from workbench.foreign import RecordedFile
+from workbench.foreign.spelling import conversion, is_unit
 from workbench.mapping.clock import Clock, read_clock
-from workbench.mapping.names import (
-    EXACT,
-    TIME,
-    WITHIN,
-    WORDS,
-    NamedChannel,
-    alike,
-    is_asked,
-    listed,
-)
-from workbench.mapping.units import conversion_to, fitting_units, unit_in_name
-from workbench.recording import Vector
+from workbench.mapping.matching import Assigned, Place, match, unconfirmed, unit_reason
+from workbench.mapping.names import TIME, NamedChannel, listed
+from workbench.mapping.units import conversion_to, fitting_units
 from workbench.system import System
 from workbench.system_parts import Signal
-
-
-@dataclass(frozen=True, eq=False)
-class Assigned:
-    """A channel that is taken for a signal.
-
-    Attributes
-    ----------
-    file : it stands in, counted from 0.
-    group : in that file, counted from 0.
-    label : the channel's name, with its group where several have it.
-    unit : that its values are in.
-    factor, zero : SI value is `factor*value + zero`.
-    formula : what the recorder has in place of the signal; empty: the signal itself.
-    reason : why this one, for people.
-    certain : whether name and unit are the system's own, so that nobody need be asked.
-    concluded : whether the file does not say the unit.
-    alone : whether nothing but its unit speaks for it.
-    """
-
-    file: int
-    group: int
-    channel: FileChannel
-    label: str
-    unit: str
-    factor: float
-    zero: float
-    formula: str
-    reason: str
-    certain: bool
-    concluded: bool = False
-    alone: bool = False
-
-    @property
-    def values(self) -> Vector:
-        """(n,) SI, not finite in gaps."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-            return self.factor * self.channel.values + self.zero
-
-    @property
-    def named(self) -> NamedChannel:
-        """As it is stored; what the file says of the unit is left to it."""
-        unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
-        return NamedChannel(self.label, unit, self.factor < 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,18 +25,31 @@ class ProposedMapping:
     clocks : of each group with an assigned channel, by file and group.
     left : channels that nobody takes.
     problems : why a signal that is needed has no channel, in words.
+    unmatched : why a channel is not taken for a signal that a recording may be without, in words.
+    contradictions : units that were named and that files contradict, in words.
     """
 
     assigned: Mapping[str, Assigned]
     clocks: Mapping[tuple[int, int], Clock]
     left: tuple[str, ...]
     problems: tuple[str, ...]
+    unmatched: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
     @property
     def certain(self) -> bool:
         """Whether it follows from names and units alone."""
         own = all(one.certain for one in self.assigned.values())
         return not self.problems and own and all(one.certain for one in self.clocks.values())
+
+    @property
+    def doubts(self) -> list[str]:
+        """What somebody must confirm, in words: nobody has said it, nor does a file."""
+        found = [f"{name}: {one.doubt}" for name, one in self.assigned.items() if one.doubt]
+        times = {one.channel: one.unit for one in self.clocks.values() if not one.certain}
+        return found + [
+            f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
+        ]
 
     @property
     def named(self) -> dict[str, NamedChannel]:
@@ -102,15 +61,6 @@ class ProposedMapping:
                     TIME, NamedChannel(clock.channel, "" if clock.certain else clock.unit)
                 )
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Place:
-    file: int
-    group: int
-    holder: Group
-    channel: FileChannel
-    label: str
 
 
 def propose(
@@ -151,28 +101,27 @@ def propose(
         and not one.channel.stamp
         and all(one.channel is not other.channel for other in assigned.values())
     ]
-    doubts: dict[str, str] = {}
-    _by_name(assigned, doubts, free, system)
-    _by_unit(assigned, doubts, free, system)
+    assigned, doubts = match(assigned, free, system)
     problems = tuple(
         f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
         for one in (*system.inputs, *system.outputs)
         if one.name not in assigned
     )
-    clocks: dict[tuple[int, int], Clock] = {}
-    for one in assigned.values():
-        if (one.file, one.group) not in clocks:
-            group = files[one.file].groups[one.group]
-            at = str(files[one.file].path) + (f", '{group.name}'" if group.name else "")
-            clocks[one.file, one.group] = read_clock(group, given.get(TIME), step, system, at)
+    unmatched = tuple(
+        f"{one.name}: {doubts[one.name]}"
+        for one in system.judged
+        if one.name in doubts and one.name not in assigned
+    )
+    clocks = _clocks(assigned, files, given.get(TIME), step, system)
     taken = {id(one.channel) for one in assigned.values()}
     timed = {clock.channel for clock in clocks.values()}
-    left = [p.channel for p in places if id(p.channel) not in taken and p.channel.name not in timed]
-    shown = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in left)
-    return ProposedMapping(assigned, clocks, shown, problems)
+    left = [p for p in places if id(p.channel) not in taken and p.channel.name not in timed]
+    shown = tuple(f"{p.label} [{p.channel.unit}]" if p.channel.unit else p.label for p in left)
+    contradictions = tuple(_contradictions(given, assigned, files, clocks, system))
+    return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
 
-def _places(files: Sequence[RecordedFile]) -> list[_Place]:
+def _places(files: Sequence[RecordedFile]) -> list[Place]:
     """All channels, each with a name that no other has, if groups have names."""
     found = [
         (i, j, group, channel)
@@ -182,12 +131,12 @@ def _places(files: Sequence[RecordedFile]) -> list[_Place]:
     ]
     counts = Counter(channel.name for *_, channel in found)
     return [
-        _Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
+        Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
         for i, j, group, one in found
     ]
 
 
-def _find(one: NamedChannel, signal: str, places: Sequence[_Place], where: str) -> _Place:
+def _find(one: NamedChannel, signal: str, places: Sequence[Place], where: str) -> Place:
     """The place that a user names."""
     name = one.channel
     found = [place for place in places if place.channel.name == name]
@@ -208,24 +157,18 @@ def _find(one: NamedChannel, signal: str, places: Sequence[_Place], where: str) 
 
 
 def _as_named(
-    one: NamedChannel, signal: Signal, places: Sequence[_Place], system: System, where: str
+    one: NamedChannel, signal: Signal, places: Sequence[Place], system: System, where: str
 ) -> Assigned:
     """The channel that a user names for a signal."""
     place = _find(one, signal.name, places, where)
-    unit = one.unit or place.channel.unit
-    concluded = not unit
-    if not unit:
+    unit = stated = one.unit or place.channel.unit
+    if not stated:
         fitting = fitting_units(place.channel, signal, system)
         unit = fitting[0] if len(fitting) == 1 else ""
+    concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system) if unit else None
     if way is None:
-        raise InputError(
-            where=f"{where}, channel '{place.channel.name}'",
-            found=f"[{unit}], no unit of {signal.label}" if unit else "no unit in the file",
-            expected=f"one that can become {signal.unit}"
-            + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
-            remedy=f"give it, --column '{signal.name}={place.channel.name} [{signal.shown}]'",
-        )
+        raise _no_unit_of(signal, place, unit, stated_by_user=bool(one.unit), where=where)
     turn = -1.0 if one.reversed else 1.0
     scale, formula = way
     return Assigned(
@@ -237,9 +180,32 @@ def _as_named(
         turn * scale.factor,
         turn * scale.zero,
         formula,
-        _unit_reason("named", unit, concluded),
-        certain=True,
+        unit_reason("named", unit, concluded),
+        certain=not concluded,
         concluded=concluded or bool(one.unit),
+        doubt=unconfirmed(signal.name, place.label, unit) if concluded else "",
+    )
+
+
+def _no_unit_of(
+    signal: Signal, place: Place, unit: str, *, stated_by_user: bool, where: str
+) -> InputError:
+    """A unit that cannot become that of a signal; where one is stated, no other is proposed."""
+    name = f"--column '{signal.name}={place.label}"
+    if not unit:
+        found, remedy = "no unit in the file", f"give it, {name} [UNIT]'"
+    elif not is_unit(unit):
+        found = f"[{unit}], a unit that is not known"
+        remedy = f"convert the values, or name one that is the same, {name} [UNIT]'"
+    else:
+        found = f"[{unit}], no unit of {signal.label}"
+        remedy = "correct the unit" if stated_by_user else "name another channel"
+    return InputError(
+        where=f"{where}, channel '{place.channel.name}'",
+        found=found,
+        expected=f"one that can become {signal.unit}"
+        + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
+        remedy=remedy,
     )
 
 
@@ -257,107 +223,59 @@ def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
         taken[id(one.channel)] = signal
 
 
-def _unit_reason(reason: str, unit: str, concluded: bool) -> str:
-    return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
-
-
-def _candidate(
-    place: _Place, signal: Signal, system: System, likeness: int
-) -> tuple[Assigned | None, str]:
-    """A channel as a signal, or None and why it cannot be."""
-    channel = place.channel
-    unit = channel.unit or unit_in_name(channel.name, signal, system)
-    concluded = not unit
-    if concluded:
-        fitting = fitting_units(channel, signal, system)
-        if len(fitting) != 1:
-            fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
-            return None, f"'{channel.name}' has no unit and is plausible {fits}"
-        unit = fitting[0]
-    way = conversion_to(unit, signal, system)
-    if way is None:
-        return None, f"'{channel.name}' is in [{unit}]"
-    scale, formula = way
-    values = scale.factor * channel.values + scale.zero
-    low, high = signal.possible
-    if not np.isfinite(values).any():
-        return None, f"'{channel.name}' holds no numbers"
-    if np.nanmin(values) < low or np.nanmax(values) > high:
-        return None, f"'{channel.name}' in [{unit}] goes beyond what is possible"
-    reason = "name and unit" if likeness else "the only one of its unit"
-    return Assigned(
-        place.file,
-        place.group,
-        channel,
-        place.label,
-        unit,
-        scale.factor,
-        scale.zero,
-        formula,
-        _unit_reason(reason, unit, concluded),
-        certain=likeness == EXACT and channel.name == signal.name and bool(channel.unit),
-        concluded=concluded,
-        alone=not likeness,
-    ), ""
-
-
-def _by_name(
-    assigned: dict[str, Assigned],
-    doubts: dict[str, str],
-    places: Sequence[_Place],
+def _clocks(
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    named: NamedChannel | None,
+    step: float | None,
     system: System,
-) -> None:
-    """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
-    found: dict[int, list[tuple[Signal, Assigned]]] = {EXACT: [], WORDS: [], WITHIN: []}
-    for signal in system.signals.values():
-        for place in places:
-            likeness = alike(place.channel.name, place.channel.about, signal)
-            if likeness and is_asked(place.channel.name) and not signal.exact:
-                doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
-            elif likeness:
-                one, doubt = _candidate(place, signal, system, likeness)
-                if one is not None:
-                    found[likeness].append((signal, one))
-                else:
-                    doubts[signal.name] = doubt
-    settled = set(assigned)
-    for level in found.values():
-        taken = {id(one.channel) for one in assigned.values()}
-        left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
-        for signal, one in left:
-            rivals = [o.label for s, o in left if s is signal]
-            claims = [s.name for s, o in left if o.channel is one.channel]
-            settled.add(signal.name)
-            if len(rivals) == len(claims) == 1:
-                assigned[signal.name] = one
-            elif len(rivals) > 1:
-                doubts[signal.name] = f"it may be {' or '.join(map(repr, rivals))}"
-            else:
-                doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
+) -> dict[tuple[int, int], Clock]:
+    """Times of each group with an assigned channel, by file and group.
+
+    Raises
+    ------
+    InputError
+        If a group has none, or one rate is that of unlike numbers of samples in one file.
+    """
+    clocks: dict[tuple[int, int], Clock] = {}
+    for i, j in dict.fromkeys((one.file, one.group) for one in assigned.values()):
+        group = files[i].groups[j]
+        at = str(files[i].path) + (f", '{group.name}'" if group.name else "")
+        clocks[i, j] = read_clock(group, named, step, system, at)
+    for index, file in enumerate(files):
+        own = [clock for (i, _), clock in clocks.items() if i == index and clock.counted]
+        sizes = dict.fromkeys(str(clock.times.size) for clock in own)
+        if len(sizes) > 1:
+            raise InputError(
+                where=str(file.path),
+                found=f"one rate for channels of {' and '.join(sizes)} samples",
+                expected="channels that were sampled together, or times of their own",
+                remedy="export each with its times, or name channels of one length by --column",
+            )
+    return clocks
 
 
-def _by_unit(
-    assigned: dict[str, Assigned],
-    doubts: Mapping[str, str],
-    places: Sequence[_Place],
+def _contradictions(
+    given: Mapping[str, NamedChannel],
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    clocks: Mapping[tuple[int, int], Clock],
     system: System,
-) -> None:
-    """Assign the only channel that has the unit of the only signal that lacks one."""
-    taken = {id(one.channel) for one in assigned.values()}
-    lacking = [
-        one
-        for one in (*system.inputs, *system.outputs)
-        if one.name not in assigned and one.name not in doubts
-    ]
-    fitting = [
-        (signal, one)
-        for signal in lacking
-        for place in places
-        if id(place.channel) not in taken
-        and place.channel.unit
-        and not is_asked(place.channel.name)
-        and (one := _candidate(place, signal, system, 0)[0]) is not None
-    ]
-    for signal, one in fitting:
-        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1:
-            assigned[signal.name] = one
+) -> Iterator[str]:
+    """Units that a user names, and that the files contradict: one of the two is wrong."""
+    for name in (one for one in given if one in assigned):
+        one, signal = assigned[name], system.signals[name]
+        ways = [conversion_to(unit, signal, system) for unit in (one.unit, one.channel.unit)]
+        if one.channel.unit and ways[0] != ways[1]:
+            yield _contradiction(files[one.file], one.label, one.unit, one.channel.unit)
+    for (i, j), clock in clocks.items():
+        stated = {one.name: one.unit for one in files[i].groups[j].channels}.get(clock.channel)
+        if stated and conversion(clock.unit, "s") != conversion(stated, "s"):
+            yield _contradiction(files[i], clock.channel, clock.unit, stated)
+
+
+def _contradiction(file: RecordedFile, channel: str, unit: str, stated: str) -> str:
+    return (
+        f"{file.path}, channel '{channel}': taken in [{unit}], as named, and the file states "
+        f"[{stated}]"
+    )

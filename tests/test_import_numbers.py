@@ -1,0 +1,353 @@
+"""Recorders' files that can be read in two ways: no number of them is taken in silence."""
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+from numpy.testing import assert_allclose
+from scipy.io import savemat
+
+from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.foreign import read_foreign
+from workbench.foreign.spelling import conversion, spelled
+from workbench.foreign.stamps import iso
+from workbench.mapping import NamedChannel, propose
+from workbench.mapping.clock import Clock
+from workbench.system import System
+from workbench.systems import load_system
+from workbench.template import write_system
+
+
+@pytest.fixture(scope="module")
+def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A tank with an inflow and a level, sampled each 0.5 s."""
+    folder = tmp_path_factory.mktemp("systems") / "tank"
+    write_system(folder)
+    return load_system(folder)
+
+
+# --- names above samples ---
+
+
+def table(path: Path, lines: list[str]) -> Path:
+    path.write_text("\n".join(lines))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "match"),
+    [
+        ("time [s]\tinflow [l/s]\th [mm]", "{0}\t{0}.5\t3.{0}\t950.2", "3 names over 4 columns"),
+        ("time [s]\tinflow [l/s]\th [mm]\t", "{0}\t{0}.5\t3.{0}\t950.2", "3 names over 4 columns"),
+        ("time [s],inflow [l/s],h [mm]", "{0},3,5,95,2", "3 names over 5 columns"),
+        ("Nr;time;h\ns;mm", "{0};{0}.5;950.2", "2 units below 3 names"),
+    ],
+    ids=["R without a name of rows", "the same by way of a spreadsheet", "commas", "units"],
+)
+def test_a_header_that_is_narrower_than_its_samples_is_refused(
+    tmp_path: Path, header: str, row: str, match: str
+) -> None:
+    path = table(tmp_path / "a.csv", [header, *(row.format(i) for i in range(1, 60))])
+    with pytest.raises(InputError, match=rf"above line \d: found {match}.*name every column"):
+        read_foreign(path)
+
+
+def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
+    rows = [f"{i};{i}.5;;" for i in range(60)]
+    (group,) = read_foreign(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
+    assert [one.name for one in group.channels] == ["time", "h"]
+
+
+# --- times ---
+
+
+def clock(path: Path, system: System, **columns: NamedChannel) -> Clock:
+    """The one clock of a file."""
+    (found,) = propose([read_foreign(path)], system, columns).clocks.values()
+    return found
+
+
+MINUTE = np.arange(0.0, 60.0, 0.5)  # s
+
+
+def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path: Path, tank: System) -> None:
+    said = {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE, "time_unit": "ms"}
+    savemat(tmp_path / "a.mat", {"h": said})
+    assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE, rtol=1e-12)
+
+
+def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path: Path, tank: System) -> None:
+    savemat(tmp_path / "a.mat", {"h": {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE}})
+    found = clock(tmp_path / "a.mat", tank)
+    assert (found.unit, found.certain) == ("ms", False)
+    said = clock(tmp_path / "a.mat", tank, time=NamedChannel("time", "ms"))
+    assert_allclose(said.times, MINUTE, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "step"), [("ms", 500.0), ("s", 0.5), ("", 0.5)])
+def test_steps_of_a_waveform_are_in_its_own_unit(
+    tmp_path: Path, tank: System, unit: str, step: float
+) -> None:
+    stated = {"unit_string": "mm", "wf_increment": step, "wf_start_offset": 2 * step}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        written = ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})
+        file.write_segment([written])
+    assert_allclose(clock(tmp_path / "a.tdms", tank).times, 1.0 + MINUTE, rtol=1e-12)
+
+
+def test_a_waveform_over_no_time_has_no_times(tmp_path: Path, tank: System) -> None:
+    stated = {"unit_string": "mm", "wf_increment": 0.5, "wf_xunit_string": "Hz"}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment([ChannelObject("G", "h", MINUTE, stated)])
+    with pytest.raises(InputError, match="found no time"):
+        clock(tmp_path / "a.tdms", tank)
+
+
+def test_durations_of_a_workbook_count_in_no_unit_of_their_column(
+    tmp_path: Path, tank: System
+) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(["Zeit [min]", "h [mm]"])
+    for t in MINUTE:
+        book.active.append([datetime.timedelta(hours=23.995, seconds=t), t])
+    book.save(tmp_path / "a.xlsx")
+    for named in ({}, {"time": NamedChannel("Zeit", "min")}):
+        assert_allclose(clock(tmp_path / "a.xlsx", tank, **named).times, MINUTE, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "rate"),
+    [
+        (["Filterfrequenz: 50 Hz", "Abtastrate: 2 Hz"], 2.0),
+        (["Abtastrate: 2 Hz; Grenzfrequenz: 50 Hz"], 2.0),
+        (["Carrier frequency: 4.8 kHz", "dt = 5e-1 s"], 2.0),
+        (["Sampling interval: 500 ms", "Messrate: 2 Hz"], 2.0),
+    ],
+)
+def test_a_rate_of_something_else_is_none_of_the_samples(
+    tmp_path: Path, tank: System, head: list[str], rate: float
+) -> None:
+    path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
+    assert_allclose(clock(path, tank).times, np.arange(60) / rate)
+
+
+@pytest.mark.parametrize(
+    ("head", "match"),
+    [
+        (["Filterfrequenz: 50 Hz"], "no time among"),
+        (["Messzeit: 30 s"], "no time among"),
+        (["Sample rate: 1,000 Hz"], "'1,000', which can be read with decimal commas or with"),
+        (["Sample rate: 2.000 Hz"], "'2.000', which can be read with decimal points or with"),
+        (["Abtastrate: 1 000 Hz"], "a preamble with '1 000', which may be one number or two"),
+        (["Abtastrate: 2 Hz", "Messrate: 5 Hz"], "'Abtastrate: 2 Hz' and 'Messrate: 5 Hz'"),
+    ],
+)
+def test_a_rate_in_doubt_is_refused_until_it_is_said(
+    tmp_path: Path, tank: System, head: list[str], match: str
+) -> None:
+    path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
+    with pytest.raises(InputError, match=f"{match}.*--sample-rate '200 Hz'"):
+        clock(path, tank)
+    (said,) = propose([read_foreign(path)], tank, {}, step=0.5).clocks.values()
+    assert_allclose(said.times, MINUTE[:60])
+
+
+@pytest.mark.parametrize("said", [None, 0.5])
+def test_one_rate_is_not_that_of_vectors_of_two_lengths(
+    tmp_path: Path, tank: System, said: float | None
+) -> None:
+    savemat(tmp_path / "a.mat", {"fs": 2.0, "h_mm": MINUTE, "inflow": MINUTE[::4], "gains": [1, 2]})
+    columns = {"inflow": NamedChannel("inflow", "l/s")}
+    with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
+        propose([read_foreign(tmp_path / "a.mat")], tank, columns, said)
+    assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
+
+
+def test_a_rate_that_is_stated_goes_before_a_unit_that_is_concluded(
+    tmp_path: Path, tank: System
+) -> None:
+    """In ms the count would be sampled as is usual."""
+    rows = [f"{500 * i};{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", ["Abtastrate: 2 Hz", "Zeit;h [mm]", *rows])
+    assert_allclose(clock(path, tank).times, MINUTE[:60])
+
+
+@pytest.mark.parametrize("named", [{}, {"time": NamedChannel("Zeit")}], ids=["found", "named"])
+def test_times_that_may_be_seconds_or_minutes_are_asked_for(
+    tmp_path: Path, tank: System, named: dict[str, NamedChannel]
+) -> None:
+    rows = [f"{i * 2 / 60:.6f};{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", ["Zeit;h [mm]", *rows])
+    with pytest.raises(InputError, match=r"without a unit.*--column 'time=\w+ \[UNIT\]'"):
+        clock(path, tank, **named)
+    said = clock(path, tank, time=NamedChannel("Zeit", "min"))
+    assert_allclose(said.times, 2.0 * np.arange(60), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "day", ["01-Mar-2024", "1 March 2024", "01-MAR-2024", "1. März 2024", "01.03.2024"]
+)
+def test_months_may_be_written_by_their_names(tmp_path: Path, tank: System, day: str) -> None:
+    """The first as MATLAB writes it."""
+    rows = [f"{day} 08:15:{t:06.3f};{t}" for t in MINUTE]
+    found = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
+    assert_allclose(found.times, MINUTE, atol=1e-9)
+    assert iso(found.start) == "2024-03-01T08:15:00.000000"
+
+
+@pytest.mark.parametrize("day", ["01-Mon-2024", "31-Feb-2024", "Mar-2024", "01-Mar-24 x"])
+def test_what_is_no_day_of_a_month_is_no_time(tmp_path: Path, tank: System, day: str) -> None:
+    rows = [f"{day} 08:15:{t:06.3f};{t};{t}" for t in MINUTE]
+    with pytest.raises(InputError, match="found no time"):
+        clock(table(tmp_path / "a.csv", ["Time;h [mm];v", *rows]), tank)
+
+
+# --- names, units ---
+
+
+@pytest.mark.parametrize("said", [{}, {"inflow": NamedChannel("inflow")}], ids=["found", "named"])
+def test_a_unit_that_nobody_says_is_to_be_confirmed(
+    tmp_path: Path, tank: System, said: dict[str, NamedChannel]
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [s];inflow;h [m]", *(f"{i};5;1" for i in range(60))])
+    proposal = propose([read_foreign(path)], tank, said)
+    assert not proposal.certain
+    (doubt,) = proposal.doubts
+    assert doubt.endswith("--column 'inflow=inflow [l/s]' confirms [l/s]")
+    confirmed = {"inflow": NamedChannel("inflow", "l/s")}
+    assert propose([read_foreign(path)], tank, confirmed).certain
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("Füllstandsollwert", "Sollfüllstand", "Füllstand-Soll", "FüllstandVorgabe"),
+        *("h_Anforderung", "h_sp", "h_req", "h dmd", "level_setpoint", "levelDemand"),
+    ],
+)
+def test_a_value_that_is_asked_for_is_no_measurement(
+    tmp_path: Path, tank: System, name: str
+) -> None:
+    rows = [f"{i};1.5;{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
+    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow"}
+
+
+@pytest.mark.parametrize("name", ["Rollenmessung h", "Radsatz-Rolle h", "h console"])
+def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, name: str) -> None:
+    rows = [f"{i};1.5;{i}" for i in range(60)]
+    path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
+    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow", "h"}
+
+
+ROWS = [f"{i};5;{i}" for i in range(60)]
+
+
+def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(
+    tmp_path: Path, tank: System
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h [Zoll]", *ROWS])
+    (problem,) = propose([read_foreign(path)], tank, {}).problems
+    assert problem == "h: 'h' is in [Zoll], a unit that is not known"
+    match = r"\[Zoll\], a unit that is not known.*convert the values, or name one .*'h=h \[UNIT\]'"
+    with pytest.raises(InputError, match=match):
+        propose([read_foreign(path)], tank, {"h": NamedChannel("h")})
+
+
+def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
+    tmp_path: Path, tank: System, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = table(tmp_path / "a.csv", ["t [ms];inflow [l/s];h [Zoll]", *ROWS])
+    command = [
+        "import",
+        str(path),
+        "--system",
+        str(tank.source.parent),
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    columns = ("time=t [s]", "h=h [mm]", "inflow=inflow [l/s]")
+    assert main([*command, *(part for one in columns for part in ("--column", one))]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "as named" in line]
+    assert [line.partition("channel ")[2] for line in told] == [
+        "'h': taken in [mm], as named, and the file states [Zoll]",
+        "'t': taken in [s], as named, and the file states [ms]",
+    ]
+
+
+def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
+    tmp_path: Path, system: System
+) -> None:
+    """A recording may be without the creep force, but its channel is seen."""
+    names = "t [s];Bremsdruck [bar];Antriebsmoment [kNm];v_Rad [m/s];v_Rolle [m/s]"
+    rows = [f"{0.01 * i:.2f};1.5;1.5;20.5;20.5;1.5" for i in range(60)]
+    told = {}
+    for force in ("F_long [kN]", "Längskraft [kp2]", "Temperatur [degC]"):
+        path = table(tmp_path / "a.csv", [f"{names};{force}", *rows])
+        proposal = propose([read_foreign(path)], system, {})
+        assert not proposal.problems
+        assert "Fx" not in proposal.assigned
+        told[force] = proposal.unmatched
+    assert told == {
+        "F_long [kN]": (
+            "Fx: it may be 'F_long'; nothing but its unit speaks for it, "
+            "--column 'Fx=F_long' confirms it",
+        ),
+        "Längskraft [kp2]": ("Fx: 'Längskraft' is in [kp2], a unit that is not known",),
+        "Temperatur [degC]": (),
+    }
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),
+    [
+        ("cm", "m", 0.01),
+        ("dm", "m", 0.1),
+        ("daN", "N", 10.0),
+        ("daNm", "N.m", 10.0),
+        ("kgf", "N", 9.80665),
+        ("kp", "N", 9.80665),  # as it was called in German
+        ("kgf/cm²", "Pa", 98066.5),  # 1 at, the technical atmosphere
+        ("kp/cm^2", "Pa", 98066.5),
+        ("lbf.ft", "N.m", 1.3558179483314004),  # NIST SP 811, appendix B.8
+        ("ft·lb", "N.m", 1.3558179483314004),
+        ("ft-lbf", "N.m", 1.3558179483314004),
+    ],
+)
+def test_units_of_workshops_are_known(unit: str, si: str, factor: float) -> None:
+    found = conversion(spelled(f"[{unit}]"), si)
+    assert found is not None
+    assert found.factor == pytest.approx(factor, rel=1e-15)
+    assert found.zero == 0.0
+
+
+def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
+    tmp_path: Path, system: System
+) -> None:
+    names = "t [s],BCP [psi],Torque,Wheel speed [mph],Roller speed [mph]"
+    rows = [f"{0.01 * i:.2f},20.5,3000.5,45.5,45.5" for i in range(60)]
+    (problem,) = propose(
+        [read_foreign(table(tmp_path / "a.csv", [names, *rows]))], system, {}
+    ).problems
+    assert problem == "tauR: 'Torque' has no unit and is plausible as N.m or lbf.ft"
+
+
+def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(
+    tmp_path: Path, tank: System
+) -> None:
+    """Two recordings on two sheets: one of them is named."""
+    book = openpyxl.Workbook()
+    for sheet in (book.active, book.create_sheet("two")):
+        sheet.append(["t [s]", "inflow [l/s]", "h [mm]"])
+        for t in MINUTE:
+            sheet.append([t, 5.0, t])
+    book.save(tmp_path / "a.xlsx")
+    held = read_foreign(tmp_path / "a.xlsx")
+    left = propose([held], tank, {}).left
+    assert "two/h [mm]" in left
+    named = {name: NamedChannel(f"two/{name}") for name in ("inflow", "h")}
+    assert propose([held], tank, named).certain
