@@ -4,6 +4,7 @@ A shell script stands in for omc: it writes down how it was called, prints what 
 leaves a file. Trajectories of real builds are compared in `test_clients`.
 """
 
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,8 @@ CHECKED = (
     '"Check of Rig.M completed successfully.\nClass Rig.M has {} equation(s) and {} variable(s)."'
 )
 
+OFFERS = 'providesDirectionalDerivative="true"'
+
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
@@ -30,11 +33,14 @@ def package(tmp_path: Path) -> Path:
 
 def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, prints: str, *, builds: bool) -> Path:
     """Put a program 'omc' on the PATH; returns the file in which it notes its call."""
-    calls, said = folder / "calls", folder / "said"
+    calls, said, built = folder / "calls", folder / "said", folder / "built"
     said.write_text(prints)
+    with zipfile.ZipFile(built, "w") as archive:
+        archive.writestr("modelDescription.xml", OFFERS)
+        archive.writestr("binaries/linux64/M.so", OFFERS)
     program = folder / "bin" / "omc"
     program.parent.mkdir()
-    leave = "echo fmu > M.fmu" if builds else ":"
+    leave = f"cp {built} M.fmu" if builds else ":"
     program.write_text(
         f'#!/bin/sh\necho "$@" > {calls}\ncat build.mos >> {calls}\n{leave}\ncat {said}\n'
     )
@@ -49,12 +55,15 @@ def test_omc_is_asked_for_an_fmu_that_observers_can_use(
     calls = stand_in(tmp_path, monkeypatch, CHECKED.format(7, 7), builds=True)
     out = tmp_path / "out" / "omc"
     assert build_with_omc(package, ["Rig.M"], out) == [out / "M.fmu"]
-    assert (out / "M.fmu").read_text() == "fmu\n"
+    with zipfile.ZipFile(out / "M.fmu") as archive:
+        # Wrong without aliases: the workbench would believe them, and wreck the gains.
+        assert b'"true"' not in archive.read("modelDescription.xml")
+        assert archive.read("binaries/linux64/M.so") == OFFERS.encode()
     assert [p.name for p in out.iterdir()] == ["M.fmu"]
     options, load, _, tolerance, build, _ = calls.read_text().splitlines()
     assert set(options.split()) == {
         "--fmiFlags=s:cvode",
-        "-d=-disableDirectionalDerivatives",
+        "-d=-disableDirectionalDerivatives",  # or each state is named twice
         "--preOptModules-=introduceOutputAliases",  # or an alias is the state
         "build.mos",
     }

@@ -1,17 +1,24 @@
 """Modelica to FMU by OpenModelica, the second compiler, where it is installed.
 
 FMI 2.0 only. Three of its defaults do not serve observers. Its Co-Simulation is explicit Euler,
-which a stiff motion does not survive: CVODE is asked for. Directional derivatives have to be asked
-for, too. An output that is a state gets an alias, which becomes the state in its place, so that its
-start value could not be set: no aliases. The tolerance of CVODE is that of the model's experiment
-when the FMU is built, whatever a tool asks of the FMU later: a tight one is written there, in omc's
-copy of the model alone. Source: OpenModelica User's Guide, chapters "FMI and TLM" and "Options".
+which a stiff motion does not survive: CVODE is asked for. An output that is a state gets an alias,
+which becomes the state in its place, so that its start value could not be set: no aliases. The
+tolerance of CVODE is that of the model's experiment when the FMU is built, whatever a tool asks of
+the FMU later: a tight one is written there, in omc's copy of the model alone.
+
+Without aliases its directional derivatives are wrong (1.26.9): there are no rows for outputs that
+are states, but the others are looked up as if there were, so that one output's are given for
+another, without an error. They are no longer offered, and whoever needs them takes differences.
+omc has to build them all the same: an FMU that it builds without names each state twice.
+Source: OpenModelica User's Guide, chapters "FMI and TLM" and "Options".
 """
 
+import io
 import re
 import shutil
 import subprocess
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +32,9 @@ _OPTIONS = (
     "--fmiFlags=s:cvode",
     "-d=-disableDirectionalDerivatives",
     "--preOptModules-=introduceOutputAliases",
+)
+_OFFERED, _WITHDRAWN = (
+    f'providesDirectionalDerivative="{value}"'.encode() for value in ("true", "false")
 )
 # So far below the 1e-6 of a usual experiment that CVODE is no part of the error of a comparison.
 _TOLERANCE = 1e-9
@@ -146,5 +156,17 @@ def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
                 expected="Modelica that OpenModelica translates to an FMU",
                 remedy="correct the source; the workbench's own compiler may say more",
             )
-        write_whole(folder / name, built.read_bytes())
+        write_whole(folder / name, _without_directional_derivatives(built))
     return folder / name
+
+
+def _without_directional_derivatives(fmu: Path) -> bytes:
+    """The FMU, whose description no longer offers them; all else in it as it was."""
+    written = io.BytesIO()
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(written, "w") as target:
+        for entry in source.infolist():
+            data = source.read(entry)
+            if entry.filename == "modelDescription.xml":
+                data = data.replace(_OFFERED, _WITHDRAWN)
+            target.writestr(entry, data)
+    return written.getvalue()

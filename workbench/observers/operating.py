@@ -109,9 +109,11 @@ def corrected_states(fmu: FMU, system: System) -> tuple[str, ...]:
 
     States that an extension adds, such as a temperature, follow from the model alone. A model that
     names its states otherwise is corrected in all of them.
+
+    In the order of that model: gains are numbered by it, and compilers order states as they like.
     """
     own = fmu.states if system.states is None else system.states
-    return tuple(name for name in fmu.states if name in own) or (fmu.states if own else ())
+    return tuple(name for name in own if name in fmu.states) or (fmu.states if own else ())
 
 
 def swinging_states(fmu: FMU, system: System) -> tuple[str, ...]:
