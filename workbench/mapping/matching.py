@@ -59,7 +59,7 @@ class Assigned:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class PlacedChannel:
     """Where a channel stands: file and group, and a name that no other channel has."""
 
     file: int
@@ -80,7 +80,7 @@ def unit_reason(reason: str, unit: str, concluded: bool) -> str:
 
 
 def match(
-    named: Mapping[str, Assigned], places: Sequence[Place], system: System
+    named: Mapping[str, Assigned], places: Sequence[PlacedChannel], system: System
 ) -> tuple[dict[str, Assigned], dict[str, str]]:
     """Channels by signal, those that are named and those that names and units tell; and doubts.
 
@@ -96,7 +96,7 @@ def match(
 
 
 def _candidate(
-    place: Place, signal: Signal, system: System, likeness: int
+    place: PlacedChannel, signal: Signal, system: System, likeness: int
 ) -> tuple[Assigned | None, str]:
     """A channel as a signal, or None and why it cannot be."""
     channel = place.channel
@@ -145,7 +145,7 @@ def _candidate(
 def _by_name(
     assigned: dict[str, Assigned],
     doubts: dict[str, str],
-    places: Sequence[Place],
+    places: Sequence[PlacedChannel],
     system: System,
 ) -> None:
     """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
@@ -181,7 +181,7 @@ def _by_unit(
     signals: Sequence[Signal],
     assigned: Mapping[str, Assigned],
     doubts: Mapping[str, str],
-    places: Sequence[Place],
+    places: Sequence[PlacedChannel],
     system: System,
 ) -> dict[str, Assigned]:
     """The only channel that has its unit, for each signal that alone lacks one of it."""

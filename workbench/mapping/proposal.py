@@ -8,7 +8,7 @@ from workbench.errors import InputError, closest
 from workbench.foreign import RecordedFile
 from workbench.foreign.spelling import conversion, is_unit
 from workbench.mapping.clock import Clock, read_clock
-from workbench.mapping.matching import Assigned, Place, match, unconfirmed, unit_reason
+from workbench.mapping.matching import Assigned, PlacedChannel, match, unconfirmed, unit_reason
 from workbench.mapping.names import TIME, NamedChannel, listed
 from workbench.mapping.units import conversion_to, fitting_units
 from workbench.system import System
@@ -121,7 +121,7 @@ def propose(
     return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
 
-def _places(files: Sequence[RecordedFile]) -> list[Place]:
+def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
     """All channels, each with a name that no other has, if groups have names."""
     found = [
         (i, j, group, channel)
@@ -131,12 +131,16 @@ def _places(files: Sequence[RecordedFile]) -> list[Place]:
     ]
     counts = Counter(channel.name for *_, channel in found)
     return [
-        Place(i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}")
+        PlacedChannel(
+            i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}"
+        )
         for i, j, group, one in found
     ]
 
 
-def _find(one: NamedChannel, signal: str, places: Sequence[Place], where: str) -> Place:
+def _find(
+    one: NamedChannel, signal: str, places: Sequence[PlacedChannel], where: str
+) -> PlacedChannel:
     """The place that a user names."""
     name = one.channel
     found = [place for place in places if place.channel.name == name]
@@ -157,7 +161,7 @@ def _find(one: NamedChannel, signal: str, places: Sequence[Place], where: str) -
 
 
 def _as_named(
-    one: NamedChannel, signal: Signal, places: Sequence[Place], system: System, where: str
+    one: NamedChannel, signal: Signal, places: Sequence[PlacedChannel], system: System, where: str
 ) -> Assigned:
     """The channel that a user names for a signal."""
     place = _find(one, signal.name, places, where)
@@ -188,7 +192,7 @@ def _as_named(
 
 
 def _no_unit_of(
-    signal: Signal, place: Place, unit: str, *, stated_by_user: bool, where: str
+    signal: Signal, place: PlacedChannel, unit: str, *, stated_by_user: bool, where: str
 ) -> InputError:
     """A unit that cannot become that of a signal; where one is stated, no other is proposed."""
     name = f"--column '{signal.name}={place.label}"
