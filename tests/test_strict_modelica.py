@@ -275,3 +275,27 @@ def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
     message = r"redeclaration of 'slot', which Lib\.N inherits.*declare 'slot' in Lib\.N"
     with pytest.raises(InputError, match=message):
         flatten(write(tmp_path, text), "Lib.M")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "model M extends A(k(max=2.0)=1.0); end M;",
+        "model M = A(k(max=2.0)=1.0);",
+        "model H A a; end H; model M H h(a(k(max=2.0)=1.0)); end M;",
+        "model H replaceable A a; end H; model M H h(redeclare A a(k(max=2.0)=1.0)); end M;",
+    ],
+)
+def test_a_value_that_the_front_end_would_lose_is_refused(text: str, tmp_path: Path) -> None:
+    """It would go on with the default: a model with another number, and no word of it."""
+    pytest.importorskip("rumoca")
+    from workbench.compiler.flat import flatten  # needs the extra
+
+    law = "model A parameter Real k(max=1.0) = 0.5; output Real y = k; end A; "
+    with pytest.raises(
+        InputError, match=r"package\.mo:\d+: found a value of 'k' together with max"
+    ):
+        flatten(write(tmp_path, law + text), "Lib.M")
+    alone = text.replace("k(max=2.0)=1.0", "k=1.0")
+    (tmp_path / "alone").mkdir()
+    flatten(write(tmp_path / "alone", law + alone), "Lib.M")

@@ -8,9 +8,9 @@ model SizeZeroIsNominal "No effect of this library has one by default"
   Effects.StartLoss start(u=runs);
   Effects.ReservoirHeat heat(isothermal=1e3*sin(time), p=p);
 equation
-  assert(valve.actual == 0.01*runs and falling.actual == 0.01*runs
-    and warming.actual == 0.01*runs, "The compressor");
-  assert(start.y == runs, "A start");
+  assert(abs(valve.actual - 0.01*runs) + abs(falling.actual - 0.01*runs)
+    + abs(warming.actual - 0.01*runs) <= 0.0, "The compressor");
+  assert(abs(start.y - runs) <= 0.0, "A start");
   assert(abs(heat.actual - 1e3*sin(time)) < 1e-9, "The air");
   annotation (experiment(StopTime=7.0, Tolerance=1e-6));
 end SizeZeroIsNominal;

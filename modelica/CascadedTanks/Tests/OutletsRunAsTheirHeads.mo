@@ -1,6 +1,7 @@
 within CascadedTanks.Tests;
 model OutletsRunAsTheirHeads "A head adds to the level, a laminar part to the flow"
-  Real h(unit="V") = 1.0 + time;
+  parameter Real rise(unit="V/s") = 1.0;
+  Real h(unit="V") = 1.0 + rise*time;
   Effects.LowerOutletHead head(nominal=0.2*Functions.root(h), h=h, k=0.2, head=3.0);
   Effects.LowerLaminarOutlet laminar(nominal=0.2*Functions.root(h), h=h, k=0.2, rate=0.01);
 equation

@@ -11,7 +11,7 @@ equation
   capacity*der(p) = -laminar.q;
   assert(abs(p - 1e5 - 3e5*exp(-0.1*time)) < 1.0, "The overpressure does not fall by 1/e in 10 s");
   assert(abs(gas.q - laminar.q*(p + 1e5)/2e5) < 1e-12, "Not proportional to the mean pressure");
-  assert(gas.q == -back.q, "Not the same in the other direction");
-  assert(steady.q == 2e-4, "Not steady");
+  assert(abs(gas.q + back.q) <= 0.0, "Not the same in the other direction");
+  assert(abs(steady.q - 2e-4) <= 0.0, "Not steady");
   annotation (experiment(StopTime=20.0, Tolerance=1e-8));
 end LeaksFollowPressure;

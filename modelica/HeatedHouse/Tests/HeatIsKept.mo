@@ -1,6 +1,7 @@
 within HeatedHouse.Tests;
 model HeatIsKept "What the air lost to walls is in them, or outside"
-  Effects.ShellStore shell(nominal=4000.0, T=293.0, G=200.0, heavy=0.75, inside=0.3, lag=20.0);
+  Effects.ShellStore shell(nominal=4000.0, T=293.0, G=200.0, heavy=0.75, inside=0.3,
+    lag(min=1.0)=20.0);
   Real balance(unit="J", start=0.0, fixed=true, nominal=1e5) "In less out";
 equation
   // Outside it is 273 K. A quarter goes there at once, the rest through two resistances.

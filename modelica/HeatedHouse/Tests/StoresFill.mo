@@ -1,7 +1,7 @@
 within HeatedHouse.Tests;
 model StoresFill "What a store took at last: its capacity times its rise"
   Effects.HeaterStore heater(power=1000.0, T=293.0, Ch=2e3, window=1e-3);
-  Effects.InteriorStore interior(nominal=0.0, T=294.0, G=190.0, Cm=1e3, lag=1.0);
+  Effects.InteriorStore interior(nominal=0.0, T=294.0, G=190.0, Cm=1e3, lag(min=1.0)=1.0);
   Real taken(unit="J", start=0.0, fixed=true, nominal=1e3) "By the heater";
   Real stored(unit="J", start=0.0, fixed=true, nominal=1e3) "By what is inside";
 equation

@@ -1,5 +1,6 @@
 within TrainRig.Tests;
 model SizeZeroIsNominal "With every effect at size zero the train moves as the nominal one"
+  constant Real tolerance(unit="1") = 1e-8 "Of the solver, as in the experiment";
   Real p(unit="Pa") = 2.0e5*(1.0 - exp(-time)) "In all cylinders";
   TwoVehicles nominal(
     pB1=p, pB2=p, pB3=p, pB4=p, mass1=47e3, mass2=53e3, slope1=1e-3, slope2=0.0, curve=0.0,
@@ -21,7 +22,9 @@ model SizeZeroIsNominal "With every effect at size zero the train moves as the n
     redeclare Effects.LowAdhesion adhesion, redeclare Effects.WrongGradient gradient,
     redeclare Effects.AirResistance airResistance, redeclare Effects.LateSpeed speedSensor);
 equation
-  assert(abs(zero.vTrain - nominal.vTrain) < 1e-9, "The train moves otherwise");
-  assert(abs(zero.omegaReading[5] - nominal.omegaReading[5]) < 1e-9, "The reading is another one");
+  // A solver may leave its tolerance of 30 m/s and of 65 rad/s, tenfold for what adds up.
+  assert(abs(zero.vTrain - nominal.vTrain) < 10.0*tolerance*30.0, "The train moves otherwise");
+  assert(abs(zero.omegaReading[5] - nominal.omegaReading[5]) < 10.0*tolerance*65.0,
+    "The reading is another one");
   annotation (experiment(StopTime=5.0, Tolerance=1e-8));
 end SizeZeroIsNominal;

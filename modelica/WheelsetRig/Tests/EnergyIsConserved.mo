@@ -1,7 +1,7 @@
 within WheelsetRig.Tests;
 model EnergyIsConserved "Without dampers, brakes, losses and friction the rig keeps its energy"
   Reference rig(
-    muWR=1e-15, pB=0.0, tauR=0.0, dmuWR=0.0, dmuDC=0.0,
+    muWR(min=0.0)=1e-15, pB=0.0, tauR=0.0, dmuWR=0.0, dmuDC=0.0,
     redeclare Losses.NoLoss wheelsetLoss, redeclare Losses.NoLoss rollerLoss,
     primary(each d=0.0), axleBox(each d=zeros(3), each dRot=zeros(3)),
     unit(each d=0.0, each dPitch=0.0), longitudinal(each d=0.0), vertical(each d=0.0),
