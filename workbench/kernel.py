@@ -20,7 +20,7 @@ from numba.extending import intrinsic
 from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
-from workbench.linking import PartCompiler, WholeCompiler
+from workbench.linking import PartCompiler
 
 
 class _Law(CPUDispatcher):  # type: ignore[misc]
@@ -38,7 +38,7 @@ class _Law(CPUDispatcher):  # type: ignore[misc]
     @cached_property
     def wrapped(self) -> Any:
         """The function as Python calls it; its code is kept between runs."""
-        dispatcher = njit(**self._options, pipeline_class=WholeCompiler)(self.py_func)
+        dispatcher = njit(**self._options)(self.py_func)
         with suppress(RuntimeError):  # a function without a file is compiled in each process
             dispatcher._cache = CodeCache(self.py_func)
         return dispatcher

@@ -108,9 +108,9 @@ def _all_fit(columns: Sequence[Sequence[str]], reading: str) -> bool:
 def values_of(cells: Sequence[str], reading: str) -> Vector:
     """Numbers of a column, (n,); NaN where there is none."""
     pattern, python = _READINGS[reading]
-    plain = reading == _POINT
+    as_python = reading == _POINT
     try:  # nearly always all are numbers, and Python's own reader is the fastest
-        values = np.array([float(cell if plain else python(cell)) for cell in cells])
+        values = np.array([float(cell if as_python else python(cell)) for cell in cells])
     except ValueError:
         values = np.array(
             [float(python(cell)) if pattern.fullmatch(cell) else math.nan for cell in cells]
