@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,25 +32,26 @@ def read_groups(content: Mapping[str, Any]) -> tuple[list[Group], list[str]]:
     """
     groups: list[Group] = []
     notes: list[str] = []
-    _collect("", content, groups, notes)
+    _collect((), content, groups, notes)
     return groups, notes
 
 
-def _collect(path: str, content: Mapping[str, Any], groups: list[Group], notes: list[str]) -> None:
+def _collect(
+    within: tuple[str, ...], content: Mapping[str, Any], groups: list[Group], notes: list[str]
+) -> None:
     units = _units(content)
     by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
         name, unit = named(key)
         unit = unit or units.get(key, "")
         if isinstance(value, Mapping):
-            inner = f"{path}/{key}" if path else key
             one = _timed(name, value)
             if one is not None:
-                groups.append(one)
+                groups.append(replace(one, within=within))
             elif (found := _single(name, value)) is not None:
                 by_size.setdefault(found.values.size, []).append(found)
             else:
-                _collect(inner, value, groups, notes)
+                _collect((*within, key), value, groups, notes)
         elif isinstance(value, np.ndarray):
             for channel in _columns(name, unit, value, content):
                 by_size.setdefault(channel.values.size, []).append(channel)
@@ -57,8 +59,8 @@ def _collect(path: str, content: Mapping[str, Any], groups: list[Group], notes: 
                 notes.append(f"'{key}' has {value.ndim} dimensions")
     for size, channels in by_size.items():
         if size > 1:
-            name = path if len(by_size) == 1 else f"{path}{'/' * bool(path)}{size} samples"
-            groups.append(Group(name, tuple(channels), step=_step(content)))
+            name = "/".join(within if len(by_size) == 1 else (*within, f"{size} samples"))
+            groups.append(Group(name, tuple(channels), step=_step(content), within=within))
 
 
 def _step(content: Mapping[str, Any]) -> float:
@@ -151,3 +153,8 @@ def _columns(
 
 def _flat(value: np.ndarray) -> np.ndarray:
     return np.asarray(value, dtype=np.float64).ravel()
+
+
+def numbered(entries: Sequence[Any]) -> dict[str, Any]:
+    """Structures of an array of them, by the place that MATLAB gives them."""
+    return {f"({number})": entry for number, entry in enumerate(entries, 1)}

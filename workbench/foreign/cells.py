@@ -179,7 +179,9 @@ def read_group(
             )
         channels.append(FileChannel(*labels[i], values))
     step, doubt = stated_step(table.head)
-    return Group(name, (*stamps, *channels), step=step, step_doubt=doubt), reading, notes
+    within = (name,) if name else ()
+    group = Group(name, (*stamps, *channels), step=step, step_doubt=doubt, within=within)
+    return group, reading, notes
 
 
 def _joined(

@@ -20,6 +20,8 @@ class FileChannel:
     about : what the file says of it beside the name.
     start : of time stamps, the time from which they count [s since 1970]; NaN: none is known.
     stamp : whether values are times that were written as dates or times of day.
+    shown : of time stamps without a known date, what they show where they count from [s]; NaN: no
+        time of day.
     """
 
     name: str
@@ -28,6 +30,7 @@ class FileChannel:
     about: str = ""
     start: float = math.nan
     stamp: bool = False
+    shown: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,7 @@ class Group:
         may be the time.
     step : time between two samples that the file states [s]; NaN: it states none.
     step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
+    within : names of what holds it in the file, outermost first: a sheet, nested structures.
     """
 
     name: str
@@ -49,6 +53,7 @@ class Group:
     time: FileChannel | None = None
     step: float = math.nan
     step_doubt: str = ""
+    within: tuple[str, ...] = ()
 
     def renamed(self, name: str) -> "Group":
         """The same group with another name."""

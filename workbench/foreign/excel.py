@@ -25,6 +25,7 @@ def read(path: Path, raw: bytes) -> Contents:
     """
     book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
     sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+    hidden = {sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible"}
     groups: list[Group] = []
     notes: list[str] = []
     refusal: InputError | None = None
@@ -41,6 +42,7 @@ def read(path: Path, raw: bytes) -> Contents:
                 notes.append(f"sheet '{title}' was left out: {error.found}")
             continue
         groups.append(group)
+        notes += [f"sheet '{title}' is hidden"] * (title in hidden)
         notes += [f"sheet '{title}': {note}" for note in own]
         left = sum(i + 1 >= table.lines[0] for i in filled) - len(table.lines)
         if left:

@@ -1,13 +1,14 @@
 """MAT 7.3, which is HDF5, and plain HDF5 with units in attributes."""
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from workbench.foreign.arrays import read_groups
+from workbench.foreign.arrays import numbered, read_groups
 from workbench.foreign.contents import Contents
 
 _CLASS = "MATLAB_class"
@@ -24,8 +25,14 @@ def read(path: Path, raw: bytes) -> Contents:
 
 def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     """What a group holds, by name; #refs# are what cells point at."""
+    structures = _structures(group, file)
+    return numbered(structures) if structures else _entries(dict(group.items()), file)
+
+
+def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
+    """Values of entries, their units, and what is nested in them."""
     found: dict[str, Any] = {}
-    for name, item in group.items():
+    for name, item in items.items():
         if name.startswith("#"):
             continue
         if isinstance(item, h5py.Group):
@@ -41,9 +48,31 @@ def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     return found
 
 
-def _value(item: h5py.Dataset, file: h5py.File) -> Any:
+def _structures(group: h5py.Group, file: h5py.File) -> list[dict[str, Any]]:
+    """Of an array of structures each one: a field is a list of references; empty: it is none."""
+    fields = dict(group.items())
+    if _class_of(group) != "struct" or not all(map(_refers, fields.values())):
+        return []
+    if len({one.size for one in fields.values()}) != 1:
+        return []
+    rows = zip(*(np.ravel(one[()]) for one in fields.values()), strict=True)
+    return [_entries({k: file[r] for k, r in zip(fields, row, strict=True)}, file) for row in rows]
+
+
+def _refers(item: Any) -> bool:
+    """Whether a dataset holds references, and is no list of a cell array."""
+    held = isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is not None
+    return held and _class_of(item) != "cell"
+
+
+def _class_of(item: Any) -> str:
+    """What MATLAB says that an entry is; empty where it says nothing."""
     kind = item.attrs.get(_CLASS, b"")
-    kind = kind.decode() if isinstance(kind, bytes) else str(kind)
+    return kind.decode() if isinstance(kind, bytes) else str(kind)
+
+
+def _value(item: h5py.Dataset, file: h5py.File) -> Any:
+    kind = _class_of(item)
     if item.dtype.kind == "O" and h5py.check_ref_dtype(item.dtype) is not None:
         entries = [_value(file[reference], file) for reference in np.ravel(item[()])]
         return [entry for entry in entries if isinstance(entry, str)]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat
 
-from workbench.foreign.arrays import read_groups
+from workbench.foreign.arrays import numbered, read_groups
 from workbench.foreign.contents import Contents
 
 
@@ -24,6 +24,8 @@ def _plain(value: Any) -> Any:
     """Arrays, texts, lists of texts, and mappings of them."""
     if isinstance(value, dict):
         return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+        return _plain(numbered(value))
     if isinstance(value, np.ndarray) and value.dtype.kind in "OU":
         return [str(entry) for entry in value.ravel() if isinstance(entry, str)]
     return value

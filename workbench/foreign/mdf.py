@@ -73,4 +73,6 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
     # Some are sampled over an angle or a way.
     timed = master is not None and getattr(held.channels[master], "sync_type", _TIME) <= _TIME
     title = str(getattr(held.channel_group, "acq_name", "") or "") or f"group {index + 1}"
-    return Group(title, tuple(channels), time=clock if timed else None)
+    # Recorders may give several groups one name.
+    within = title, str(index + 1)
+    return Group(title, tuple(channels), time=clock if timed else None, within=within)

@@ -57,7 +57,8 @@ def read_stamps(name: str, cells: Sequence[str]) -> FileChannel | None:
     # A step back by more than half a period is the next day, or the next hour.
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
-    return FileChannel(name, "s", _from_first(times, known), stamp=True)
+    shown = float(times[known][0])
+    return FileChannel(name, "s", _from_first(times, known), stamp=True, shown=shown)
 
 
 def has_day(cells: Sequence[str]) -> bool:
@@ -89,8 +90,10 @@ def _dated(name: str, texts: Sequence[str]) -> FileChannel | None:
     fractions = _fractions(matches)
     times = (whole - begin) + fractions
     surely = matches[int(known.argmax())]["mark"] != "/"  # type: ignore[index]
-    start = begin + float(fractions[known][0]) if surely else math.nan
-    return FileChannel(name, "s", _from_first(times, known), start=start, stamp=True)
+    shown = begin + float(fractions[known][0])
+    start = shown if surely else math.nan
+    values = _from_first(times, known)
+    return FileChannel(name, "s", values, start=start, stamp=True, shown=shown)
 
 
 def _day_first(matches: Sequence[re.Match[str] | None]) -> bool | None:

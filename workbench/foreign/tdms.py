@@ -68,7 +68,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         if step > 0.0:
             times = offset + step * np.arange(size, dtype=np.float64)
             clock = FileChannel("time", "s", times, start=start if start >= 0.0 else np.nan)
-        groups.append(Group(held.name, tuple(channels), time=clock))
+        groups.append(Group(held.name, tuple(channels), time=clock, within=(held.name,)))
     return groups
 
 

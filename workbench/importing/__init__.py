@@ -17,10 +17,9 @@ from workbench.case import check_recording
 from workbench.conditions import UNKNOWN, conditions_shown, read_conditions
 from workbench.errors import InputError
 from workbench.files import write_json, write_whole
-from workbench.foreign import RecordedFile
 from workbench.foreign.stamps import iso
 from workbench.importing.cutting import Cut, cut
-from workbench.mapping import COLUMNS, Measured, NamedChannel, ProposedMapping, merge
+from workbench.mapping import COLUMNS, Measured, NamedChannel, Recording, merge
 from workbench.plausibility import Origin, doubts
 from workbench.provenance import commit
 from workbench.recording import Vector
@@ -34,7 +33,7 @@ __all__ = [
     "Piece",
     "case_name",
     "describe",
-    "import_files",
+    "import_recording",
     "imported",
     "store",
     "write",
@@ -70,37 +69,36 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Import:
-    """What becomes of some files that hold one recording, or one long one.
+    """What becomes of one recording, or one long one.
 
     Attributes
     ----------
+    recording : files that hold it, and its channels.
     measured : all of it, in SI units.
     parts : in which it was cut.
     pieces : those that become cases.
     """
 
-    files: tuple[RecordedFile, ...]
-    proposal: ProposedMapping
+    recording: Recording
     measured: Measured
     parts: tuple[Cut, ...]
     pieces: tuple[Piece, ...] = field(default_factory=tuple)
 
 
-def import_files(
+def import_recording(
     name: str,
-    files: Sequence[RecordedFile],
-    proposal: ProposedMapping,
+    recording: Recording,
     system: System,
     conditions: Mapping[str, Any],
     *,
     whole: bool = False,
 ) -> Import:
-    """Make recordings of files whose channels are known.
+    """Make cases of a recording whose channels are known.
 
     Parameters
     ----------
     name : of the case, or of all that a long recording is cut into, with numbers.
-    proposal : channels of all signals that are needed, confirmed.
+    recording : with channels of all signals that are needed, confirmed.
     conditions : of all these recordings, as `case.toml` has them.
     whole : leave a long recording as it is.
 
@@ -110,8 +108,8 @@ def import_files(
         If signals have no samples in common, a condition is none of the system's, or a recording
         cannot be what it says it is.
     """
-    where = ", ".join(str(one.path) for one in files)
-    measured = merge(files, proposal, system)
+    where = recording.where
+    measured = merge(recording.files, recording.proposal, system)
     check_recording(measured.time, system, f"{where}, time", None)
     parts = [Cut(0, measured.time.size)] if whole else cut(measured.time, measured.signals, system)
     kept = [one for one in parts if not one.reason]
@@ -128,13 +126,24 @@ def import_files(
         _piece(own, one, measured, system, conditions, where)
         for own, one in zip(names, kept, strict=True)
     ]
-    return Import(tuple(files), proposal, measured, tuple(parts), tuple(pieces))
+    return Import(recording, measured, tuple(parts), tuple(pieces))
 
 
-def case_name(path: Path) -> str:
-    """Name of a case: letters, figures and signs that every file system takes."""
+def case_name(path: Path, part: str = "") -> str:
+    """Name of a case: letters, figures and signs that every file system takes.
+
+    Parameters
+    ----------
+    part : name of a sheet or group that holds a recording of its own.
+
+    Examples
+    --------
+    >>> case_name(Path("monday.xlsx")), case_name(Path("monday.xlsx"), "120 km/h wet")
+    ('monday', 'monday_120_km_h_wet')
+    """
     stem = re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", path.name)
-    return re.sub(r"[^\w.+-]+", "_", stem).strip("._") or "recording"
+    names = (re.sub(r"[^\w.+-]+", "_", name).strip("._") for name in (stem, part))
+    return "_".join(filter(None, names)) or "recording"
 
 
 def _piece(
@@ -189,7 +198,8 @@ def write(one: Import, out: Path, system: System) -> None:
     """
     written: dict[str, str] = {}
     for piece in one.pieces:
-        names = ", ".join(file.path.name for file in one.files)
+        names = ", ".join(file.path.name for file in one.recording.files)
+        names += f", '{one.recording.name}'" if one.recording.name else ""
         case = {"title": f"{piece.name}, imported from {names}"}
         conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
         measurement = {"measurement": {"file": "measured.csv"}}
@@ -216,12 +226,13 @@ def describe(one: Import, system: System) -> dict[str, Any]:
                 "notes": list(file.notes),
                 "doubts": list(file.doubts),
             }
-            for file in one.files
+            for file in one.recording.files
         ],
+        "recording": one.recording.name or None,
         "began": iso(measured.start + float(time[0])) or None,
         "time": _described_clocks(one),
         "channels": _described_channels(one, system),
-        "dropped": list(one.proposal.left),
+        "dropped": list(one.recording.proposal.left),
         "notes": list(measured.notes),
         "cut": [
             {
@@ -249,23 +260,25 @@ def describe(one: Import, system: System) -> dict[str, Any]:
 
 
 def _described_clocks(one: Import) -> list[dict[str, Any]]:
+    files = one.recording.files
     return [
         {
-            "file": one.files[file].path.name,
-            "group": one.files[file].groups[group].name,
+            "file": files[file].path.name,
+            "group": files[file].groups[group].name,
             "channel": clock.channel or None,
             "unit": clock.unit,
             "reason": clock.reason,
         }
-        for (file, group), clock in one.proposal.clocks.items()
+        for (file, group), clock in one.recording.proposal.clocks.items()
     ]
 
 
 def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]]:
+    files = one.recording.files
     return {
         name: {
-            "file": one.files[found.file].path.name,
-            "group": one.files[found.file].groups[found.group].name,
+            "file": files[found.file].path.name,
+            "group": files[found.file].groups[found.group].name,
             "channel": found.channel.name,
             "unit": found.unit,
             "unit_stated": not found.concluded,
@@ -277,7 +290,7 @@ def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]
             },
             "reason": found.reason,
         }
-        for name, found in one.proposal.assigned.items()
+        for name, found in one.recording.proposal.assigned.items()
     }
 
 

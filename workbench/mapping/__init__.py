@@ -2,15 +2,11 @@
 
 from workbench.mapping.merge import Measured, merge
 from workbench.mapping.names import TIME, NamedChannel, listed, parse_named, read_named
+from workbench.mapping.parting import propose_recordings
 from workbench.mapping.proposal import ProposedMapping, propose
-from workbench.mapping.reading import (
-    COLUMNS,
-    Told,
-    has_own_names,
-    read_measured,
-    stored_columns,
-    usable,
-)
+from workbench.mapping.reading import has_own_names, read_measured
+from workbench.mapping.recordings import Recording, Recordings
+from workbench.mapping.told import COLUMNS, Told, stored_columns
 
 __all__ = [
     "COLUMNS",
@@ -18,14 +14,16 @@ __all__ = [
     "Measured",
     "NamedChannel",
     "ProposedMapping",
+    "Recording",
+    "Recordings",
     "Told",
     "has_own_names",
     "listed",
     "merge",
     "parse_named",
     "propose",
+    "propose_recordings",
     "read_measured",
     "read_named",
     "stored_columns",
-    "usable",
 ]

@@ -68,6 +68,11 @@ class PlacedChannel:
     channel: FileChannel
     label: str
 
+    @property
+    def full(self) -> str:
+        """Name with that of its group, whether or not others have the same."""
+        return f"{self.holder.name}/{self.channel.name}"
+
 
 def unconfirmed(signal: str, channel: str, unit: str) -> str:
     """That nobody has said a unit, and how to."""

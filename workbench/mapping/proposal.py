@@ -144,7 +144,7 @@ def _find(
     """The place that a user names."""
     name = one.channel
     found = [place for place in places if place.channel.name == name]
-    found = found or [place for place in places if place.label == name]
+    found = found or [place for place in places if name in (place.label, place.full)]
     found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
     if signal == TIME and found:
         return found[0]

@@ -1,69 +1,18 @@
 """A recorder's file as signals, by what was confirmed before or what is certain."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from workbench.errors import InputError
-from workbench.foreign import RecordedFile, read_foreign
+from workbench.foreign import read_foreign
 from workbench.mapping.merge import Measured, merge
-from workbench.mapping.names import TIME, NamedChannel, read_named
-from workbench.mapping.proposal import ProposedMapping, propose
+from workbench.mapping.names import TIME, NamedChannel, listed
+from workbench.mapping.parting import propose_recordings
+from workbench.mapping.proposal import ProposedMapping
+from workbench.mapping.told import Told
 from workbench.recording import header
 from workbench.system import System
-from workbench.tables import read_table
-
-COLUMNS = "columns.toml"  # which channels are which signals, in all files of a folder
-
-
-@dataclass(frozen=True)
-class Told:
-    """What a user says of a recording that its file does not say.
-
-    Attributes
-    ----------
-    conditions : as `case.toml` has them.
-    columns : channels by signal.
-    step : between two samples [s].
-    """
-
-    conditions: Mapping[str, Any] = field(default_factory=dict)
-    columns: Mapping[str, NamedChannel] = field(default_factory=dict)
-    step: float | None = None
-
-
-def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
-    """Channels by signal that were confirmed for a folder; empty where none were.
-
-    Raises
-    ------
-    InputError
-        If the file is no TOML, or names no signal of the system.
-    """
-    path = folder / COLUMNS
-    if not path.is_file():
-        return {}
-    table = read_table(path, "correct the file", "[columns]")
-    table.refuse_unknown("columns")
-    return read_named(table.table("columns"), system)
-
-
-def usable(
-    stored: Mapping[str, NamedChannel], files: Sequence[RecordedFile]
-) -> dict[str, NamedChannel]:
-    """Of stored channels those that some files have, in no other unit than what was confirmed."""
-    units: dict[str, str] = {}
-    for group in (group for one in files for group in one.groups):
-        for channel in group.channels:
-            units[channel.name] = units[f"{group.name}/{channel.name}"] = channel.unit
-    return {
-        signal: one
-        for signal, one in stored.items()
-        if one.channel in units
-        and (not one.unit or not units[one.channel] or one.unit == units[one.channel])
-    }
 
 
 def has_own_names(path: Path, system: System) -> bool:
@@ -89,11 +38,21 @@ def read_measured(
     Raises
     ------
     InputError
-        If the file cannot be read, or somebody must say what its channels are.
+        If the file cannot be read, holds several recordings, or somebody must say what its
+        channels are.
     """
     recorded = read_foreign(path)
-    known = {**usable(stored, [recorded]), **told.columns}
-    proposal = propose([recorded], system, known, told.step)
+    found = propose_recordings([recorded], system, stored, told)
+    if len(found.held) > 1:
+        names = [f"'{one.name}'" for one in found.held]
+        raise InputError(
+            where=str(path),
+            found=f"{len(names)} recordings, {listed(names)}",
+            expected="one",
+            remedy=f"run 'workbench import {path} --out CASES', which makes a case of each, or "
+            "name the channels of one, --column 'SIGNAL=GROUP/CHANNEL'",
+        )
+    (proposal,) = (one.proposal for one in found.held)
     if not proposal.certain:
         raise _unsure(path, proposal)
     return merge([recorded], proposal, system)

@@ -29,10 +29,17 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         action="store_true",
         help="take what is proposed by name without asking, but not what only a unit speaks for",
     )
-    parser.add_argument(
+    parts = parser.add_mutually_exclusive_group()
+    parts.add_argument(
         "--together",
         action="store_true",
-        help="the files are of one recording, by several recorders",
+        help="the files, with all sheets and groups, are of one recording, by several recorders",
+    )
+    parts.add_argument(
+        "--apart",
+        action="store_true",
+        help="sheets or groups with the same channels are recordings of their own, even if their "
+        "times overlap",
     )
     parser.add_argument(
         "--whole", action="store_true", help="do not cut a long recording into several"
