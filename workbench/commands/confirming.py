@@ -1,6 +1,7 @@
 """What files are taken for is shown, and one question asks for all of it."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,8 @@ def confirmed(
         else:
             name, value = read_condition(answer, system)
             conditions[name] = value
-    told = Told(known.conditions, columns, known.step, known.apart)
-    return _complete(files, propose_recordings(files, system, stored, told), []), conditions
+    found = propose_recordings(files, system, stored, replace(known, columns=columns))
+    return _complete(files, found, []), conditions
 
 
 def _answers(files: Sequence[RecordedFile], found: Recordings) -> list[str]:

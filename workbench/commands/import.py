@@ -78,6 +78,7 @@ def _files(
         if [file["sha256"] for file in one["files"]] != hashes or one.get("recording") not in names
     ]
     refused = list(found.refused)
+    warned: set[str] = set()
     for recording in found.held:
         name = _free_name(paths[0], recording.name, by_now)
         try:
@@ -89,7 +90,7 @@ def _files(
         store(options.out, {**stored, **found.named})
         if len(one.parts) > 1:
             draw_cuts(one, name, system, options.out)
-        _tell(one, output)
+        _tell(one, output, warned)
         by_now = [*by_now, describe(one, system)]
         record = by_now
         write_record(options.out, system, record)
@@ -106,15 +107,17 @@ def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> st
     return next(one for one in chain((name, second), further) if one.casefold() not in taken)
 
 
-def _tell(one: Import, output: Output) -> None:
-    """Say what was written, what nobody knows, and what is unlikely."""
-    for doubt in one.measured.doubts:
-        print(f"warning: {doubt}", file=sys.stderr, flush=True)
+def _tell(one: Import, output: Output, warned: set[str]) -> None:
+    """Say what was written, what nobody knows, and what is unlikely and was not said by now."""
+    doubts = list(one.measured.doubts)
     for piece in one.pieces:
         unknown = [key for key, source in piece.sources.items() if source == UNKNOWN]
         known = [f"{key} {value}" for key, value in piece.conditions.items() if key not in unknown]
         words = [f"{piece.time.size} samples, {piece.time[-1]:.4g} s", *known]
         words += [f"unknown: {', '.join(unknown)} (--condition says it)"] * bool(unknown)
         output.result(f"  {piece.name}: {'; '.join(words)}")
-        for doubt in piece.doubts:
+        doubts += piece.doubts
+    for doubt in doubts:
+        if doubt not in warned:
             print(f"warning: {doubt}", file=sys.stderr, flush=True)
+            warned.add(doubt)

@@ -1,8 +1,9 @@
 """Signals of different rates and recorders, at common times: nothing is invented in a gap."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -100,8 +101,29 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
     zero = min(begun, default=math.nan)
     damaged = [f"{one.path}: {doubt}" for one in files for doubt in one.doubts]
-    doubts = *damaged, *proposal.contradictions
+    doubts = *damaged, *proposal.contradictions, *_mixed(files, proposal)
     return Measured(time[known], signals, zero, tuple(notes), doubts)
+
+
+def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
+    """Signals of groups of a file that may be two recordings: one holds the other's channel, too.
+
+    Where both have dates, they are brought together by these.
+    """
+    for (name, one), (_, other) in permutations(proposal.assigned.items(), 2):
+        keys = (one.file, one.group), (other.file, other.group)
+        dated = all(math.isfinite(proposal.clocks[key].start) for key in keys)
+        if one.file != other.file or one.group == other.group or dated:
+            continue
+        file = files[one.file]
+        own, theirs = (file.groups[group] for _, group in keys)
+        if any(channel.name == other.channel.name for channel in own.channels):
+            yield (
+                f"{file.path}: {name} is taken from '{own.name}', which holds "
+                f"'{other.channel.name}' as '{theirs.name}' does, from which that is taken: they "
+                "may be two recordings"
+            )
+            return
 
 
 def _starts(

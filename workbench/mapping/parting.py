@@ -16,7 +16,7 @@ from workbench.mapping.simultaneous import at_one_time
 from workbench.mapping.told import Told, usable
 from workbench.system import System
 
-_Signature = tuple[tuple[tuple[str, NamedChannel], ...], frozenset[str]]
+_Signature = tuple[tuple[tuple[str, NamedChannel], ...], tuple[str, ...], frozenset[str]]
 
 
 def propose_recordings(
@@ -84,8 +84,7 @@ def _doubted(
 ) -> Recording | InputError:
     """Files as one recording, where parts of them may be recordings of their own."""
     if isinstance(whole, Recording):
-        problems = doubt, *whole.proposal.problems
-        return replace(whole, proposal=replace(whole.proposal, problems=problems))
+        return replace(whole, proposal=replace(whole.proposal, problems=(doubt,)))
     return InputError(
         where=where(files, ""),
         found=doubt,
@@ -132,10 +131,14 @@ def _alike(tried: Sequence[Recording], system: System) -> list[Recording]:
 
 
 def _signature(one: Recording, system: System) -> _Signature:
-    """Channels of all signals that are needed; where some have none, the names of all channels."""
-    named = one.proposal.named
+    """Channels of all signals that are needed; where some have none, the names of all channels.
+
+    A unit that was named for all sheets is not taken for one that states another.
+    """
+    named, proposal = one.proposal.named, one.proposal
     needed = tuple((name, named[name]) for name in (TIME, *_needed(system)) if name in named)
-    return needed, _names(one.files[0]) if one.proposal.problems else frozenset()
+    names = _names(one.files[0]) if proposal.problems else frozenset()
+    return needed, proposal.contradictions, names
 
 
 def _names(file: RecordedFile) -> frozenset[str]:
@@ -182,7 +185,9 @@ def _refusal(
     if isinstance(outcome, InputError):
         found, remedy = outcome.found, outcome.remedy
     else:
-        found = "; ".join([*outcome.proposal.problems, *_differences(outcome, first, system)])
+        differences = _differences(outcome, first, system)
+        proposal = outcome.proposal
+        found = "; ".join([*proposal.problems, *differences, *proposal.contradictions])
         remedy = "give it the names and units of the others, or --column 'SIGNAL=CHANNEL [unit]'"
     return InputError(
         where=where([file], name),

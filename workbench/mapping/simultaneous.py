@@ -15,6 +15,7 @@ from workbench.system import System
 _SAME = 1e-3  # of how far an output goes: repeated experiments differ by more, filters by less
 _COPIED = 0.9  # of all rows: cut out of a longer recording
 _FEW = 10  # rows that differ, of which by chance most may be in another recording
+_NEAR = 0.1  # of a recording's length: how long after its own zero it may begin
 _DATE, _CLOCK = "date", "clock"
 _CHOICE = ": they are two recordings, --apart, or one, of which channels are named GROUP/CHANNEL"
 
@@ -68,7 +69,7 @@ def _span(one: Recording) -> _Span | None:
         held = np.sort(times[np.isfinite(times)]) + zero
         if held.size > 1:
             begin, end = float(held[0]), float(held[-1])
-            own_zero = begin <= float(np.median(np.diff(held))) and end >= 0.0
+            own_zero = begin <= _NEAR * (end - begin) and end >= 0.0
             if kind == _DATE or not own_zero:
                 return _Span(kind, begin, end)
     return None
@@ -116,4 +117,5 @@ def _rows(part: Recording, system: System) -> Vector:
 def _same_rows(one: Vector, other: Vector) -> str:
     """What to call rows that are nearly all in both; or nothing."""
     short, long = sorted((one, other), key=np.size)
-    return "all signals" * (short.size > _FEW and np.isin(short, long).mean() >= _COPIED)
+    copied = short.size > _FEW and np.isin(short, long).mean() >= _COPIED
+    return "all signals" if copied else ""
