@@ -13,8 +13,8 @@ from workbench.foreign import RecordedFile
 from workbench.mapping import (
     TIME,
     NamedChannel,
-    Recording,
-    Recordings,
+    ProposedRecording,
+    ProposedRecordings,
     Told,
     listed,
     parse_named,
@@ -33,7 +33,7 @@ def confirmed(
     known: Told,
     output: Output,
     yes: bool,
-) -> tuple[Recordings, dict[str, Any]]:
+) -> tuple[ProposedRecordings, dict[str, Any]]:
     """Recordings with their channels, and conditions, after one question at most.
 
     Parameters
@@ -65,7 +65,7 @@ def confirmed(
     return _complete(files, found, []), conditions
 
 
-def _answers(files: Sequence[RecordedFile], found: Recordings) -> list[str]:
+def _answers(files: Sequence[RecordedFile], found: ProposedRecordings) -> list[str]:
     """What the user answers to a proposal: nothing, or corrections."""
     taken = "name what is missing" if found.problems else "Enter takes this"
     print(f"{taken}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
@@ -85,8 +85,8 @@ def _answers(files: Sequence[RecordedFile], found: Recordings) -> list[str]:
 
 
 def _complete(
-    files: Sequence[RecordedFile], found: Recordings, doubts: Sequence[str]
-) -> Recordings:
+    files: Sequence[RecordedFile], found: ProposedRecordings, doubts: Sequence[str]
+) -> ProposedRecordings:
     """The proposal, if all that is needed has a channel.
 
     Raises
@@ -105,7 +105,7 @@ def _complete(
     return found
 
 
-def _shown(files: Sequence[RecordedFile], found: Recordings, system: System) -> str:
+def _shown(files: Sequence[RecordedFile], found: ProposedRecordings, system: System) -> str:
     """What files are and what their channels are taken for, a line each."""
     lines = [f"{one.path}: {one.kind}" for one in files]
     if len(found.held) > 1:
@@ -119,7 +119,7 @@ def _shown(files: Sequence[RecordedFile], found: Recordings, system: System) -> 
     return "\n".join(lines)
 
 
-def _clocks(held: Sequence[Recording]) -> Iterator[str]:
+def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
     """Times of recordings; those that are alike are one line."""
     rows: list[_Row] = []
     for one in held:
@@ -134,7 +134,7 @@ def _clocks(held: Sequence[Recording]) -> Iterator[str]:
         yield f"  {TIME:<10} {channel:<28} {steps} ({reason}){where}"
 
 
-def _channels(held: Sequence[Recording], system: System) -> Iterator[str]:
+def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str]:
     """Channels of signals, with the range over all recordings that have them alike."""
     for signal in system.signals.values():
         scale = si_factor(signal.shown, signal.unit, signal.name)

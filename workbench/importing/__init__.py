@@ -19,7 +19,7 @@ from workbench.errors import InputError
 from workbench.files import write_json, write_whole
 from workbench.foreign.stamps import iso
 from workbench.importing.cutting import Cut, cut
-from workbench.mapping import COLUMNS, Measured, NamedChannel, Recording, merge
+from workbench.mapping import COLUMNS, Measured, NamedChannel, ProposedRecording, merge
 from workbench.plausibility import Origin, doubts
 from workbench.provenance import commit
 from workbench.recording import Vector
@@ -79,7 +79,7 @@ class Import:
     pieces : those that become cases.
     """
 
-    recording: Recording
+    recording: ProposedRecording
     measured: Measured
     parts: tuple[Cut, ...]
     pieces: tuple[Piece, ...] = field(default_factory=tuple)
@@ -87,7 +87,7 @@ class Import:
 
 def import_recording(
     name: str,
-    recording: Recording,
+    recording: ProposedRecording,
     system: System,
     conditions: Mapping[str, Any],
     *,
@@ -138,8 +138,8 @@ def case_name(path: Path, part: str = "") -> str:
 
     Examples
     --------
-    >>> case_name(Path("monday.xlsx")), case_name(Path("monday.xlsx"), "120 km/h wet")
-    ('monday', 'monday_120_km_h_wet')
+    >>> case_name(Path("monday.xlsx")), case_name(Path("monday.xlsx"), "120 % load, warm")
+    ('monday', 'monday_120_load_warm')
     """
     stem = re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", path.name)
     names = (re.sub(r"[^\w.+-]+", "_", name).strip("._") for name in (stem, part))

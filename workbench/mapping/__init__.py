@@ -5,7 +5,7 @@ from workbench.mapping.names import TIME, NamedChannel, listed, parse_named, rea
 from workbench.mapping.parting import propose_recordings
 from workbench.mapping.proposal import ProposedMapping, propose
 from workbench.mapping.reading import has_own_names, read_measured
-from workbench.mapping.recordings import Recording, Recordings
+from workbench.mapping.recordings import ProposedRecording, ProposedRecordings
 from workbench.mapping.told import COLUMNS, Told, stored_columns
 
 __all__ = [
@@ -14,8 +14,8 @@ __all__ = [
     "Measured",
     "NamedChannel",
     "ProposedMapping",
-    "Recording",
-    "Recordings",
+    "ProposedRecording",
+    "ProposedRecordings",
     "Told",
     "has_own_names",
     "listed",

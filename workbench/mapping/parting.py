@@ -11,7 +11,7 @@ from workbench.errors import InputError
 from workbench.foreign import Group, RecordedFile
 from workbench.mapping.names import TIME, NamedChannel, listed
 from workbench.mapping.proposal import propose
-from workbench.mapping.recordings import Recording, Recordings, where
+from workbench.mapping.recordings import ProposedRecording, ProposedRecordings, where
 from workbench.mapping.simultaneous import at_one_time
 from workbench.mapping.told import Told, usable
 from workbench.system import System
@@ -24,7 +24,7 @@ def propose_recordings(
     system: System,
     stored: Mapping[str, NamedChannel],
     told: Told,
-) -> Recordings:
+) -> ProposedRecordings:
     """Propose recordings, and channels for each.
 
     Files are one recording where their channels tell it, as they do if one sheet alone holds them.
@@ -42,7 +42,7 @@ def propose_recordings(
         As `propose`; or if it cannot be told whether parts of a file are recordings of their own.
     """
     whole = _tried("", files, system, stored, told)
-    settled = isinstance(whole, Recording) and not whole.proposal.problems
+    settled = isinstance(whole, ProposedRecording) and not whole.proposal.problems
     one = told.apart is False or len(files) > 1 or settled or _names_a_group(told, files)
     found = None if one else _apart(files[0], system, stored, told)
     if found is not None:
@@ -53,7 +53,7 @@ def propose_recordings(
             whole = _doubted(whole, doubt, files)
     if isinstance(whole, InputError):
         raise whole
-    return Recordings((whole,))
+    return ProposedRecordings((whole,))
 
 
 def _tried(
@@ -62,11 +62,11 @@ def _tried(
     system: System,
     stored: Mapping[str, NamedChannel],
     told: Told,
-) -> Recording | InputError:
+) -> ProposedRecording | InputError:
     """Some files or parts of them as one recording, or why they cannot be proposed as one."""
     try:
         known = {**usable(stored, files), **told.columns}
-        return Recording(name, tuple(files), propose(files, system, known, told.step))
+        return ProposedRecording(name, tuple(files), propose(files, system, known, told.step))
     except InputError as error:
         return error
 
@@ -80,10 +80,10 @@ def _names_a_group(told: Told, files: Sequence[RecordedFile]) -> bool:
 
 
 def _doubted(
-    whole: Recording | InputError, doubt: str, files: Sequence[RecordedFile]
-) -> Recording | InputError:
+    whole: ProposedRecording | InputError, doubt: str, files: Sequence[RecordedFile]
+) -> ProposedRecording | InputError:
     """Files as one recording, where parts of them may be recordings of their own."""
-    if isinstance(whole, Recording):
+    if isinstance(whole, ProposedRecording):
         return replace(whole, proposal=replace(whole.proposal, problems=(doubt,)))
     return InputError(
         where=where(files, ""),
@@ -96,19 +96,21 @@ def _doubted(
 
 def _apart(
     file: RecordedFile, system: System, stored: Mapping[str, NamedChannel], told: Told
-) -> Recordings | None:
+) -> ProposedRecordings | None:
     """The recordings of a file whose parts hold the same channels; None: it has no such parts."""
     for depth in range(1, 1 + max(len(group.within) for group in file.groups)):
         parts: dict[tuple[str, ...], list[Group]] = {}
         for group in file.groups:
             parts.setdefault(group.within[:depth], []).append(group)
-        tried: dict[str, Recording | InputError] = {}
+        tried: dict[str, ProposedRecording | InputError] = {}
         held: dict[str, RecordedFile] = {}
         for path, groups in parts.items():
-            name = "/".join(path) or file.path.stem
+            name = "/".join(path) or file.path.name  # what stands outside of all others
             held[name] = replace(file, groups=tuple(groups))
             tried[name] = _tried(name, [held[name]], system, stored, told)
-        alike = _alike([one for one in tried.values() if isinstance(one, Recording)], system)
+        alike = _alike(
+            [one for one in tried.values() if isinstance(one, ProposedRecording)], system
+        )
         if alike:
             return _sorted_out(alike, tried, held, system)
     return None
@@ -118,11 +120,11 @@ def _needed(system: System) -> list[str]:
     return [one.name for one in (*system.inputs, *system.outputs)]
 
 
-def _alike(tried: Sequence[Recording], system: System) -> list[Recording]:
+def _alike(tried: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
     """Most of those that hold the same channels, at least two; those without problems first."""
-    classes: dict[_Signature, list[Recording]] = {}
+    classes: dict[_Signature, list[ProposedRecording]] = {}
     for one in tried:
-        # Channels of one name, however many, are no recording if they are fewer than its signals.
+        # A part with fewer channels than a recording has signals is that of one logger.
         if not one.proposal.problems or len(_names(one.files[0])) >= len(_needed(system)):
             classes.setdefault(_signature(one, system), []).append(one)
     several = [held for held in classes.values() if len(held) > 1]
@@ -130,7 +132,7 @@ def _alike(tried: Sequence[Recording], system: System) -> list[Recording]:
     return max(complete or several, key=len, default=[])
 
 
-def _signature(one: Recording, system: System) -> _Signature:
+def _signature(one: ProposedRecording, system: System) -> _Signature:
     """Channels of all signals that are needed; where some have none, the names of all channels.
 
     A unit that was named for all sheets is not taken for one that states another.
@@ -146,11 +148,11 @@ def _names(file: RecordedFile) -> frozenset[str]:
 
 
 def _sorted_out(
-    alike: Sequence[Recording],
-    tried: Mapping[str, Recording | InputError],
+    alike: Sequence[ProposedRecording],
+    tried: Mapping[str, ProposedRecording | InputError],
     held: Mapping[str, RecordedFile],
     system: System,
-) -> Recordings:
+) -> ProposedRecordings:
     """Recordings, and of what else the file holds which parts look like further ones."""
     first = alike[0].proposal
     taken = {first.assigned[name].channel.name for name in _needed(system) if name in first.named}
@@ -171,14 +173,14 @@ def _sorted_out(
         replace(one, files=tuple(replace(f, notes=(*f.notes, *notes)) for f in one.files))
         for one in alike
     ]
-    return Recordings(tuple(recordings), tuple(refused), notes)
+    return ProposedRecordings(tuple(recordings), tuple(refused), notes)
 
 
 def _refusal(
     name: str,
-    outcome: Recording | InputError,
+    outcome: ProposedRecording | InputError,
     file: RecordedFile,
-    first: Recording,
+    first: ProposedRecording,
     system: System,
 ) -> InputError:
     """Why a part of a file is no recording, where others are."""
@@ -197,7 +199,7 @@ def _refusal(
     )
 
 
-def _differences(one: Recording, other: Recording, system: System) -> Iterator[str]:
+def _differences(one: ProposedRecording, other: ProposedRecording, system: System) -> Iterator[str]:
     """Channels that are not those of another recording, in words."""
     named, others = one.proposal.named, other.proposal.named
     for signal in (TIME, *_needed(system)):

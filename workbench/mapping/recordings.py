@@ -10,7 +10,7 @@ from workbench.mapping.proposal import ProposedMapping
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class ProposedRecording:
     """One recording, with the channels that are proposed for it.
 
     Attributes
@@ -30,7 +30,7 @@ class Recording:
 
 
 @dataclass(frozen=True, eq=False)
-class Recordings:
+class ProposedRecordings:
     """All recordings of some files.
 
     Attributes
@@ -40,7 +40,7 @@ class Recordings:
     beside : what else the file holds, in words.
     """
 
-    held: tuple[Recording, ...]
+    held: tuple[ProposedRecording, ...]
     refused: tuple[InputError, ...] = ()
     beside: tuple[str, ...] = ()
 

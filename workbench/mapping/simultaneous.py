@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.foreign import FileChannel
 from workbench.foreign.stamps import iso
-from workbench.mapping.recordings import Recording
+from workbench.mapping.recordings import ProposedRecording
 from workbench.recording import Vector
 from workbench.system import System
 
@@ -39,7 +39,7 @@ class _Span:
         return f"{self.begin:.9g} s to {self.end:.9g} s"
 
 
-def at_one_time(parts: Sequence[Recording], system: System) -> str:
+def at_one_time(parts: Sequence[ProposedRecording], system: System) -> str:
     """Why it cannot be told whether parts are recordings of their own, in words; empty: they are.
 
     Times that count from a zero within them are of a recording of their own.
@@ -56,7 +56,7 @@ def at_one_time(parts: Sequence[Recording], system: System) -> str:
     return ""
 
 
-def _span(one: Recording) -> _Span | None:
+def _span(one: ProposedRecording) -> _Span | None:
     """When a part was recorded; None: its times count from a zero of their own."""
     for key, clock in one.proposal.clocks.items():
         group = one.files[key[0]].groups[key[1]]
@@ -79,21 +79,22 @@ def _is_dated(channel: FileChannel) -> bool:
     return bool(np.isfinite(channel.start) or np.isfinite(channel.shown))
 
 
-def _same_output(one: Recording, other: Recording, system: System) -> str:
+def _same_output(one: ProposedRecording, other: ProposedRecording, system: System) -> str:
     """An output that goes the same way in both, counted from their first samples; or none."""
     for signal in system.outputs:
         if not all(signal.name in part.proposal.assigned for part in (one, other)):
             continue
         (t, x), (u, y) = (_samples(part, signal.name) for part in (one, other))
         near = u <= t[-1]
-        spread = float(np.std(y[near]))
-        apart = float(np.sqrt(np.mean((np.interp(u[near], t, x) - y[near]) ** 2)))
+        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
+            spread = float(np.std(y[near]))
+            apart = float(np.sqrt(np.mean((np.interp(u[near], t, x) - y[near]) ** 2)))
         if near.sum() > _FEW and spread > 0.0 and apart <= _SAME * spread:
             return signal.name
     return ""
 
 
-def _samples(part: Recording, signal: str) -> tuple[Vector, Vector]:
+def _samples(part: ProposedRecording, signal: str) -> tuple[Vector, Vector]:
     """Times from the first sample [s], and values, SI, where there are any."""
     one = part.proposal.assigned[signal]
     times, values = part.proposal.clocks[one.file, one.group].times, one.values
@@ -103,14 +104,15 @@ def _samples(part: Recording, signal: str) -> tuple[Vector, Vector]:
     return times[held] - times[held][0], values[held]
 
 
-def _rows(part: Recording, system: System) -> Vector:
+def _rows(part: ProposedRecording, system: System) -> Vector:
     """A number for each row of signals that differs from all others; empty if rates differ."""
     needed = [one.name for one in (*system.inputs, *system.outputs)]
     held = [part.proposal.assigned[name] for name in needed if name in part.proposal.assigned]
     if not held or len({(one.file, one.group) for one in held}) > 1:
         return np.empty(0)
     weights = np.sqrt(np.arange(2.0, 2.0 + len(held)))
-    sums = (np.column_stack([one.values for one in held]) * weights).sum(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        sums = (np.column_stack([one.values for one in held]) * weights).sum(axis=1)
     return np.unique(sums[np.isfinite(sums)])
 
 
