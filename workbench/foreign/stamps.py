@@ -147,5 +147,8 @@ def iso(seconds: float) -> str:
     """A time since 1970 as people and programs read it; empty where it is not known."""
     if not math.isfinite(seconds):
         return ""
-    moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds)
+    try:
+        moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds)
+    except OverflowError:  # no calendar goes as far
+        return ""
     return moment.replace(tzinfo=None).isoformat(timespec="microseconds")
