@@ -9,6 +9,7 @@ import hashlib
 import os
 import pickle
 import tempfile
+import time
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -20,8 +21,14 @@ from numba.core import caching, serialize
 
 from workbench.shelf import cache_folder
 
+try:
+    import fcntl
+except ImportError:  # Windows: there each process compiles for itself
+    fcntl = None  # type: ignore[assignment]
+
 _DIGEST = hashlib.sha256().digest_size
 _PACKAGE = Path(__file__).parent
+_PATIENCE = 120.0  # [s]: several times what any function here takes to compile
 
 
 @cache
@@ -108,8 +115,51 @@ class _File:
         return hashlib.sha256(self._state + b"\0" + content).digest()
 
 
+@cache
+def _turns() -> int:
+    """File of which a process holds a byte while it compiles; closing it would end all turns.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made.
+    """
+    _folder().mkdir(parents=True, exist_ok=True)
+    return os.open(_folder() / "turns", os.O_RDWR | os.O_CREAT, 0o600)
+
+
+class _Turn:
+    """Compiling one function, one process at a time; the system ends it with the process."""
+
+    def __init__(self, path: Path) -> None:
+        # Functions that share a byte wait for each other, which costs time alone.
+        self._byte = int.from_bytes(hashlib.sha256(str(path).encode()).digest()[:4], "little")
+
+    def take(self) -> None:
+        """Wait until no other process has it, or is stopped while it has."""
+        end = time.monotonic() + _PATIENCE
+        while fcntl is not None and time.monotonic() < end:
+            try:
+                fcntl.lockf(_turns(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte)
+            except BlockingIOError:
+                time.sleep(0.02)
+            except OSError:  # no place for the file, or one on which nothing can be locked
+                return
+            else:
+                return
+
+    def end(self) -> None:
+        """Let the next one read what was compiled."""
+        if fcntl is not None:
+            with suppress(OSError):
+                fcntl.lockf(_turns(), fcntl.LOCK_UN, 1, self._byte)
+
+
 class CodeCache(caching.FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function in our folder; numba's own setting is left to the user."""
+    """numba's cache of a function in our folder; numba's own setting is left to the user.
+
+    What several processes need at once is compiled by one of them, while the others wait.
+    """
 
     _impl_class = _CodeCache
 
@@ -119,3 +169,16 @@ class CodeCache(caching.FunctionCache):  # type: ignore[misc]
         state = f"{numba.__version__} {llvmlite.__version__} {stamp}"
         path = Path(self._cache_path, f"{self._impl.filename_base}.code")
         self._cache_file = _File(path, state)
+        self._turn = _Turn(path)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Code for a signature; None if this process has to compile it, until `compiled`."""
+        code = super().load_overload(sig, target_context)
+        if code is None:
+            self._turn.take()
+            code = super().load_overload(sig, target_context)
+        return code
+
+    def compiled(self) -> None:
+        """What had to be compiled is, or cannot be."""
+        self._turn.end()

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
@@ -21,6 +21,23 @@ from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
 from workbench.linking import PartCompiler
+
+
+class _Kept(CPUDispatcher):  # type: ignore[misc]
+    """A function that Python calls, whose code is kept between runs."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=options)
+        with suppress(RuntimeError):  # a function without a file is compiled in each process
+            self._cache = CodeCache(function)
+
+    def compile(self, sig: Any) -> Any:
+        """Code for a signature, kept or made."""
+        try:
+            return super().compile(sig)
+        finally:
+            if isinstance(self._cache, CodeCache):
+                self._cache.compiled()
 
 
 class _Law(CPUDispatcher):  # type: ignore[misc]
@@ -36,12 +53,9 @@ class _Law(CPUDispatcher):  # type: ignore[misc]
         self._options = options
 
     @cached_property
-    def wrapped(self) -> Any:
-        """The function as Python calls it; its code is kept between runs."""
-        dispatcher = njit(**self._options)(self.py_func)
-        with suppress(RuntimeError):  # a function without a file is compiled in each process
-            dispatcher._cache = CodeCache(self.py_func)
-        return dispatcher
+    def wrapped(self) -> _Kept:
+        """The function as Python calls it."""
+        return _Kept(self.py_func, {"nopython": True, **self._options})
 
     def __call__(self, *given: Any) -> Any:
         return self.wrapped(*given)
