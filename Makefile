@@ -5,8 +5,9 @@ RUN := $(VENV)/bin/python
 # Modelica compiler of `make fmus`: workbench, or omc (OpenModelica, writes to build/omc)
 COMPILER ?= workbench
 
-# On all processors; the slowest are listed.
-PYTEST := $(RUN) -m pytest --numprocesses logical --maxprocesses 4 --dist worksteal --durations 10
+# One more than processors, as tests wait for programs that they start; the slowest are listed.
+WORKERS := $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN))
+PYTEST := $(RUN) -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist worksteal --durations 10
 # The long tests, and all that their diagnoses are made of; what is left out are layers above, which
 # they cannot import.
 LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/conftest.py \

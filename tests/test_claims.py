@@ -3,6 +3,7 @@
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import pytest
@@ -22,6 +23,15 @@ CLAIMS = [
     for library in LIBRARIES
     for claim in (library / "Tests" / "package.order").read_text().split()
 ]
+# Models that take longest to build; one claim on them is among the short tests.
+MULTIBODY = re.compile(r"\b(Reference|CoupledTrain|StiffCoupler)\b")
+SHORT = "EnergyIsConserved"
+
+
+def parameters(library: Path, claim: str) -> Any:
+    text = (library / "Tests" / f"{claim}.mo").read_text()
+    is_long = claim != SHORT and MULTIBODY.search(text) is not None
+    return pytest.param(library, claim, marks=[pytest.mark.long] * is_long)
 
 
 def simulate(package: Path, claim: str, scratch: Path) -> list[str]:
@@ -63,7 +73,9 @@ def test_every_claim_is_listed(library: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("library", "claim"), CLAIMS, ids=lambda value: getattr(value, "name", value)
+    ("library", "claim"),
+    [parameters(*one) for one in CLAIMS],
+    ids=lambda value: getattr(value, "name", value),
 )
 def test_claim(library: Path, claim: str, tmp_path: Path) -> None:
     assert simulate(library / "package.mo", claim, tmp_path) == []

@@ -67,8 +67,8 @@ PLANTED = {
     "time_skew": ("LoggerTimeSkew[speeds]", "skew", 0.025),
     "roller_radius": ("RollerRadius", "delta", -5e-4),
 }
-# One each of pads, contact and losses; others of cylinders, sensors and what turns are found below.
-SHORT = {"fade", "wheel_load", "roller_losses"}
+# Others of cylinders, sensors and what turns are found below.
+SHORT = {"fade"}
 # Dry stops in which pressure only rises and no wheel slides do not show these.
 HIDDEN = {"caliper_hysteresis", "adhesion_recovery", "wheel_inertia"}
 OUTSIDE = {"friction_step": 0.05, "friction_ripple": 0.02, "drive_beat": 0.03}
@@ -138,6 +138,7 @@ def test_a_planted_effect_is_named_with_its_size(
         assert one.low - 0.1 * abs(size) <= size <= one.high + 0.1 * abs(size)
 
 
+@pytest.mark.long
 def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Path) -> None:
     """As by `--model Extended.fmu`: what was found of the pads acts in every simulation."""
     cases = recorded(tmp_path / "stops", Effects(cylinder_lag=0.06), 511)
@@ -152,7 +153,8 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Pat
     assert (again.diagnosis.verdict, again.extension) == ("nothing", None)
 
 
-@pytest.mark.parametrize("planted", mostly_long(sorted(HIDDEN), {"adhesion_recovery"}))
+@pytest.mark.long
+@pytest.mark.parametrize("planted", sorted(HIDDEN))
 def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     planted: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -163,6 +165,7 @@ def test_an_effect_that_the_stops_do_not_show_is_not_invented(
     assert set(found.not_visible) == {"CaliperHysteresis", "FallingFriction", "WheelInertia"}
 
 
+@pytest.mark.long
 def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
     tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -187,6 +190,7 @@ def test_nothing_is_found_without_a_measured_force(
     assert diagnosed([case.without(["Fx"]) for case in clean]).verdict == "nothing"
 
 
+@pytest.mark.long
 def test_stops_by_one_clock_show_none_that_is_late(
     clean: list[Case], everything: Path, tmp_path: Path
 ) -> None:
@@ -204,6 +208,7 @@ def test_stops_by_one_clock_show_none_that_is_late(
     assert abs(np.mean(ratios)) < 4.0 / np.sqrt(len(ratios))
 
 
+@pytest.mark.long
 def test_fade_is_found_without_a_measured_force(
     tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
 ) -> None:
@@ -229,14 +234,8 @@ def test_a_late_logger_is_named_whatever_it_records(
     assert skew.low <= 0.025 <= skew.high
 
 
-@pytest.mark.parametrize(
-    "signals",
-    [
-        ("pB", "Fx"),
-        *(pytest.param((name,), marks=pytest.mark.long) for name in LATE),
-    ],
-    ids="-".join,
-)
+@pytest.mark.long
+@pytest.mark.parametrize("signals", [("pB", "Fx"), *((name,) for name in LATE)], ids="-".join)
 def test_a_late_logger_that_nobody_declared_is_no_other_cause(
     signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
 ) -> None:
@@ -258,13 +257,14 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(
     assert (found.verdict, found.causes, found.gain) == ("unexplained", (), None)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        pytest.param("fade", "wheel_radius", marks=pytest.mark.long),
+        ("fade", "wheel_radius"),
         ("speed_friction", "fx_offset"),
-        pytest.param("cylinder_lag", "roller_losses", marks=pytest.mark.long),
-        pytest.param("pressure_offset", "cylinder_lag", marks=pytest.mark.long),
+        ("cylinder_lag", "roller_losses"),
+        ("pressure_offset", "cylinder_lag"),
     ],
 )
 def test_two_effects_are_found_one_after_the_other(

@@ -46,8 +46,7 @@ def run_life(fmi: int, sources: Path) -> subprocess.CompletedProcess[str]:
     [
         (2, "MinimalObserver"),
         (3, "MinimalObserver"),
-        (3, "Reference"),
-        pytest.param(2, "Reference", marks=pytest.mark.long),
+        *(pytest.param(fmi, "Reference", marks=pytest.mark.long) for fmi in (2, 3)),
     ],
 )
 def test_a_life_with_right_and_wrong_calls_is_clean(fmi: int, model: str, tmp_path: Path) -> None:

@@ -150,11 +150,12 @@ def diagnosed(
         return found, [one.set_aside for one in simulations.recordings]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("planted", "name", "size"),
     [
         ("adhesion_recovery", "AdhesionRecovery", 0.3),
-        pytest.param("falling_friction", "FallingFriction", 0.3, marks=pytest.mark.long),
+        ("falling_friction", "FallingFriction", 0.3),
     ],
 )
 def test_what_slip_makes_of_friction_is_named_from_three_slides(

@@ -161,6 +161,7 @@ def test_a_labelled_fault_is_named_with_its_place(name: str, train: System, tmp_
         assert cause.parameters[size].low < planted < cause.parameters[size].high
 
 
+@pytest.mark.long
 def test_a_wrong_radius_is_named_with_its_axle(train: System, tmp_path: Path) -> None:
     """Among three causes on every axle, in two stops of the four."""
     pytest.importorskip("rumoca")

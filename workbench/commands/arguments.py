@@ -98,6 +98,16 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_platforms(parser: argparse.ArgumentParser, fmu: str, usual: str) -> None:
+    """Add for which platforms an FMU is compiled."""
+    parser.add_argument(
+        "--platforms",
+        choices=("native", "all"),
+        default=usual,
+        help=f"of {fmu}: this machine's, or all (default: %(default)s)",
+    )
+
+
 def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
     """Add the cases to read and the folder to write to."""
     parser.add_argument(

@@ -3,7 +3,7 @@
 import argparse
 import hashlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -30,6 +30,7 @@ _Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Write the observer as an FMU, and the package."""
     require_compiler()
+    from workbench.compiler import PLATFORMS, native
     from workbench.export import write_package
 
     system = load_system(options.system)
@@ -38,7 +39,8 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     if reference is None and REFERENCE in system.models:
         reference = model_path(system, REFERENCE)
     with claimed(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
-        model, make = _maker(stack, system, chosen)
+        platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
+        model, make = _maker(stack, system, chosen, platforms)
         name = model.rpartition(".")[2]
 
         def build(fmi: int) -> "BuiltFMU":
@@ -95,17 +97,19 @@ def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
     return _Choice(kind, gains, path.read_text(encoding="utf-8"), path.name)
 
 
-def _maker(stack: ExitStack, system: System, chosen: _Choice) -> tuple[str, "_Make"]:
+def _maker(
+    stack: ExitStack, system: System, chosen: _Choice, platforms: Sequence[str]
+) -> tuple[str, "_Make"]:
     """Dotted name of an estimator's FMU, and what builds it: of its Modelica class, or its law."""
     from workbench.export import EstimatorLaw, ObserverModel, build_law, build_observer
 
     kind, gains = chosen.kind, chosen.gains
     if kind.name in system.export.classes:
         observer = ObserverModel(system, kind, gains, chosen.text)
-        return observer.model, partial(build_observer, observer)
+        return observer.model, partial(build_observer, observer, platforms=platforms)
     fmu = stack.enter_context(open_model(system, kind.role))
     law = EstimatorLaw(kind(fmu, system, gains), chosen.text)
-    return law.model, partial(build_law, law)
+    return law.model, partial(build_law, law, platforms=platforms)
 
 
 def _summary(system: System, chosen: _Choice, built: "BuiltFMU") -> dict[str, Any]:

@@ -6,6 +6,7 @@ from workbench.commands.arguments import (
     Commands,
     add_effects,
     add_model,
+    add_platforms,
     add_recordings,
     add_run,
     add_system,
@@ -47,12 +48,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser.add_argument(
         "--list", action="store_true", help="list the effects of the library, and end"
     )
-    parser.add_argument(
-        "--platforms",
-        choices=("native", "all"),
-        default="native",
-        help="of the extended FMU: this machine's, or all (default: %(default)s)",
-    )
+    add_platforms(parser, "the extended FMU", "native")
     parser.add_argument(
         "--propose",
         action="store_true",

@@ -3,7 +3,14 @@
 import argparse
 from pathlib import Path
 
-from workbench.commands.arguments import Commands, add_isolated, add_out, add_reference, add_system
+from workbench.commands.arguments import (
+    Commands,
+    add_isolated,
+    add_out,
+    add_platforms,
+    add_reference,
+    add_system,
+)
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -41,6 +48,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         default=2,
         help="version of the FMU; SSP 1.0 packages hold FMI 2.0 (default: %(default)s)",
     )
+    add_platforms(export, "the FMU", "all")
     add_reference(export, "(FMI 2.0) that the package connects the observer to")
     add_out(export, "results/export")
     add_isolated(export)
