@@ -34,8 +34,8 @@ help:
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
 	@echo "make test       format, lint, types, import layers, FMUs against sources, tests"
-	@echo "make test-long  the tests that 'make test' leaves out: many more diagnoses; before a"
-	@echo "                release, and by .ci/run when what they test has changed"
+	@echo "make test-long  the tests that 'make test' leaves out, most diagnoses and claims on"
+	@echo "                multibody models; before a release, and by .ci/run when needed"
 	@echo "make clean      remove the environment and results"
 
 $(VENV)/run.stamp: pyproject.toml constraints.txt
