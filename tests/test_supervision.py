@@ -116,6 +116,36 @@ def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(
     assert (run.returncode, run.stderr) == (status, "")
 
 
+BESIDE_FILES = """\
+import os, signal, sys
+from workbench import scratch
+from workbench.supervision import supervised
+
+{which} = scratch.{which}
+
+
+def asked_to_end(*given, **named):
+    os.kill(os.getpid(), signal.SIGTERM)
+    return {which}(*given, **named)
+
+
+scratch.{which} = asked_to_end
+sys.exit(supervised(lambda: 0))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the command is no process of its own")
+@pytest.mark.parametrize("which", ["_held", "_remove"])
+def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_none(
+    which: str, home: Path
+) -> None:
+    (home / "work.py").write_text(BESIDE_FILES.format(which=which))
+    (home / "tmp").mkdir()
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(home / "tmp")}
+    subprocess.run([sys.executable, "work.py"], cwd=home, env=environment, check=False)
+    assert left(home) == []
+
+
 @contextmanager
 def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]]":
     """A check that waits for a model, in the middle of its work."""

@@ -19,36 +19,41 @@ from types import FrameType
 from workbench.scratch import own_temporary_files
 
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER of <sys/prctl.h>
+_REQUESTS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGTSTP")
+    if hasattr(signal, name)  # Windows has not all
+)
 _PATIENCE = 10  # [s] from a request to end until the end; results are written in less
 
 
 def supervised(work: Callable[[], int]) -> int:
     """Do work in a child process; returns its status, or 1 if it did not come to its end.
 
-    Signals that ask this process to end or to pause are passed on. Where processes cannot be
-    forked (Windows) the work is done in this one.
+    Signals that ask this process to end or to pause are passed on; when the work is over they are
+    left blocked, for a process that ends. Where processes cannot be forked (Windows) the work is
+    done in this one.
     """
-    with own_temporary_files():
-        if not hasattr(os, "fork"):
+    if not hasattr(os, "fork"):
+        with own_temporary_files():
             return work()
-        status = b""
+    status = b""
+    # They wait but for while they are passed on: who ended before or after would leave files.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _REQUESTS)
+    with own_temporary_files():
         done, tell = os.pipe()
         sys.stdout.flush()
         sys.stderr.flush()
         parent = os.getpid()
-        # Until they are passed on, they wait.
-        signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
-        signal.pthread_sigmask(signal.SIG_BLOCK, signals)
         child = os.fork()
         if child == 0:
             os.close(done)
             _begin(parent)
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _REQUESTS)
             return _worked(work, tell)
         os.close(tell)
         _control(_ADOPT, 1)
         with _passing_on(child):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
             _, ending = os.waitpid(child, 0)
         _end_the_rest(child)
         os.set_blocking(done, False)  # a model may have left someone who holds the other end
@@ -149,9 +154,11 @@ def _passing_on(child: int) -> Iterator[None]:
     for number, handler in handlers.items():
         if before[number] != signal.SIG_IGN:
             signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _REQUESTS)
     try:
         yield
     finally:
+        signal.pthread_sigmask(signal.SIG_BLOCK, _REQUESTS)
         signal.alarm(0)
         for number, usual in before.items():
             signal.signal(number, usual)
