@@ -319,8 +319,14 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     brute = np.linalg.lstsq(matrix, -vector, rcond=None)[0]
     np.testing.assert_allclose(step, brute[:3], rtol=1e-6)
     assert total.at(step) == pytest.approx(float(np.sum((matrix @ brute + vector) ** 2)), rel=1e-6)
-    full = np.linalg.inv(matrix.T @ matrix)[:3, :3]
-    np.testing.assert_allclose(covariance(total.N), full, rtol=1e-6)
+    full = np.linalg.inv(matrix.T @ matrix)
+    np.testing.assert_allclose(covariance(total.N), full[:3, :3], rtol=1e-6)
+    nothing = Quadratic(np.zeros((3, 3)), np.zeros(3), 0.0, 0)
+    keys = tuple(("effect", name) for name in "abc")
+    means = np.hstack([np.zeros((5, 3)), np.tile(np.eye(5) / 4, 4)])
+    shown = np.vstack([np.eye(3, 23), means])
+    joint = Joint(keys, keys, (), tuple(systems), nothing)
+    np.testing.assert_allclose(joint.covariance(), shown @ full @ shown.T, rtol=1e-5, atol=1e-9)
     local = systems[2].local(step)
     np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
 

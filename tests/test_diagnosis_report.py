@@ -186,6 +186,30 @@ def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
     assert f"{100 * cause['explained']:.1f} %" in text(article)
 
 
+def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_with(
+    page: Any, summary: dict[str, Any]
+) -> None:
+    (cause,), certainty = summary["causes"], summary["certainty"]
+    ((name, one),) = cause["parameters"].items()
+    size = f"{cause['effect']} {name}"
+    ends = certainty["likelihood"][size]
+    row = section(page, "causes").xpath(f".//article//tr[th='{name}']")[0]
+    assert [float(cell.get("data-value")) for cell in row[6:8]] == [ends["low"], ends["high"]]
+    # The interval also holds forms of laws and companions.
+    assert one["low"] < ends["low"] < one["value"] < ends["high"] < one["high"]
+    rows = dict(zip(certainty["unknowns"], certainty["correlations"], strict=True))
+    others = {n: c for n, c in zip(rows, rows[size], strict=True) if n != size and abs(c) >= 0.3}
+    shown = text(section(page, "causes").xpath(".//article")[0])
+    # While the roller slows down evenly its inertia takes a constant torque, as a wrong zero does.
+    assert set(others) == {"JR by recording"}
+    for other, correlation in others.items():
+        assert re.search(rf"{other} \((correlation )?{re.escape(f'{correlation:+.2f}')}\)", shown)
+    assert ("goes with that of no other" in shown) == (not others)
+    # A wrong zero is linear: no start ends elsewhere.
+    assert certainty["starts"]["sentence"] in text(section(page, "causes"))
+    assert certainty["starts"]["same"] == 4
+
+
 def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str, Any]) -> None:
     table = data(page.get_element_by_id("candidate-table"))
     falls = table["fall, held out"].astype(float)
@@ -326,6 +350,29 @@ def test_the_unexplained_is_no_cause(
     assert "BrakeFade would explain a part, which is no proof" in text(causes)
     assert not page.xpath("//*[@class='mark']")
     assert "is not explained" in text(section(page, "shown"))
+
+
+def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(
+    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+) -> None:
+    starts = {
+        "behind": [0.0, -40.0, None],
+        "same": 1,
+        "lower": 40.0,
+        "sentence": "One lower by 40.",
+    }
+    changed = {**summary, "certainty": {**summary["certainty"], "starts": starts}}
+    causes = section(written(system, changed, [figure], tmp_path), "causes")
+    (told,) = [one for one in causes.find_class("warning") if "lower" in text(one)]
+    assert "0.0, -40.0, no end" in text(told)
+
+
+def test_an_interrupted_diagnosis_says_nothing_of_how_sure_sizes_are(
+    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
+) -> None:
+    page = written(system, {**summary, "certainty": None}, [figure], tmp_path)
+    assert "noise alone" not in text(section(page, "causes"))
+    assert "Begun elsewhere" not in text(section(page, "causes"))
 
 
 def test_a_deviation_beyond_its_tolerance_is_flagged(

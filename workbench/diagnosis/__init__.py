@@ -16,6 +16,7 @@ import numpy as np
 from workbench.case import Case
 from workbench.cosim import replay
 from workbench.diagnosis.catalogue import Effect, choose, read_effects
+from workbench.diagnosis.certainty import Certainty, assess
 from workbench.diagnosis.clocks import case_in_time, catalogue, late_signals
 from workbench.diagnosis.counting import refuse_too_few
 from workbench.diagnosis.evidence import Simulations
@@ -107,6 +108,9 @@ def diagnose(
         ) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
+            certainty = None
+            if diagnosis.causes and not diagnosis.interrupted:
+                certainty = assess(fit, diagnosis.best, report)
             extension = _extend(
                 *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
@@ -121,13 +125,15 @@ def diagnose(
                 errors, starts = errors + more, starts | their_starts
             observers = _observers(simulations, diagnosis, extension, report)
             starts = _differing(system, extension, starts)
-            return _outcome(simulations, fit, diagnosis, extension, observers, errors, starts)
+            found = (diagnosis, certainty, extension, observers, errors, starts)
+            return _outcome(simulations, fit, *found)
 
 
 def _outcome(
     simulations: Simulations,
     fit: Fit,
     diagnosis: Diagnosis,
+    certainty: Certainty | None,
     extension: Extension | None,
     observers: Mapping[str, Mapping[str, tuple[float, float]]],
     errors: Sequence[Errors],
@@ -157,6 +163,7 @@ def _outcome(
         rivals=gathered(simulations, fit, diagnosis.base, diagnosis.rivals)
         if diagnosis.rivals
         else None,
+        certainty=certainty,
     )
 
 

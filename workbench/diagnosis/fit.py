@@ -8,6 +8,7 @@ leaves-one-out are made of.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -289,8 +290,7 @@ class Fit:
         active: Sequence[Effect],
         rounds: int,
         spread: Vector | None = None,
-        *,
-        common: bool = True,
+        held: Mapping[Key, float] = MappingProxyType({}),
     ) -> Linearised:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
@@ -300,7 +300,7 @@ class Fit:
         rounds : most evaluations; a step that made things worse is halved, which costs one.
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
-        common : whether common unknowns are fitted, or only what differs between recordings.
+        held : common unknowns that are not fitted, at these values.
 
         Returns
         -------
@@ -308,7 +308,7 @@ class Fit:
         """
         best = self.linearise(best, active)
         first = best.spread if spread is None else spread
-        point, halved = self._stepped(best, first, common=common), 0
+        point, halved = self.stepped(best, first, held), 0
         worse = self.decides.worse
         for left in reversed(range(rounds)):
             tried = self.tried(point)
@@ -322,16 +322,20 @@ class Fit:
                 break
             if better:
                 best = self.linearise(best, active)
-                point = self._stepped(best, best.spread, common=common)
+                point = self.stepped(best, best.spread, held)
             else:
                 point, halved = between(best.point, point), halved + 1
         return best
 
-    def _stepped(self, lin: Linearised, spread: Vector, *, common: bool) -> Point:
+    def stepped(self, lin: Linearised, spread: Vector, held: Mapping[Key, float]) -> Point:
+        """Where derivatives have the best point, beside what is held at values of its own."""
         joint, point = self.quadratics(replace(lin, inflation=spread)), lin.point
         at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
-        reach = [self._reach(point, key) for key in joint.shared]
-        low, high = np.array(reach).reshape(-1, 2).T if common else (at, at)
+        reach = [
+            (held[key], held[key]) if key in held else self._reach(point, key)
+            for key in joint.shared
+        ]
+        low, high = np.array(reach).reshape(-1, 2).T
         count = len(self.unknowns.local)
         furthest = np.full(joint.systems[0].P.shape[1], _TURN)
         furthest[:count] = self.decides.furthest

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.case import Case
+from workbench.diagnosis.certainty import Certainty
 from workbench.diagnosis.counting import FAULTY, MISSING
 from workbench.diagnosis.residuals import Dependence, Residuals
 from workbench.diagnosis.rivals import Rivals
@@ -65,6 +66,7 @@ class Outcome:
     starts : see `start_values`, by recording.
     rivals : the model that was named, and those that these recordings do not tell from it; None
         unless a cause was found.
+    certainty : how sure the sizes are, by fits of their own; None likewise, or if interrupted.
     """
 
     system: System
@@ -80,6 +82,7 @@ class Outcome:
     errors: tuple[Errors, ...]
     starts: Mapping[str, Mapping[str, float]]
     rivals: Rivals | None
+    certainty: Certainty | None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -136,6 +139,8 @@ class Outcome:
         lines = [self.sentence]
         for cause in self.diagnosis.causes:
             lines += ["", *_told(cause)]
+        if self.certainty is not None:
+            lines += ["", self.certainty.sentence]
         lines += ["", *self._sample_errors()]
         if self.extension is not None:
             lines += ["", f"extended model: {self.extension.modelica}, {self.extension.fmu}"]
@@ -198,15 +203,7 @@ class Outcome:
             "partial": list(found.partial),
             "late": None if found.late is None else asdict(found.late),
             "lasting_errors": self._lasting_errors(),
-            "dependences": [
-                {
-                    "channel": one.channel,
-                    "influence": one.influence,
-                    "before": one.before,
-                    "after": one.after,
-                }
-                for one in self.dependences
-            ],
+            "dependences": [asdict(one) for one in self.dependences],
             "confusability": {"effects": list(found.names), "cosines": found.cosines.tolist()},
             "candidates": [_candidate(score) for score in found.scores],
             "steps": [_step(step) for step in found.steps],
@@ -228,6 +225,7 @@ class Outcome:
                 for name, errors in self.observers.items()
             },
             "rivals": None if self.rivals is None else self.rivals.to_dict(),
+            "certainty": None if self.certainty is None else self.certainty.to_dict(),
             "cases": [case.name for case in self.cases],
         }
 

@@ -171,6 +171,12 @@ class RecordingSystem:
         step[self._free] = np.linalg.solve(normal, -coupling @ z - gradient)
         return step
 
+    def follows(self) -> tuple[Matrix, Matrix]:
+        """How l follows z, (q, p), and its covariance about that, (q, q)."""
+        normal, coupling, _ = self._local()
+        own: Matrix = np.asarray(np.linalg.inv(normal), np.float64)
+        return -own @ coupling, own
+
     def holding(self, z: Vector, furthest: Vector) -> "RecordingSystem":
         """The same where entries of l that a step z takes beyond bounds are held there.
 
@@ -256,6 +262,17 @@ class Joint:
     def total(self) -> Quadratic:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
+
+    def covariance(self) -> Matrix:
+        """Of the common unknowns, then of each deviation's mean over all stops, (p + d, p + d)."""
+        count = self.systems[0].deviations.size
+        follows, own = zip(*(one.follows() for one in self.systems), strict=True)
+        mean = np.mean(follows, axis=0)[:count]
+        common = covariance(self.total().N)
+        both = np.vstack([np.eye(len(common)), mean])
+        spread: Matrix = both @ common @ both.T
+        spread[len(common) :, len(common) :] += np.mean(own, axis=0)[:count, :count] / len(own)
+        return spread
 
     def solve(self, low: Vector, high: Vector, furthest: Vector) -> tuple[Vector, list[Vector]]:
         """Best step of the common unknowns, and of the local ones of each stop, within bounds.

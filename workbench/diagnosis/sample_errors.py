@@ -83,6 +83,7 @@ def held_out_errors(
             levels = {key: one.point.levels.get(key, usual) for key, usual in start.levels.items()}
             phases = {name: np.zeros(len(cases)) for name in one.point.phases}
             point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)
-            ends.append(fit.refine(fit.at(point), one.active, ROUNDS, common=False))
+            common = {**point.sizes, **point.levels}
+            ends.append(fit.refine(fit.at(point), one.active, ROUNDS, held=common))
         starts = fit.unknowns.starts(ends[-1].point)
         return errors_of(simulations, *ends, held_out=True), starts

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from workbench.errors import FMUError
 from workbench.fmu import Vector
 
 Reporter = Callable[[str], None]
+Result = TypeVar("Result")
 
 BEGUN = 3  # rounds after which a rival that is far behind is given up
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
@@ -133,7 +135,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
 
     def finished(one: Fitted) -> Fitted | None:
-        return _differentiable(partial(fitted, fit, one.linearised, one.active))
+        return differentiable(partial(fitted, fit, one.linearised, one.active))
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
     every = [end for i, one in enumerate(begun) if (end := ends.get(i, one)) is not None]
@@ -169,10 +171,10 @@ def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) ->
     if start is None:
         return None
     active = (*before.active, rival.effect)
-    return _differentiable(partial(fitted, fit, start, active, rounds, spread))
+    return differentiable(partial(fitted, fit, start, active, rounds, spread))
 
 
-def _differentiable(fitting: Callable[[], Fitted]) -> Fitted | None:
+def differentiable(fitting: Callable[[], Result]) -> Result | None:
     """A fit; None where it leads to no derivative, as an inertia less than none does."""
     try:
         return fitting()

@@ -23,6 +23,7 @@ from workbench.units import si_factor
 _FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
 _SIMILAR = 0.7  # cosine from which on a pair is worth a word
 _PAIRS = 8  # that are put in words
+_TOGETHER = 0.3  # correlation of errors that is worth a word: a tenth of the variance
 _CLEAR = 0.05  # share of variance that is a dependence worth a word
 _READ = 4  # of them that are put in words
 _CELL, _NAMES = 24, 205  # of the matrix of similarities, room for names [px]
@@ -59,6 +60,8 @@ def write_diagnosis_page(
         dependences=_dependences(summary["dependences"]),
         channels=list(summary["lasting_errors"]),
         candidates=_candidates(summary),
+        traded=_traded(summary),
+        together=_TOGETHER,
         matrix=_matrix(summary),
         pairs=_pairs(summary["confusability"]),
         dots=None if summary["gain"] is None else _dots(summary["gain"]),
@@ -161,6 +164,20 @@ def _candidates(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         if one["effect"] not in best:
             best[one["effect"]] = {**one, "standing": standing.get(one["effect"], "")}
     return list(best.values())
+
+
+def _traded(summary: Mapping[str, Any]) -> dict[str, list[tuple[str, float]]]:
+    """Unknowns whose errors go with that of a size, the closest first, by size."""
+    found = summary["certainty"]
+    if found is None:
+        return {}
+    rows = dict(zip(found["unknowns"], found["correlations"], strict=True))
+    traded = {}
+    for size in found["likelihood"]:
+        others = [pair for pair in zip(rows, rows[size], strict=True) if pair[0] != size]
+        others.sort(key=lambda pair: -abs(pair[1]))
+        traded[size] = [pair for pair in others if abs(pair[1]) >= _TOGETHER][:_READ]
+    return traded
 
 
 def _matrix(summary: Mapping[str, Any]) -> dict[str, Any]:

@@ -172,10 +172,22 @@ def _diagnose() -> Schema:
         "observers": by_name(by_name(closed({"before": ERROR, "after": ERROR}))),
         "smoothed": or_null(closed({"recording": TEXT, "models": by_name(by_name(estimate))})),
         "rivals": or_null(_rivals(matrix)),
+        "certainty": or_null(_certainty(matrix)),
         "cases": listed(TEXT),
     }
     provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "model": FMU}
     return summary("diagnose", closed({**provenance, "effects": listed(TEXT)}), entries)
+
+
+def _certainty(matrix: Schema) -> Schema:
+    starts = {"behind": listed(ERROR), "same": WHOLE, "lower": NUMBER, "sentence": TEXT}
+    certainty = {
+        "unknowns": listed(TEXT),
+        "correlations": matrix,
+        "likelihood": by_name(closed({"low": ERROR, "high": ERROR})),
+        "starts": closed(starts),
+    }
+    return closed(certainty)
 
 
 def _rivals(matrix: Schema) -> Schema:

@@ -1,0 +1,203 @@
+"""How sure a size is, by other ways to the same: no derivatives, closed forms.
+
+A gauge whose law is known in closed form: a curve that bends, and a ripple that fits data in many
+places.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import minimize_scalar
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+from workbench import case_from_frame
+from workbench.diagnosis import build_everything, read_effects
+from workbench.diagnosis.certainty import assess
+from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.search import Fitted
+from workbench.diagnosis.selection import anew
+from workbench.modelica import read_library
+from workbench.systems import load_system
+
+LIBRARY = """within ;
+package Gauge "A gauge: reading by what is measured"
+  partial model PartialLaw "Slot: what is read beside the scale"
+    input Real u(unit="m") "Measured";
+    output Real f(unit="N") "Read in addition";
+  end PartialLaw;
+
+  model Straight "Null version"
+    extends PartialLaw;
+  equation
+    f = 0.0;
+  end Straight;
+
+  model Bend "a scale that bends"
+    extends PartialLaw;
+    parameter Real b(unit="1/m", min=0.0, max=2.0) = 0.0 "Exponent";
+  equation
+    f = exp(b*u) - 1.0;
+    annotation (__Workbench(effect(size="b", matters=0.01, separation="two readings")));
+  end Bend;
+
+  model Ripple "teeth that mesh"
+    extends PartialLaw;
+    parameter Real k(unit="rad/m", min=-20.0, max=20.0) = 0.0 "Teeth";
+  equation
+    f = sin(k*u);
+    annotation (__Workbench(effect(size="k", matters=0.1, separation="a slow pull")));
+  end Ripple;
+
+  model Observer "The gauge that observers run on"
+    parameter Real c(unit="N/m") = 2.0 "Scale";
+    input Real u(unit="m") "Measured";
+    input Real dc(unit="N/m") "Correction of c";
+    output Real y(unit="N") = (c + dc)*u + law.f "Reading";
+    replaceable Straight law(u=u) constrainedby PartialLaw(u=u) "Law";
+  end Observer;
+end Gauge;
+"""
+SYSTEM = """
+title = "A gauge"
+sample_time = "10 ms"
+
+[models]
+observer = { class = "Observer" }
+
+[inputs.u]
+unit = "m"
+noise = "0 m"
+scale = "2 m"
+
+[outputs.y]
+unit = "N"
+noise = "0.1 N"
+scale = "5 N"
+
+[estimated.c]
+correction = "dc"
+unit = "N/m"
+range = ["1 N/m", "4 N/m"]
+acts_on = "y"
+walk = "0.1 N/m"
+spread = "0.1 N/m"
+
+[points.design]
+inputs = { u = "1 m" }
+
+[diagnosis.levels]
+c = {}
+"""
+SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
+
+
+@pytest.fixture(scope="module")
+def fits(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fit]]:
+    """Two pulls of a gauge with each of the effects."""
+    folder = tmp_path_factory.mktemp("gauge")
+    (folder / "package.mo").write_text(LIBRARY)
+    (folder / "system.toml").write_text(SYSTEM)
+    system, rng = load_system(folder), np.random.default_rng(1)
+    library = read_library(system.library)
+    effects = read_effects(library, "Observer")
+    path = folder / "AllEffects.fmu"
+    build_everything(system, library, effects, path)
+    laws = {"Bend": lambda u: np.expm1(BEND * u), "Ripple": lambda u: np.sin(TEETH * u)}
+    fits, opened = {}, []
+    for name, law in laws.items():
+        cases = []
+        for period in (4.0, 5.0):
+            t = 0.01 * np.arange(1500)
+            u = 1.0 - np.cos(2.0 * np.pi / period * t)
+            y = SCALE * u + law(u) + NOISE * rng.standard_normal(t.size)
+            columns = {"time [s]": t, "u [m]": u, "y [N]": y}
+            cases.append(case_from_frame(system, pd.DataFrame(columns), name=f"{period:g} s"))
+        opened.append(Simulations(path, system, {}, cases, 1))
+        fits[name] = Fit(opened[-1], effects)
+    yield fits
+    for one in opened:
+        one.__exit__(None, None, None)
+
+
+def begun(fit: Fit, name: str, size: float) -> Fitted:
+    """A fit with one effect that begins at a size."""
+    effect = fit.unknowns.effects[name]
+    point = replace(fit.unknowns.start(), sizes={(name, effect.label): size})
+    return anew(fit, point, (effect,))
+
+
+def least(fit: Fit, best: Fitted, size: float) -> float:
+    """Chi-squared with the size held, as a search over the scale finds it without derivatives."""
+    (key,), (level,) = best.point.sizes, best.point.levels
+
+    def deviance(scale: float) -> float:
+        point = replace(best.point, sizes={key: size}, levels={level: scale})
+        return fit.at(point).deviance
+
+    # Some hundred times the tolerance of the search is the standard deviation of the scale.
+    return float(minimize_scalar(deviance, bounds=(1.0, 3.0), options={"xatol": 1e-5}).fun)
+
+
+def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(
+    fits: dict[str, Fit],
+) -> None:
+    fit = fits["Bend"]
+    best = begun(fit, "Bend", BEND)
+    found = assess(fit, best, lambda _: None)
+    ((key, (low, high)),) = found.ends.items()
+    assert low is not None
+    assert high is not None
+    bottom = least(fit, best, best.point.sizes[key])
+    rises = [least(fit, best, end) - bottom for end in (low, high)]
+    # Ends are found along a parabola through one point of each side: 5 % is its third order.
+    assert_allclose(rises, 3.84, rtol=0.05)
+    # The bend shows by its square: to the side of zero there is more room.
+    assert 1.02 < (best.point.sizes[key] - low) / (high - best.point.sizes[key]) < 2.0
+
+
+def test_errors_go_together_as_the_inverse_of_all_products_of_derivatives_says(
+    fits: dict[str, Fit],
+) -> None:
+    """Closed form: the bend has the derivative u exp(b u), the scale u, in means of blocks."""
+    fit = fits["Bend"]
+    found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
+    u = np.concatenate([1.0 - np.cos(2.0 * np.pi / p * 0.01 * np.arange(1500)) for p in (4.0, 5.0)])
+    J = np.column_stack([u * np.exp(BEND * u), u])
+    inverse = np.linalg.inv(J.T @ J)
+    expected = inverse[0, 1] / np.sqrt(inverse[0, 0] * inverse[1, 1])
+    assert found.unknowns == (("Bend", "b"), ("c", "all"))
+    assert_allclose(found.correlations, [[1.0, expected], [expected, 1.0]], atol=2e-3)
+
+
+def test_a_law_with_one_minimum_is_found_from_everywhere(fits: dict[str, Fit]) -> None:
+    fit = fits["Bend"]
+    found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
+    assert found.same == len(found.behind) == 4
+    assert found.lower == 0.0
+
+
+def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(
+    fits: dict[str, Fit],
+) -> None:
+    fit = fits["Ripple"]
+    found = assess(fit, begun(fit, "Ripple", TEETH), lambda _: None)
+    assert 0 < found.same < 4
+    assert found.lower == 0.0
+    assert "none lower" in found.sentence
+
+
+def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits: dict[str, Fit]) -> None:
+    fit = fits["Ripple"]
+    wrong = begun(fit, "Ripple", 0.5 * TEETH)
+    assert abs(wrong.point.sizes["Ripple", "k"] - TEETH) > 1.0
+    found = assess(fit, wrong, lambda _: None)
+    assert found.lower > 100.0
+    assert "sizes may be others" in found.sentence
