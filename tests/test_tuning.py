@@ -26,6 +26,7 @@ from workbench.tuning import (
     Plan,
     Problem,
     Search,
+    Tuned,
     cross_validate,
     evaluate_all,
     evaluate_gains,
@@ -33,7 +34,9 @@ from workbench.tuning import (
     recording,
     search,
     sensitivities,
+    summarise_tuning,
 )
+from workbench.tuning.checkpoint import Population
 
 FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 
@@ -206,6 +209,25 @@ def test_a_gain_without_effect_does_not_matter(
     matters = {e.gain: e.matters for e in sensitivities(pool, job, space, found)}
     assert matters["L42"]
     assert not matters["T_muWR"]
+
+
+def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
+    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
+) -> None:
+    job, space = problem.job, problem.space
+    plan = Plan(generations=0, population=1, seed=3)
+    found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
+    assert found is not None
+    assert not found.converged
+    members = np.tile(found.coordinates, (3, 1))
+    members[:, 0] = 0.55, 0.65, 0.95
+    last = Population(members, found.z * np.array([1.0, 1.009, 1.011]), found.last.z_k[:3])
+    tuned = Tuned(problem, plan, replace(found, last=last), found.z_k, interrupted=False)
+    told = summarise_tuning(tuned, 0)
+    assert (told["work"]["as_good"], told["work"]["last"]) == (2, 3)
+    assert_allclose(told["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])
+    low, high = told["gains"]["L21"]["as_good"]
+    assert low == high == found.best[job.gains.names.index("L21")]
 
 
 # --- what gains are judged by ---

@@ -278,6 +278,9 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page: Any, summary: dict[
         row, effect = table.loc[name], summary["sensitivity"][name]
         assert (row["tuned"], row["reasoned"]) == (gain["value"], gain["reasoned"])
         assert row["searched from, to"] == f"{gain['lower']:.4g}, {gain['upper']:.4g}"
+        low, high = gain["as_good"]
+        assert row["as good, from, to"] == f"{low:.4g}, {high:.4g}"
+        assert gain["lower"] <= low <= gain["value"] <= high <= gain["upper"]
         for column, key in (("z, less", "less"), ("z, more", "more"), ("z, without", "without")):
             assert row[column] == (np.inf if effect[key] is None else effect[key])
         assert ("does not matter" in row["remark"]) == (not effect["matters"])
@@ -408,6 +411,9 @@ def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], result
     told = {text(entry): text(entry.getnext()) for entry in page.xpath("//dl[@class='grid']/dt")}
     work, provenance = summary["work"], summary["provenance"]
     assert told["Generations"] == str(work["generations"])
+    assert told["As good"].startswith(f"{work['as_good']} of the last {work['last']} candidates")
+    # Two for each of the gains that are searched, of which the best is as good as itself.
+    assert 1 <= work["as_good"] <= work["last"] == 2 * len(summary["gains"])
     assert told["Candidates"].startswith(f"{work['candidates']}, ")
     assert told["Work saved"].startswith(f"{100 * work['saved']:.2f} %")
     assert told["Time"] == f"{work['seconds']:.1f} s"
@@ -418,6 +424,17 @@ def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], result
         assert f"{package} {version}" in told["Versions"]
     (use,) = page.xpath("//pre[@class='source']")
     assert text(use) == f"python -m workbench simulate --gains {results / 'gains.toml'}"
+
+
+def searched(page: Any) -> Any:
+    (section,) = page.xpath("//section[@aria-labelledby='search']")
+    return section
+
+
+def test_a_search_that_converged_says_so(changed: dict[str, Any], tmp_path: Path) -> None:
+    assert "then converged" not in text(searched(written(changed, tmp_path)))
+    changed["work"]["converged"] = True
+    assert "then converged" in text(searched(written(changed, tmp_path)))
 
 
 # --- bad news ---

@@ -82,9 +82,13 @@ def _simulate() -> Schema:
 
 def _tune() -> Schema:
     of_gain = {name: NUMBER for name in ("value", "reasoned", "lower", "upper")}
-    gain = closed({"meaning": TEXT, "unit": TEXT, **of_gain, "at_bound": FLAG})
+    gain = closed(
+        {"meaning": TEXT, "unit": TEXT, **of_gain, "at_bound": FLAG, "as_good": listed(NUMBER)}
+    )
     changes = {name: ERROR for name in ("less", "more", "without")}
-    work = {name: WHOLE for name in ("generations", "candidates", "crashed", "folds")}
+    counts = ("generations", "candidates", "crashed", "folds", "as_good", "last")
+    work = {name: WHOLE for name in counts}
+    work |= {"seconds": NUMBER, "saved": NUMBER, "interrupted": FLAG, "converged": FLAG}
     provenance = closed(
         {
             "run": RUN,
@@ -112,7 +116,7 @@ def _tune() -> Schema:
         "sensitivity": by_name(closed({**changes, "matters": FLAG})),
         "folds": listed(declared(Fold, nullable=True)),
         "beside": by_name(closed({"label": TEXT, "z": ERROR, "worst": TEXT})),
-        "work": closed({**work, "seconds": NUMBER, "saved": NUMBER, "interrupted": FLAG}),
+        "work": closed(work),
         "convergence": listed(NUMBER),
     }
     return summary("tune", provenance, entries)

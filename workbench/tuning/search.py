@@ -58,6 +58,8 @@ class Search:
     z_k : (k,) objective in each case that was searched on, in their order.
     cases : numbers of these cases in the job.
     history : generations, the initial one first.
+    last : candidates of the last one.
+    converged : whether z of these candidates is the same within TOLERANCE.
     interrupted : whether it was stopped before its end.
     """
 
@@ -67,6 +69,8 @@ class Search:
     z_k: Vector
     cases: tuple[int, ...]
     history: tuple[Generation, ...]
+    last: Population
+    converged: bool
     interrupted: bool
 
 
@@ -142,6 +146,8 @@ def search(
         z_k=best.z_k[0][list(cases)],
         cases=tuple(cases),
         history=state.history,
+        last=best,
+        converged=state.converged,
         interrupted=interrupted,
     )
 

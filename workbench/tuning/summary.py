@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from workbench.fmu import Vector
+from workbench.fmu import Matrix, Vector
 from workbench.observers import estimators
 from workbench.observers.gains_file import format_gains
 from workbench.tuning.recipe import Tuned
+from workbench.tuning.validation import NEGLIGIBLE
 
 
 def tuned_gains(tuned: Tuned) -> str:
@@ -82,6 +83,9 @@ def summarise_tuning(tuned: Tuned, folds: int) -> dict[str, Any]:
             "saved": 1.0 - sum(g.samples for g in history) / sum(g.of for g in history),
             "crashed": sum(g.crashed for g in history),
             "interrupted": found.interrupted,
+            "converged": found.converged,
+            "as_good": len(_as_good(tuned)),
+            "last": len(found.last.z),
             "folds": folds,
         },
         "convergence": [g.z for g in history],
@@ -103,7 +107,7 @@ def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
     job, space, found = tuned.problem.job, tuned.problem.space, tuned.search
     names, reasoned = job.gains.names, job.gains.values
     lower, upper = space.gains(np.array([np.zeros(len(names)), np.ones(len(names))]))
-    at_bound = space.at_bound(found.coordinates)
+    at_bound, as_good = space.at_bound(found.coordinates), _as_good(tuned)
     return {
         name: {
             "meaning": tuned.problem.meanings[name][0],
@@ -113,9 +117,16 @@ def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
             "lower": float(lower[i]),
             "upper": float(upper[i]),
             "at_bound": bool(at_bound[i]),
+            "as_good": [float(as_good[:, i].min()), float(as_good[:, i].max())],
         }
         for i, name in enumerate(names)
     }
+
+
+def _as_good(tuned: Tuned) -> Matrix:
+    """Gains of the last candidates whose z is the best but for what does not matter, (s, n)."""
+    last = tuned.search.last
+    return tuned.problem.space.gains(last.members[last.z <= (1.0 + NEGLIGIBLE) * last.z[0]])
 
 
 def _finite(value: float) -> float | None:
