@@ -21,7 +21,10 @@ def diagnose(root: Path, stops: Path, out: Path) -> Path:
     """Through the command line, with few effects to be quick."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
-        assert main(["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(out)]) == 0
+        assert (
+            main(["diagnose", str(stops), "--certainty", "--effects", *EFFECTS, "--out", str(out)])
+            == 0
+        )
     return out
 
 

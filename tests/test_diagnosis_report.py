@@ -367,7 +367,7 @@ def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(
     assert "0.0, -40.0, no end" in text(told)
 
 
-def test_an_interrupted_diagnosis_says_nothing_of_how_sure_sizes_are(
+def test_a_diagnosis_that_was_not_asked_says_nothing_of_how_sure_sizes_are(
     system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
 ) -> None:
     page = written(system, {**summary, "certainty": None}, [figure], tmp_path)

@@ -233,6 +233,7 @@ def diagnose(
     held_out: Sequence[Case] = (),
     effects: Sequence[str] = (),
     out: str | Path | None = None,
+    certainty: bool = False,
     workers: int | None = None,
     report: Callable[[str], None] = print,
 ) -> Outcome:
@@ -243,6 +244,7 @@ def diagnose(
     held_out : recordings on which only the errors of both models are measured.
     effects : names of those to consider; all of the library unless some are given.
     out : folder of the extended model; a temporary one unless another is given.
+    certainty : whether it is asked how sure the sizes are, by fits of their own.
     workers : processes, one per processor unless another number is given.
     report : takes a line on what is being done.
 
@@ -253,7 +255,9 @@ def diagnose(
     """
     library, chosen = _catalogue(system, effects)
     rest = (_folder(out, "diagnosis"), _number(workers), report)
-    return diagnose_system(system, cases, library, chosen, *rest, held_out=held_out)
+    return diagnose_system(
+        *(system, cases, library, chosen, *rest), held_out=held_out, certainty=certainty
+    )
 
 
 def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:

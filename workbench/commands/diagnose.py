@@ -99,6 +99,7 @@ def _run(
         *(system, cases, library, effects, options.out, options.workers, output.stage),
         held_out=held_out,
         every_platform=options.platforms == "all",
+        certainty=options.certainty,
     )
     with open_model(system) as model:
         provenance = {

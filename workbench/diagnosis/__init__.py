@@ -75,6 +75,7 @@ def diagnose(
     *,
     held_out: Sequence[Case] = (),
     every_platform: bool = False,
+    certainty: bool = False,
 ) -> Outcome:
     """Find what an observer model lacks, from recordings; write the extended model.
 
@@ -90,6 +91,7 @@ def diagnose(
     held_out : recordings on which only the errors of both models are measured: all that is common
         is as fitted to the others, only what differs between recordings is fitted.
     every_platform : whether the extended FMU is for all platforms, or only for this machine's.
+    certainty : whether it is asked how sure the sizes are, by fits of their own.
 
     Raises
     ------
@@ -108,9 +110,8 @@ def diagnose(
         ) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
-            certainty = None
-            if diagnosis.causes and not diagnosis.interrupted:
-                certainty = assess(fit, diagnosis.best, report)
+            asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
+            assessed = assess(fit, diagnosis.best, report) if asked else None
             extension = _extend(
                 *(simulations, fit, diagnosis, effects, library, out, report),
                 every_platform=every_platform,
@@ -125,7 +126,7 @@ def diagnose(
                 errors, starts = errors + more, starts | their_starts
             observers = _observers(simulations, diagnosis, extension, report)
             starts = _differing(system, extension, starts)
-            found = (diagnosis, certainty, extension, observers, errors, starts)
+            found = (diagnosis, assessed, extension, observers, errors, starts)
             return _outcome(simulations, fit, *found)
 
 

@@ -66,7 +66,8 @@ class Outcome:
     starts : see `start_values`, by recording.
     rivals : the model that was named, and those that these recordings do not tell from it; None
         unless a cause was found.
-    certainty : how sure the sizes are, by fits of their own; None likewise, or if interrupted.
+    certainty : how sure the sizes are, by fits of their own; None if that was not asked, no
+        cause was found, or the search was interrupted.
     """
 
     system: System

@@ -50,6 +50,12 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     add_platforms(parser, "the extended FMU", "native")
     parser.add_argument(
+        "--certainty",
+        action="store_true",
+        help="also ask how sure the sizes are, by further fits: what noise alone allows, which "
+        "errors go together, and whether fits that begin elsewhere end the same",
+    )
+    parser.add_argument(
         "--propose",
         action="store_true",
         help="if something is missing that no effect explains, infer a law for it: where it acts, "
