@@ -114,6 +114,17 @@ def test_a_size_that_is_not_the_true_one_is_refused(tmp_path: Path, places: Path
     assert list(places.iterdir()) == []
 
 
+def test_a_list_of_contents_that_says_it_begins_later_is_refused(tmp_path: Path) -> None:
+    """Of a file that lost bytes in the middle; all entries seem to begin as much earlier."""
+    raw = bytearray(OWN.read_bytes())
+    (begin,) = struct.unpack_from("<L", raw, len(raw) - 6)  # the last of it, but for no comment
+    struct.pack_into("<L", raw, len(raw) - 6, begin + 1000)
+    path = tmp_path / "evil.fmu"
+    path.write_bytes(raw)
+    with pytest.raises(InputError, match="begins before it"):
+        FMU(path)
+
+
 def test_many_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "many.fmu"
     shutil.copy(OWN, path)

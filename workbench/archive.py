@@ -72,6 +72,8 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         kind = stat.S_IFMT(entry.external_attr >> 16)
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise _refusal(path, f"{shown}, which is a link or a device", "files and folders")
+        if entry.header_offset < 0:
+            raise _refusal(path, f"{shown}, which begins before it", "files inside the archive")
         if entry.flag_bits & 1:
             raise _refusal(path, f"{shown}, which is encrypted", "files that can be read")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
