@@ -11,7 +11,7 @@ PYTEST := $(RUN) -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist wor
 # The long tests, and all that their diagnoses are made of; what is left out are layers above, which
 # they cannot import.
 LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/conftest.py \
-	$(patsubst %,':(exclude)workbench/%',commands template report benchmark export)
+	$(patsubst %,':(exclude)workbench/%',commands template report benchmark)
 LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
 	| xargs -0 sha256sum | sha256sum | cut -c 1-64
 

@@ -26,6 +26,7 @@ from workbench.systems import load_system, open_model
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
+from workbench.commands.options import command_line
 from workbench.compiler.archive import PLATFORMS
 from workbench.export import ObserverModel, build_observer, observer, write_package
 
@@ -234,9 +235,13 @@ def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "gains.toml").write_text(format_gains(gains.with_values(values), "", {"z": 0.3}))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
-        command = ["export", "--gains", str(folder / "gains.toml"), "--out", str(folder / "out")]
-        assert main(command) == 0
+        assert main(exporting(folder / "gains.toml", folder / "out")) == 0
     return folder
+
+
+def exporting(gains: Path, out: Path) -> list[str]:
+    """The command; for this machine alone, as what others need is compiled for a minute."""
+    return ["export", "--gains", str(gains), "--platforms", "native", "--out", str(out)]
 
 
 def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
@@ -254,13 +259,27 @@ def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
         held = archive.read("resources/gains.toml")
         libraries = [n for n in archive.namelist() if n.startswith("binaries/")]
     assert held == (package / "gains.toml").read_bytes()
-    assert len(libraries) == len(PLATFORMS)
+    assert len(libraries) == 1
+
+
+@pytest.mark.long
+def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path: Path) -> None:
+    gains = reasoned("disturbance_observer")
+    model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
+    build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
+    with zipfile.ZipFile(tmp_path / "observer.fmu") as archive:
+        folders = {Path(n).parts[1] for n in archive.namelist() if n.startswith("binaries/")}
+    assert folders == {fmi2_name for fmi2_name, *_ in PLATFORMS.values()}
+
+
+def test_the_command_asks_for_all_platforms_unless_told_otherwise() -> None:
+    assert command_line("0", "export").parse_args(["export"]).platforms == "all"
 
 
 def test_the_same_gains_give_the_same_bytes(root: Path, package: Path, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
-        assert main(["export", "--gains", str(package / "gains.toml"), "--out", str(tmp_path)]) == 0
+        assert main(exporting(package / "gains.toml", tmp_path)) == 0
     for file in tmp_path.iterdir():
         assert file.read_bytes() == (package / "out" / file.name).read_bytes(), file.name
 

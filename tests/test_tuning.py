@@ -44,6 +44,7 @@ FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 # --- the algorithm ---
 
 
+@pytest.mark.long
 def test_planted_gains_are_found(
     system: System,
     prepare: Callable[[str, Sequence[Case]], Problem],
