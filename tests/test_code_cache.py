@@ -19,14 +19,14 @@ assert kernel.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
 print(sum(kernel.solve.wrapped.stats.cache_hits.values()), "kept")
 """
 
-# One that never ends what it compiles.
+# One that does not end what it compiles, while a test may wait.
 DYING = (
     """
 import time
 from numba.core.dispatcher import _FunctionCompiler
 def compile(*given):
     print("compiling", flush=True)
-    time.sleep(600)
+    time.sleep(60)
 _FunctionCompiler.compile = compile
 """
     + PROGRAM
