@@ -4,6 +4,7 @@ import re
 import subprocess
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 _PERIOD = 0.02  # s between two looks at processes; a peak stays to be seen until a process ends
@@ -53,9 +54,8 @@ def watch_command(command: Sequence[str]) -> list[int]:
 def _descendants(process: int) -> list[int]:
     """Processes that the threads of a process, and those that it started, have started."""
     found: list[int] = []
-    for children in Path(f"/proc/{process}/task").glob("*/children"):
-        try:
-            found += map(int, children.read_text().split())
-        except OSError:  # the thread has ended
-            continue
+    with suppress(OSError):  # the process has ended
+        for thread in Path(f"/proc/{process}/task").iterdir():
+            with suppress(OSError):  # the thread has ended
+                found += map(int, (thread / "children").read_text().split())
     return found + [one for child in found for one in _descendants(child)]
