@@ -16,7 +16,7 @@ import numpy as np
 from workbench import kernel
 a = np.array([[2.0, 0.0, 2.0], [0.0, 4.0, 2.0]])
 assert kernel.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
-print(sum(kernel.solve.wrapped.stats.cache_hits.values()), "kept")
+print(sum(kernel.solve.entry.stats.cache_hits.values()), "kept")
 """
 
 # One that does not end what it compiles, while a test may wait.

@@ -70,7 +70,7 @@ from workbench.kernel import solve
 a = np.array([[2.0, 6.0]])
 assert solve(a) == 0 and a[0, 1] == 3.0
 assert before == {key: getattr(numba.config, key) for key in before}
-print(sum(solve.wrapped.stats.cache_hits.values()), sum(solve.wrapped.stats.cache_misses.values()))
+print(sum(solve.entry.stats.cache_hits.values()), sum(solve.entry.stats.cache_misses.values()))
 """
 
 

@@ -33,14 +33,14 @@ _PATIENCE = 120.0  # [s]: several times what any function here takes to compile
 
 @cache
 def _folder() -> Path:
-    """Folder of compiled code, one for each state of the sources that hold laws and loops.
+    """Folder of compiled code, one for each state of the sources that it is made of.
 
     numba renews a compiled function when its own file changes, not when one that it calls does.
     """
     files = sorted(_PACKAGE.rglob("*.py"))
     sources = (file.read_bytes() for file in files)
-    compiled_ones = b"".join(source for source in sources if b"workbench.kernel import" in source)
-    state = hashlib.sha256(compiled_ones).hexdigest()[:16]
+    laws = [one for one in sources if b"workbench.kernel import" in one or b"numba" in one]
+    state = hashlib.sha256(b"".join(laws)).hexdigest()[:16]
     return cache_folder() / state
 
 

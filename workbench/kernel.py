@@ -5,75 +5,21 @@ with the addresses of the FMU's functions, so that another FMU needs no compilat
 may also be called from ordinary Python.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from functools import cached_property
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
-from workbench.code_cache import CodeCache
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, References, Vector
-from workbench.linking import PartCompiler
+from workbench.linking import law
 
-
-class _Kept(CPUDispatcher):  # type: ignore[misc]
-    """A function that Python calls, whose code is kept between runs."""
-
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        super().__init__(function, targetoptions=options)
-        with suppress(RuntimeError):  # a function without a file is compiled in each process
-            self._cache = CodeCache(function)
-
-    def compile(self, sig: Any) -> Any:
-        """Code for a signature, kept or made."""
-        try:
-            return super().compile(sig)
-        finally:
-            if isinstance(self._cache, CodeCache):
-                self._cache.compiled()
-
-
-class _Law(CPUDispatcher):  # type: ignore[misc]
-    """A function that compiled code takes up, and Python calls by way of a wrapper.
-
-    A wrapper takes apart what it is given, some hundred arrays of an observer: it took longer to
-    compile than the law, and most laws are called by others alone.
-    """
-
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        bare = {"nopython": True, "no_cpython_wrapper": True, **options}
-        super().__init__(function, targetoptions=bare, pipeline_class=PartCompiler)
-        self._options = options
-
-    @cached_property
-    def wrapped(self) -> _Kept:
-        """The function as Python calls it."""
-        return _Kept(self.py_func, {"nopython": True, **self._options})
-
-    def __call__(self, *given: Any) -> Any:
-        return self.wrapped(*given)
-
-
-def _compiler(inline: str) -> Callable[[Callable[..., Any]], Any]:
-    """Make a decorator of laws and loops, whose compiled code is kept between runs.
-
-    Their arrays belong to the caller and they allocate none, so that references need not be
-    counted (`_nrt`), which took two thirds of a step. A wrapper for callers in C is compiled for
-    nobody.
-    """
-    options = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "inline": inline}
-    return lambda function: _Law(function, options)
-
-
-compiled = _compiler(inline="never")
-inlined = _compiler(inline="always")
+compiled = law()
+inlined = law(inline=True)
 
 OK, REFUSED, SINGULAR = 0, 1, 2
 

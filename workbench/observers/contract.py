@@ -114,7 +114,7 @@ class Estimator(ABC):
         self._model: Any = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
         self._t = 0.0
-        self._row = np.empty(2 * len(system.columns) + len(self.modes) + 1)
+        self._width = 2 * len(system.columns) + len(self.modes) + 1
 
     @property
     def models(self) -> tuple[FMU, ...]:
@@ -194,7 +194,7 @@ class Estimator(ABC):
         settings, memory = self._arguments()
         several = not isinstance(self._model, Instance)
         models = self._model if several else (self._model,)
-        return Parts(self._law, models, several, settings, memory, self._row.size)
+        return Parts(self._law, models, several, settings, memory, self._width)
 
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
@@ -211,20 +211,12 @@ class Estimator(ABC):
         """Start at time t [s] with the first sample: measured states, nominal quantities."""
         self._t = t
         self.start(u, y)
-        settings, memory = self._arguments()
-        self._row[:] = np.nan
-        status = self._law(self._model, settings, memory, 0.0, given(u), given(y), self._row)
-        checked(status, self.fmu)
-        return self._split(self._row.copy())
+        return self._take(0.0, u, y)
 
     def step(self, t: float, u: Vector, y: Vector) -> Estimate:
         """Advance to time t [s] with the sample taken there."""
-        settings, memory = self._arguments()
         h, self._t = t - self._t, t
-        self._row[:] = np.nan
-        status = self._law(self._model, settings, memory, h, given(u), given(y), self._row)
-        checked(status, self.fmu)
-        return self._split(self._row.copy())
+        return self._take(h, u, y)
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
         """The same as `init` and `step` over a whole recording, in one compiled loop.
@@ -255,11 +247,19 @@ class Estimator(ABC):
         FMUError
             If the FMU refuses a call.
         """
-        rows = np.full((steps.size, self._row.size), np.nan)
+        return self._split(self._run(steps, u, y))
+
+    def _take(self, h: float, u: Vector, y: Vector) -> Estimate:
+        """One sample, by the loop over many: a law is compiled once."""
+        return self._split(self._run(np.array([h]), np.atleast_2d(u), np.atleast_2d(y))[0])
+
+    def _run(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
+        """Rows of estimates, as laws write them."""
+        rows = np.full((steps.size, self._width), np.nan)
         settings, memory = self._arguments()
         status = self._loop(self._model, settings, memory, steps, given(u), given(y), rows)
         checked(status, self.fmu)
-        return self._split(rows)
+        return rows
 
     def _split(self, rows: Any) -> Estimate:
         width = len(self.system.columns)

@@ -320,7 +320,7 @@ class Smoother(MovingHorizonEstimator):
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
         """Smooth a recording; see Estimator."""
         self.start(u[0], y[0])
-        rows = np.full((time.size, self._row.size), np.nan)
+        rows = np.full((time.size, self._width), np.nan)
         steps, u, y = np.diff(time, prepend=time[0]), given(u), given(y)
         horizon, nodes, s = self._memory, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
