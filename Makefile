@@ -38,14 +38,19 @@ help:
 	@echo "                multibody models; before a release, and by .ci/run when needed"
 	@echo "make clean      remove the environment and results"
 
-$(VENV)/run.stamp: pyproject.toml constraints.txt
+# Bytecode is made of what is imported, where pip would make it of all that it installs.
+INSTALL := $(RUN) -m pip install --quiet --no-compile --constraint constraints.txt --editable
+
+$(VENV)/pyvenv.cfg:
 	$(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable .
+
+$(VENV)/run.stamp: pyproject.toml constraints.txt | $(VENV)/pyvenv.cfg
+	$(INSTALL) .
 	@touch $@
 
-$(VENV)/dev.stamp: $(VENV)/run.stamp
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[dev,compiler,cluster,completion,docs,files]"
-	@touch $@
+$(VENV)/dev.stamp: pyproject.toml constraints.txt | $(VENV)/pyvenv.cfg
+	$(INSTALL) ".[dev,compiler,cluster,completion,docs,files]"
+	@touch $(VENV)/run.stamp $@
 
 simulate: $(VENV)/run.stamp
 	$(RUN) -m workbench simulate --out results/simulate

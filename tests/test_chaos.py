@@ -22,7 +22,8 @@ def tune(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
     return undisturbed(command, folder)
 
 
-@pytest.mark.parametrize("kind", ["interrupt", "full disk"])  # `test_tune` kills
+# `test_tune` kills.
+@pytest.mark.parametrize("kind", ["interrupt", pytest.param("full disk", marks=pytest.mark.long)])
 def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
     kind: str, tune: Undisturbed, tmp_path: Path
 ) -> None:
