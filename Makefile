@@ -38,8 +38,7 @@ help:
 	@echo "                multibody models; before a release, and by .ci/run when needed"
 	@echo "make clean      remove the environment and results"
 
-# Bytecode is made of what is imported, where pip would make it of all that it installs.
-INSTALL := $(RUN) -m pip install --quiet --no-compile --constraint constraints.txt --editable
+INSTALL := $(RUN) -m pip install --quiet --constraint constraints.txt --editable
 
 $(VENV)/pyvenv.cfg:
 	$(PYTHON) -m venv $(VENV)
