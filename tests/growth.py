@@ -1,30 +1,38 @@
-"""Cost of the extended Kalman filter by the number of axles, on trains that are generated for it.
+"""Cost of Kalman filters by the number of axles, on trains that are generated for it.
 
-`python -m tests.growth 1 2 4` measures trains of 1, 2 and 4 vehicles. Needs the extra [compiler].
+`python -m tests.growth 1 2 4` measures the block Kalman filter on trains of 1, 2 and 4 vehicles,
+and the extended one up to `--ekf` of them, 8 unless it is said. Needs the extra [compiler].
 """
 
+import argparse
 import shutil
-import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from workbench import compiler
 from workbench.fmu import Matrix, Vector
+from workbench.observers.arrow import BlockKalmanFilter
 from workbench.observers.kalman import ExtendedKalmanFilter
 from workbench.system import OBSERVER, Estimated, System
 from workbench.systems import load_system, open_model
 
+from .built import build_here
+
 _SAMPLES, _REPEATS = 300, 5
+_PITCH = 0.16  # time in which a body pitches, as in TrainRig.Parts.Vehicle [s]
 _SLOWING, _BEGIN = 0.9, 2.0  # of the stop [m/s2], and when its brakes are on [s]
 
 
 def model_of(vehicles: int) -> str:
-    """Modelica of a train of so many vehicles, with a name for each signal, in `TrainRig`."""
+    """Modelica of a train of so many vehicles, with a name for each signal, in `TrainRig`.
+
+    Wheel loads shift by a deceleration of the train that has a state of its own, as bodies pitch,
+    and not at once by the pads of all axles: an axle depends on its own bogie and on the train.
+    """
     bogies, axles, every = 2 * vehicles, 4 * vehicles, range(1, vehicles + 1)
     inputs = [f'pB{j}(unit="Pa")' for j in range(1, bogies + 1)]
     inputs += [f'mass{k}(unit="kg", start=48000.0)' for k in every]
@@ -39,11 +47,12 @@ def model_of(vehicles: int) -> str:
     return "\n".join(
         [
             f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
-            f"  extends Train(final vehicles={vehicles});",
+            f"  extends Train(final vehicles={vehicles}, braking(start=0.0, fixed=true));",
             *(f"  input Real {one};" for one in inputs),
             *(f"  output Real {one};" for one in (*states, *outputs)),
             "equation",
             "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
+            f"  {_PITCH}*der(braking) = -acceleration - braking;",
             "  uphill = sum(m[k]*slope[k] for k in 1:vehicles)/sum(m);",
             "  air = C;\n  curves = curve;\n  v = vTrain;",
             f"  pC = {_vector('pB', bogies)};\n  m = {_vector('mass', vehicles)};",
@@ -69,8 +78,7 @@ def build(vehicles: int, folder: Path) -> System:
     order = library / "package.order"
     order.write_text(f"{order.read_text()}Longer\n")
     fmu = folder / "Longer.fmu"
-    platforms = [compiler.native()]
-    compiler.build(library / "package.mo", "TrainRig.Longer", fmu, platforms=platforms)
+    build_here(library / "package.mo", "TrainRig.Longer", fmu)
     axles, every = range(1, 4 * vehicles + 1), range(1, vehicles + 1)
     given = {one.name: one for one in system.inputs}
     pressures = [replace(given["pB1"], name=f"pB{j}") for j in range(1, 2 * vehicles + 1)]
@@ -113,10 +121,9 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
     return t, inputs, outputs
 
 
-def time_filter(system: System) -> float:
-    """Processor time of the filter for a sample, the least of five runs [s]."""
+def time_filter(system: System, kind: type[ExtendedKalmanFilter]) -> float:
+    """Processor time of a filter for a sample, the least of five runs [s]."""
     with open_model(system) as fmu:
-        kind = ExtendedKalmanFilter
         estimator, samples = kind(fmu, system, kind.reasoned(fmu, system)), stop(system)
         estimator.run(*samples)
         spent = []
@@ -127,21 +134,31 @@ def time_filter(system: System) -> float:
     return min(spent)
 
 
-def report(sizes: Iterable[int]) -> Iterable[str]:
-    """A line for each number of vehicles."""
+def report(sizes: Iterable[int], most: int) -> Iterable[str]:
+    """A line for each number of vehicles and filter; the extended one up to `most` of them."""
     for vehicles in sizes:
-        with tempfile.TemporaryDirectory() as scratch:
-            system = build(vehicles, Path(scratch))
-            spent = 1e6 * time_filter(system)
         axles = 4 * vehicles
-        yield f"{axles:>3} axles {spent:>8.1f} us a sample, {spent / axles:>6.2f} us an axle"
+        with tempfile.TemporaryDirectory() as scratch:
+            begin = time.monotonic()
+            system = build(vehicles, Path(scratch))
+            yield f"{axles:>3} axles, ready after {time.monotonic() - begin:.0f} s"
+            for kind in (BlockKalmanFilter, ExtendedKalmanFilter):
+                if kind is ExtendedKalmanFilter and vehicles > most:
+                    continue
+                spent = 1e6 * time_filter(system, kind)
+                each = f"{spent / axles:>6.2f} us an axle"
+                yield f"  {kind.name:<5} {spent:>8.1f} us a sample, {each}"
 
 
-def main(arguments: Sequence[str]) -> None:
+def main() -> None:
     """Print the report for numbers of vehicles."""
-    for line in report(int(one) for one in arguments):
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("vehicles", type=int, nargs="+", help="number of vehicles of each train")
+    parser.add_argument("--ekf", type=int, default=8, help="most of them for the extended filter")
+    told = parser.parse_args()
+    for line in report(told.vehicles, told.ekf):
         print(line, flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -82,7 +82,8 @@ CASE = 'title = "Pump on and off"\nmeasurement.file = "measured.csv"\n'
 AREA, PIPE, DRAIN = 0.5, 2e-3, 1e-3  # as in the model
 STEP, END, OPENS, SETTLED = 2.0, 6000.0, 2400.0, 4800.0  # [s]
 BEFORE, AFTER = 1e-4, 2.5e-4  # [m3/s] of the leak, which opens
-ESTIMATORS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "mhe", "imm", "smoother")
+ESTIMATORS = ("disturbance_observer", "parameter_estimator", "ekf", "arrow", "ukf", "mhe", "imm")
+ESTIMATORS += ("smoother",)
 
 
 def pump(t: float) -> float:

@@ -68,6 +68,8 @@ class Description:
     platforms : those with a binary, in FMI's names.
     binaries : sizes of the files of all platforms [bytes], by name in the archive.
     states, rates : names of the continuous states and their derivatives, in FMI's order.
+    dependencies : names of what a derivative or an output depends on, by its name; without those of
+        which the model structure does not say it.
     event_indicators : their number; 0 for a smooth model.
     step, stop : of the default experiment [s], None where there is none.
     """
@@ -85,6 +87,7 @@ class Description:
     variables: tuple[Variable, ...]
     states: tuple[str, ...]
     rates: tuple[str, ...]
+    dependencies: Mapping[str, tuple[str, ...]]
     event_indicators: int
     step: float | None
     stop: float | None
@@ -127,6 +130,10 @@ class Description:
             variables=tuple(replace(v, name=new(v.name)) for v in self.variables),
             states=tuple(map(new, self.states)),
             rates=tuple(map(new, self.rates)),
+            dependencies={
+                new(unknown): tuple(map(new, knowns))
+                for unknown, knowns in self.dependencies.items()
+            },
         )
 
     def require(self, interface: str) -> Interface:
@@ -274,6 +281,11 @@ def _description(
         variables=variables,
         states=tuple(unknown.variable.derivative.name for unknown in found.derivatives),
         rates=tuple(unknown.variable.name for unknown in found.derivatives),
+        dependencies={
+            unknown.variable.name: tuple(known.name for known in unknown.dependencies)
+            for unknown in (*found.derivatives, *found.outputs)
+            if unknown.dependencies is not None
+        },
         event_indicators=max(found.numberOfEventIndicators, len(found.eventIndicators)),
         step=_number(experiment.stepSize, "the step size") if experiment else None,
         stop=_number(experiment.stopTime, "the stop time") if experiment else None,

@@ -157,17 +157,18 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
     """
     if model.fmi == 0:
         return _differences(model)
-    return direction(model, model.knowns[row:], 1, model.seed, model.jacobian[row], count)
+    known = model.knowns[row:]
+    return direction(model, model.unknowns, count, known, 1, model.seed, model.jacobian[row])
 
 
 @inlined
-def direction(model, knowns, number, seeds, out, count):  # type: ignore[no-untyped-def]
+def direction(model, unknowns, count, knowns, number, seeds, out):  # type: ignore[no-untyped-def]
     """Derivatives of the first `count` unknowns along `number` knowns into `out`; a status."""
     if model.fmi == 2:
-        words = model.address, model.unknowns, count, knowns, number, seeds, out
+        words = model.address, unknowns, count, knowns, number, seeds, out
         status = _call(model.directional, words)
     else:
-        more = model.address, model.unknowns, count, knowns, number, seeds, number, out, count
+        more = model.address, unknowns, count, knowns, number, seeds, number, out, count
         status = _call(model.directional, more)
     return REFUSED if status > 1 else OK
 
@@ -238,7 +239,12 @@ def solve(a):  # type: ignore[no-untyped-def]
     ----------
     a : (n, n + k) the matrix, which is destroyed, and right-hand sides, which become solutions.
     """
-    n, columns = a.shape
+    return solve_part(a, a.shape[0], a.shape[1])
+
+
+@compiled
+def solve_part(a, n, columns):  # type: ignore[no-untyped-def]
+    """The same for the first n rows and `columns` columns of an array."""
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):

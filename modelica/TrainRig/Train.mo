@@ -55,22 +55,21 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   Real frictionPower[n](each unit="W") "Of an axle's pads";
   Real slipPower[n](each unit="W") "Of an axle's contacts";
   Real lossPower[n](each unit="W") "Of an axle's bearings, discs and drag";
+  Real braking(unit="m/s2") "Deceleration for which wheel loads have shifted";
 protected
   Real Fperp[n](each unit="N") "Force of a pad pair";
   Real weight(unit="kg") "Mass of the train";
-  Real braking(unit="m/s2") "Deceleration by the pads alone";
   Real cooling(unit="W/K") "Of one disc";
   Real tauL[n](each unit="N.m") "Losses of an axle, without drag";
 equation
   weight = sum(m);
-  braking = sum(tauB[i]/rA[i] for i in 1:n)/weight;
   cooling = 1.1*(25.0 + 8.0*((0.65*v)^2 + 1e-4)^0.4);
   for k in 1:vehicles loop
     for j in 1:2 loop
       for i in 1:2 loop
         Fperp[4*k + 2*j + i - 6] =
           perPressure*noEvent(max(0.0, pC[2*k + j - 2] - pRelease));
-        // By pads, in place of the forces that follow from loads themselves.
+        // By torques, in place of the forces that follow from loads themselves.
         Q[4*k + 2*j + i - 6] = 0.5*(m[k]*(g/4.0 + braking*1.3/38.0*(3 - 2*j))
           + (tauB[4*k + 2*j - 5] + tauB[4*k + 2*j - 4])/0.46*0.2*(3 - 2*i));
       end for;
@@ -98,8 +97,9 @@ equation
 losses</code>, Polach's law for <code>Fx</code>. Pads rub by an affine law of speed, a power of force and
 a linear one of temperature; the discs of an axle have one temperature.</p>
 <h4>Limitations</h4>
-<p>One speed for all vehicles. Wheel loads shift with the deceleration that the pads ask for. There is no
-slide protection: the pressure of a bogie is that of both its axles.</p>
+<p>One speed for all vehicles. Wheel loads shift with the torques of a bogie's pads, and with a deceleration
+that the extending model chooses, <code>braking</code>. There is no slide protection: the pressure of a bogie is
+that of both its axles.</p>
 <h4>References</h4>
 <p>O. Polach (2005), Wear 258, 992-1000; EN 14531-1 for the resistances.</p>
 </html>"));

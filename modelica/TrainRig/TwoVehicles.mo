@@ -62,6 +62,8 @@ model TwoVehicles "Two vehicles with four axles each"
   replaceable Slots.UnchangedAxles speedSensor(u=omega)
     constrainedby Slots.PartialAxles(u=omega) "Speed sensors";
 equation
+  // Of the pads alone, in place of forces that follow from loads themselves.
+  braking = sum(tauB[i]/rA[i] for i in 1:n)/weight;
   pC = cylinder.y;
   mu = padFriction.y;
   acting = brakeUnits.y;
@@ -90,6 +92,7 @@ equation
   annotation (
     experiment(StopTime=60.0, Tolerance=1e-6),
     Documentation(info="<html>
-<p><code>Train</code> with the signals of a recording: each has a name of its own, by its number.</p>
+<p><code>Train</code> with the signals of a recording: each has a name of its own, by its number. Wheel loads
+shift at once, with the deceleration that pads ask for.</p>
 </html>"));
 end TwoVehicles;

@@ -141,7 +141,7 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
         if number == 0:
             continue
         if not tangent.alike[q] and direction(
-            model, knowns, number, seeds, tangent.along, unknowns
+            model, model.unknowns, unknowns, knowns, number, seeds, tangent.along
         ):
             return 1
         for i in range(unknowns):

@@ -100,8 +100,8 @@ class Estimator(ABC):
     sticks: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     told: frozenset[str] = frozenset()
-    _law: ClassVar[Any]
-    _loop: ClassVar[Any]
+    _law: Any
+    _loop: Any
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         check_model(system, fmu.description)

@@ -294,12 +294,13 @@ class ExtendedKalmanFilter(Estimator):
         return known
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        memory = self._memory
-        memory.z[:] = 0.0
-        memory.z[: len(self.fmu.states)] = self.fmu.get_states()
+        self._memory.z[:] = self._start_values()
+        self._memory.P[:] = np.diag(self._settings.spread**2)
+
+    def _start_values(self) -> Vector:
+        """States and deviations of the quantities at the start, (n + q,)."""
         begins = np.array([one.start for one in self.system.estimated]) - self._layout.nominal
-        memory.z[len(self.fmu.states) :] = np.nan_to_num(begins)
-        memory.P[:] = np.diag(self._settings.spread**2)
+        return np.concatenate([self.fmu.get_states(), np.nan_to_num(begins)])
 
     @classmethod
     def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:

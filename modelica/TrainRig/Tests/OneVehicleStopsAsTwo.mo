@@ -4,6 +4,7 @@ model OneVehicleStopsAsTwo "A train of one vehicle and one of two, all alike, sl
     extends Train;
     parameter Real pressure(unit="Pa") = 2.0e5 "In all cylinders";
   equation
+    braking = sum(tauB[i]/rA[i] for i in 1:n)/weight;
     pC = fill(pressure, bogies);
     mu = ordinary;
     acting = fill(units, n);
