@@ -76,6 +76,7 @@ def test_rates_of_workers_are_measured(system: System, case: Case) -> None:
         assert rates.dask is None
 
 
+@pytest.mark.long
 def test_memory_of_master_and_workers_is_measured(
     root: Path, system: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:

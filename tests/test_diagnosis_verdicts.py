@@ -31,6 +31,7 @@ def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.long
 def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_path: Path) -> None:
     """Ctrl-C while a second cause is sought."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")

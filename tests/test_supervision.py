@@ -44,7 +44,7 @@ def left(folder: Path) -> list[Path]:
     "command",
     [
         ("simulate", CASE, "--out", "out", "--fmu"),
-        ("observability", CASE, "--out", "out", "--fmu"),
+        pytest.param(("observability", CASE, "--out", "out", "--fmu"), marks=pytest.mark.long),
         ("diagnose", ROOT / "cases", "--out", "out", "--model"),
     ],
 )
@@ -194,7 +194,7 @@ def served(session: int) -> list[int]:
     return sorted(found)
 
 
-@pytest.mark.parametrize("victim", ["server", "worker"])
+@pytest.mark.parametrize("victim", [pytest.param("server", marks=pytest.mark.long), "worker"])
 def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(
     victim: str, home: Path
 ) -> None:
