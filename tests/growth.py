@@ -27,12 +27,18 @@ _PITCH = 0.16  # time in which a body pitches, as in TrainRig.Parts.Vehicle [s]
 _SLOWING, _BEGIN = 0.9, 2.0  # of the stop [m/s2], and when its brakes are on [s]
 
 
-def model_of(vehicles: int) -> str:
+def model_of(vehicles: int, *, pitching: bool) -> str:
     """Modelica of a train of so many vehicles, with a name for each signal, in `TrainRig`.
 
-    Wheel loads shift by a deceleration of the train that has a state of its own, as bodies pitch,
-    and not at once by the pads of all axles: an axle depends on its own bogie and on the train.
+    Parameters
+    ----------
+    pitching : whether wheel loads shift by a deceleration of the train that has a state of its own,
+        as bodies pitch, so that an axle depends on its own bogie and on the train; else at once, by
+        the pads of all axles, as in `TwoVehicles`.
     """
+    at_once = "braking = sum(tauB[i]/rA[i] for i in 1:n)/weight"
+    shifting = f"{_PITCH}*der(braking) = -acceleration - braking" if pitching else at_once
+    start = ", braking(start=0.0, fixed=true)" if pitching else ""
     bogies, axles, every = 2 * vehicles, 4 * vehicles, range(1, vehicles + 1)
     inputs = [f'pB{j}(unit="Pa")' for j in range(1, bogies + 1)]
     inputs += [f'mass{k}(unit="kg", start=48000.0)' for k in every]
@@ -47,12 +53,12 @@ def model_of(vehicles: int) -> str:
     return "\n".join(
         [
             f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
-            f"  extends Train(final vehicles={vehicles}, braking(start=0.0, fixed=true));",
+            f"  extends Train(final vehicles={vehicles}{start});",
             *(f"  input Real {one};" for one in inputs),
             *(f"  output Real {one};" for one in (*states, *outputs)),
             "equation",
             "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
-            f"  {_PITCH}*der(braking) = -acceleration - braking;",
+            f"  {shifting};",
             "  uphill = sum(m[k]*slope[k] for k in 1:vehicles)/sum(m);",
             "  air = C;\n  curves = curve;\n  v = vTrain;",
             f"  pC = {_vector('pB', bogies)};\n  m = {_vector('mass', vehicles)};",
@@ -69,12 +75,12 @@ def _vector(name: str, size: int) -> str:
     return "{" + ", ".join(f"{name}{i}" for i in range(1, size + 1)) + "}"
 
 
-def build(vehicles: int, folder: Path) -> System:
+def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
     """Compile such a train in a folder; returns its system, the usual one with more signals."""
     system = load_system("train")
     library = folder / "TrainRig"
     shutil.copytree(system.library.parents[1], folder, dirs_exist_ok=True)
-    (library / "Longer.mo").write_text(model_of(vehicles))
+    (library / "Longer.mo").write_text(model_of(vehicles, pitching=pitching))
     order = library / "package.order"
     order.write_text(f"{order.read_text()}Longer\n")
     fmu = folder / "Longer.fmu"

@@ -23,7 +23,8 @@ def tune(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
 
 
 # `test_tune` kills.
-@pytest.mark.parametrize("kind", ["interrupt", pytest.param("full disk", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["interrupt", "full disk"])
 def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
     kind: str, tune: Undisturbed, tmp_path: Path
 ) -> None:

@@ -130,7 +130,7 @@ def test_sets_of_the_independent_simulator_are_understood() -> None:
 
 def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Path) -> None:
     pytest.importorskip("rumoca")
-    generated, estimates = growth.build(2, tmp_path), []
+    generated, estimates = growth.build(2, tmp_path, pitching=False), []
     samples = growth.stop(generated)
     for one in (SYSTEM, generated):
         # Inputs of a system file stand in an order of its own.
