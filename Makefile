@@ -5,8 +5,9 @@ RUN := $(VENV)/bin/python
 # Modelica compiler of `make fmus`: workbench, or omc (OpenModelica, writes to build/omc)
 COMPILER ?= workbench
 
-# Two more than processors, as tests wait for programs that they start; the slowest are listed.
-WORKERS := $(shell expr 2 + $$(getconf _NPROCESSORS_ONLN))
+# One more than processors, as tests wait for programs that they start; with two more, what each
+# prepares for itself takes longer. The slowest are listed.
+WORKERS := $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN))
 PYTEST := $(RUN) -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist worksteal --durations 10
 # The long tests, and all that their diagnoses are made of; what is left out are layers above, which
 # they cannot import.

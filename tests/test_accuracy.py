@@ -172,6 +172,7 @@ def slippery(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
     return read_cases([folder], SYSTEM)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
     estimators: dict[str, Estimator], slippery: list[Case], observer: str

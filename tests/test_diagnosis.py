@@ -221,9 +221,8 @@ def test_fade_is_found_without_a_measured_force(
 LATE = {"pB": "late_pB", "tauR": "late_tauR", "omegaR": "late_omegaR", "Fx": "late_Fx"}
 
 
-@pytest.mark.parametrize(
-    "signals", [("pB", "Fx"), pytest.param(("pB",), marks=pytest.mark.long)], ids="-".join
-)
+@pytest.mark.long
+@pytest.mark.parametrize("signals", [("pB", "Fx"), ("pB",)], ids="-".join)
 def test_a_late_logger_is_named_whatever_it_records(
     signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
 ) -> None:

@@ -89,6 +89,7 @@ def test_the_separation_is_what_the_stop_then_shows(
     assert (one.prediction.right > 0.5) == (rank == 0)
 
 
+@pytest.mark.long
 def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
     one_speed: System, tmp_path: Path
 ) -> None:

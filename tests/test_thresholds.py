@@ -93,6 +93,7 @@ def short(name: str, speed: float) -> Scenario:
     return dataclasses.replace(usual, conditions=conditions)
 
 
+@pytest.mark.long
 def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path: Path) -> None:
     """Two short stops, a load cell's gain of 1.6 %; simulations that are kept change nothing."""
     rig = PlantedStops((short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)), REFERENCE)
