@@ -30,7 +30,7 @@ COUNTS = {
     "table.parquet": 50,
     "logger.mf4": 50,
     "gains": 250,
-    "checkpoint": 250,
+    "checkpoint": 500,
     "verdicts": 150,
     "system file": 250,
     "wheelset file": 50,
