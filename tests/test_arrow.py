@@ -206,6 +206,15 @@ def test_a_model_without_blocks_has_the_extended_filter() -> None:
     np.testing.assert_array_equal(found.sigma, expected.sigma)
 
 
+def test_a_model_whose_structure_is_not_said_is_one_block(filling: FMU, vessels: System) -> None:
+    """As of exporters that leave it out, which FMI allows."""
+    said = filling.description
+    filling.description = replace(said, dependencies={})
+    _, estimator = made(filling, vessels)
+    filling.description = said
+    assert estimator._blocks.first.tolist() == [0, 12, 12]
+
+
 def test_levels_are_not_learnt_of_blocks(filling: FMU, vessels: System) -> None:
     with pytest.raises(InputError, match="noise levels that are to be learnt"):
         made(filling, replace(vessels, learns=2.0))
