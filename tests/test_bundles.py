@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from workbench.kernel import compiled
 
@@ -87,5 +88,5 @@ def test_classes_of_one_name_may_have_their_fields_in_another_order() -> None:
 
 
 def test_a_field_that_there_is_not_is_named() -> None:
-    with pytest.raises(Exception, match="first"):
+    with pytest.raises(TypingError, match="first"):
         difference(Part(np.zeros(1), 1.0))

@@ -1,6 +1,7 @@
 """Compiled code is kept whole or made again, whatever happened to the folder it is kept in."""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -8,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from workbench import code_cache
 
 ROOT = Path(__file__).parents[1]
 
@@ -79,6 +82,21 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
         assert solved(home) == "0 kept"
         assert file.read_bytes() != damaged
     assert solved(home) == "1 kept"
+
+
+@pytest.mark.parametrize("name", ["observers/kalman.py", "kernel.py", "bundles.py", "linking.py"])
+def test_code_is_made_again_when_what_makes_it_changes(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A law, what all laws call, and what compiles them."""
+    package = tmp_path / "workbench"
+    shutil.copytree(ROOT / "workbench", package)
+    monkeypatch.setattr(code_cache, "_PACKAGE", package)
+    before = code_cache._folder.__wrapped__()
+    assert code_cache._folder.__wrapped__() == before
+    with (package / name).open("a") as source:
+        source.write("# changed\n")
+    assert code_cache._folder.__wrapped__() != before
 
 
 def test_what_two_processes_need_at_once_is_compiled_by_one(home: Path) -> None:
