@@ -83,17 +83,21 @@ def worst(summary: Summary) -> Table:
     return rows
 
 
-def covered(summary: Summary) -> Table:
-    """Share of samples whose truth a 95 % band holds, mean of the stops."""
+def covered(*summaries: Summary) -> Table:
+    """Share of samples whose truth a 95 % band holds, mean of the stops, and the least of them."""
     shares: dict[str, dict[str, list[float]]] = {}
-    for stop in summary["stops"].values():
+    stops = [stop for summary in summaries for stop in summary["stops"].values()]
+    for stop in stops:
         for name, one in stop["estimators"].items():
             for quantity, share in one.get("covers", {}).items():
                 shares.setdefault(name, {}).setdefault(quantity, []).append(share)
-    rows: Table = [["", *(titled(name) for name in shares)]]
+    rows: Table = [[f"{len(stops)} stops", *(titled(name) for name in shares)]]
     for quantity in COVERED:
         known = [one.get(quantity) for one in shares.values()]
-        texts = ["" if one is None else f"{100.0 * np.mean(one):.1f} %" for one in known]
+        texts = [
+            "" if one is None else f"{100.0 * np.mean(one):.1f} % ({100.0 * min(one):.0f} %)"
+            for one in known
+        ]
         rows.append([quantity, *texts])
     return rows
 

@@ -30,7 +30,7 @@ from workbench.wheelset.accuracy import (
     slide_error,
 )
 from workbench.wheelset.claims import PeakForce
-from workbench.wheelset.rig import Effects, select
+from workbench.wheelset.rig import ORDINARY_PADS, Effects, select
 from workbench.wheelset.truth import read_truth
 
 from .recordings import record
@@ -207,6 +207,19 @@ def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
     true = np.interp(case.time, truth["time"].values, truth["muWR"].values)
     error = (run.signal("muWR") / true - 1.0)[run.claimed["muWR"]]
     assert np.median(error) == pytest.approx(-low, abs=0.02)
+
+
+@pytest.mark.parametrize("observer", ["ekf", "ukf", "mhe"])
+def test_friction_that_a_filter_passes_through_is_not_claimed(
+    estimators: dict[str, Estimator], tmp_path: Path, observer: str
+) -> None:
+    """A dry stop in which noise leads muWR to 0.12 as the force builds up, surely and for 50 ms."""
+    (scenario,) = select(["06_dry_160_3.6_rev"])
+    record(scenario, 7, ORDINARY_PADS, tmp_path / scenario.name)
+    (case,), estimator = read_cases([tmp_path], SYSTEM), estimators[observer]
+    run = replay(case, estimator)
+    assert PeakForce(estimator.fmu, SYSTEM).claims(run.estimate).any()  # the rule alone would
+    assert not run.claimed["muWR"].any()
 
 
 # --- on recordings of an independent simulator, whose truth is not known here ---

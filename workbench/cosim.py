@@ -197,7 +197,12 @@ def _doubted(estimator: Estimator) -> list[str]:
 def _claims(
     case: Case, estimator: Estimator, values: Matrix, probability: Matrix
 ) -> dict[str, NDArray[np.bool_]]:
-    """Where quantities may be claimed; of several models, by those that are hardly wrong."""
+    """Where quantities may be claimed; of several models, by those that are hardly wrong.
+
+    A rule judges by the estimate itself, which may pass through what the rule asks for: where a
+    linearised filter first sees a quantity, a noisy sample may lead it far off, and makes it sure.
+    So the rule must be met for as long as the quantity takes to walk as far as is useful.
+    """
     rules, system = _rules(estimator), estimator.system
     claimed = {}
     for name in _doubted(estimator):
@@ -209,7 +214,20 @@ def _claims(
         if met and name in rules:
             shares = [rules[name](fmu, system, values) for fmu in estimator.models]  # type: ignore[operator]
             weights = probability if estimator.modes else np.ones((case.time.size, 1))
-            claimed[name] = (np.column_stack(shares) * weights).sum(axis=1) > SURE
+            sure = (np.column_stack(shares) * weights).sum(axis=1) > SURE
+            span = (one.useful / one.walk) ** 2 if one.walk > 0.0 else 0.0
+            claimed[name] = lasting(sure, case.time, span)
         else:
             claimed[name] = np.full(case.time.size, met)
     return claimed
+
+
+def lasting(met: NDArray[np.bool_], time: Vector, span: float) -> NDArray[np.bool_]:
+    """Where a condition has been met for so long [s], (n,).
+
+    >>> lasting(np.array([1, 0, 1, 1, 1], bool), np.arange(5.0), 2.0).tolist()
+    [False, False, False, True, True]
+    """
+    unmet = np.maximum.accumulate(np.where(met, time[0], time))
+    kept: NDArray[np.bool_] = met & (time - unmet >= span)
+    return kept

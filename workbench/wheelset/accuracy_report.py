@@ -146,6 +146,8 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
             header,
         ]
         lines += [f"{q:<{width}}{_covers(stops, names, q)}" for q in COVERED]
+        lines.append("The same of the stop in which it holds the truth least")
+        lines += [f"{q:<{width}}{_covers(stops, names, q, least=True)}" for q in COVERED]
         lines.append("-" * len(header))
     failures = [
         f"{stop.name}, {name}: {result.failure}"
@@ -156,18 +158,25 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
     return "\n".join(lines + failures)
 
 
-def covered(stops: Sequence[StopAccuracy], name: str, quantity: str) -> float | None:
-    """Share of samples in which bands of an estimator hold a quantity, mean of the stops."""
+def covered(
+    stops: Sequence[StopAccuracy], name: str, quantity: str, *, least: bool = False
+) -> float | None:
+    """Share of samples in which bands of an estimator hold a quantity: mean of the stops, or least.
+
+    In a stop whose share is low the filter is overconfident, which a mean may hide.
+    """
     shares = [
         stop.estimators[name].covers[quantity]
         for stop in stops
         if quantity in stop.estimators[name].covers
     ]
-    return float(np.mean(shares)) if shares else None
+    return float(np.min(shares) if least else np.mean(shares)) if shares else None
 
 
-def _covers(stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str) -> str:
-    shares = {name: covered(stops, name, quantity) for name in names}
+def _covers(
+    stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str, *, least: bool = False
+) -> str:
+    shares = {name: covered(stops, name, quantity, least=least) for name in names}
     texts = {name: "" if one is None else f"{100.0 * one:.1f} %" for name, one in shares.items()}
     return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
 
