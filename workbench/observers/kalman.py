@@ -10,7 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import compiled, evaluate, implicit, inlined, linearise, read, solve
+from workbench.kernel import (
+    compiled,
+    evaluate,
+    implicit,
+    inlined,
+    linearise,
+    read,
+    set_inputs,
+    solve,
+)
 from workbench.observers.adaptive import Learning, Levels, learning, levels, reset
 from workbench.observers.contract import Estimator
 from workbench.observers.correction import update
@@ -41,6 +50,8 @@ class FilterSettings(NamedTuple):
     relative, floor : (l,) standard deviation of a sample: share of its size, and [its unit].
     walk : (n + q,) random walks of states and quantities [unit/sqrt(s)].
     spread : (n + q,) standard deviations at the start.
+    driven, driven_relative : (m,) standard deviation of a sample of each input: [its unit], and
+        share of its size; 0 where levels are held, which then say it all.
     """
 
     layout: Layout
@@ -49,16 +60,22 @@ class FilterSettings(NamedTuple):
     walk: Vector
     spread: Vector
     learning: Learning
+    driven: Vector
+    driven_relative: Vector
 
 
 class FilterMemory(NamedTuple):
-    """What the laws remember: z (n + q,) states and deviations, P their covariance; work space."""
+    """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
+
+    `least` holds the variances of a step of the states, (n,), see `drive`.
+    """
 
     z: Vector
     P: Matrix
     system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
     spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
     product: Matrix  # (n, n + q), see `carry`
+    least: Vector
     change: Vector
     column: Vector
     levels: Levels
@@ -155,6 +172,47 @@ def variance(settings, fade, y, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
+    """Variances by which noise of the inputs moves the states in a step from z; returns a status.
+
+    What is measured drives the model with its sensor's noise, (h df/du sigma)^2, in `memory.least`.
+    Walks that are learnt hold that too, as far as outputs show it; where two bodies are pressed
+    together, the force between them answers it and no speed does. So states move by what was learnt
+    of them, or by what inputs make of them if that is more; the sum would count it twice.
+    Source: S. Thrun, W. Burgard, D. Fox (2005), Probabilistic Robotics, table 7.2 (noise of inputs
+    as noise of the step).
+    """
+    n, least, low = model.x.size, memory.least, memory.change
+    for i in range(n):
+        least[i] = 0.0
+    status = measure(model, u) or put(model, z)
+    for j in range(u.size):
+        deviation = settings.driven[j] + settings.driven_relative[j] * abs(u[j])
+        if deviation == 0.0:
+            continue
+        model.u[j] = u[j] - deviation
+        status = status or set_inputs(model, j, 1) or evaluate(model)
+        for i in range(n):
+            low[i] = model.dx[i]
+        model.u[j] = u[j] + deviation
+        status = status or set_inputs(model, j, 1) or evaluate(model)
+        for i in range(n):
+            least[i] += (0.5 * h * (model.dx[i] - low[i])) ** 2
+        model.u[j] = u[j]
+        status = status or set_inputs(model, j, 1)
+    return status
+
+
+@inlined
+def model_noise(settings, memory, fade, h, i):  # type: ignore[no-untyped-def]
+    """Variance by which state or quantity i moves in a step, after `drive`; less where it fades."""
+    moves = h * room(settings, memory.P, i) * memory.levels.walk[i] * settings.walk[i] ** 2
+    if i < memory.least.size:
+        moves = max(moves, memory.least[i])
+    return fade * fade * moves
+
+
+@compiled
 def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
     """Limit the quantities, report the estimate and its standard deviations; returns a status."""
     z, P, layout, n = memory.z, memory.P, settings.layout, model.x.size
@@ -201,11 +259,12 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
 def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
     layout, P, size = settings.layout, memory.P, memory.z.size
-    status = measure(model, u) or predict(model, settings, memory, memory.z, h)
+    status = drive(model, settings, memory, memory.z, u, h)
+    status = status or predict(model, settings, memory, memory.z, h)
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
     for i in range(size):
-        P[i, i] += h * room(settings, P, i) * memory.levels.walk[i] * (fade * settings.walk[i]) ** 2
+        P[i, i] += model_noise(settings, memory, fade, h, i)
     for j in range(y.size):
         memory.levels.noise[j] = variance(settings, fade, y, j)
     status = status or transition(model, memory.spread, h)
@@ -267,13 +326,17 @@ class ExtendedKalmanFilter(Estimator):
         n, q = len(fmu.states), len(system.estimated)
         of_states = gains["model"] * walks(fmu, system)
         initial = [gains["initial"] * one.spread for one in system.estimated]
+        learns = learning(system)
+        told = float(learns.within < np.inf)
         self._settings: Any = FilterSettings(
             layout=self._layout,
             relative=np.array([_share(gains, one.name) for one in system.outputs]),
             floor=np.array([gains[one.name] for one in system.outputs]),
             walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
-            learning=learning(system),
+            learning=learns,
+            driven=told * np.array([one.noise for one in system.inputs]),
+            driven_relative=told * np.array([one.relative_noise for one in system.inputs]),
         )
         self._memory: Any = FilterMemory(
             *buffers(n, q), np.zeros(n + q), levels(n + q, len(system.outputs))
@@ -343,9 +406,9 @@ def _share(gains: Gains, output: str) -> float:
     return gains[name] if name in gains.names else 0.0
 
 
-def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Vector]:
+def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Vector, Vector]:
     """Memory and work space of a filter with so many states and quantities: z to change."""
     size = n + q
     z, change, product = np.zeros(size), np.zeros(size), np.zeros((n, size))
     spread = np.zeros((n, n + size))
-    return z, np.zeros((size, size)), np.zeros((n, n + 1)), spread, product, change
+    return z, np.zeros((size, size)), np.zeros((n, n + 1)), spread, product, np.zeros(n), change

@@ -14,6 +14,7 @@ from workbench.observers.kalman import (
     ExtendedKalmanFilter,
     FilterMemory,
     begin,
+    drive,
     finish,
     predict,
     put,
@@ -62,6 +63,8 @@ class HorizonSettings(NamedTuple):
     walk: Vector
     spread: Vector
     learning: Learning
+    driven: Vector
+    driven_relative: Vector
     iterations: int
     limit: float
     largest_nis: float
@@ -102,6 +105,9 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
         before = window.wider[k - 1, i] if k > 0 else window.older[i]
         share = levels.walk[i] * room(settings, memory.filter.P, i)
         window.wider[k, i] = max(share, settings.fading * before)
+    for i in range(memory.filter.least.size):
+        least = fade * fade * memory.filter.least[i]
+        window.noise[k, i] = max(window.noise[k, i], least / window.wider[k, i])
 
 
 @inlined
@@ -230,8 +236,9 @@ def horizon_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyp
         assign(window.mean, memory.filter.z)
         assign_rows(window.covariance, memory.filter.P)
         return status or finish(model, settings, memory.filter, row)
+    status = drive(model, settings, memory.filter, memory.filter.z, u, h)
     _append(settings, memory, h, u, y)
-    status = expand(model, settings, memory, window.filled[0] - 1)
+    status = status or expand(model, settings, memory, window.filled[0] - 1)
     for iteration in range(settings.iterations):
         _solve(settings, memory, iteration == 0, row)
         status = status or _relinearise(model, settings, memory)
@@ -284,7 +291,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         )
         of = self._settings
         self._settings = HorizonSettings(
-            *(of.layout, of.relative, of.floor, of.walk, of.spread, of.learning),
+            *of,
             iterations=round(iterations),
             limit=float(ndtri(1.0 - 0.5 * rare)),
             largest_nis=float(chdtri(outputs, rare)),

@@ -6,9 +6,9 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
-from workbench.kernel import checked, compiled, evaluate, given, set_inputs
+from workbench.kernel import checked, compiled, given
 from workbench.observers.contract import Estimate
-from workbench.observers.kalman import carry, finish, put
+from workbench.observers.kalman import carry, finish
 from workbench.observers.layout import clip, measure
 from workbench.observers.mhe import (
     ROUNDING,
@@ -84,37 +84,7 @@ def _go_forward(model, settings, horizon, memory, steps, u, y, rows):  # type: i
 
 
 @compiled
-def _drive(model, window, scatter, k):  # type: ignore[no-untyped-def]
-    """Let states move in a step no less than the noise of inputs moves them; returns a status.
-
-    Parameters
-    ----------
-    scatter : (N, m) standard deviations of the inputs; see `Smoother._scatter`.
-    """
-    n, inputs, h = model.x.size, scatter.shape[1], window.steps[k]
-    moved, least, status = window.moved, window.work, put(model, window.nodes[k])
-    for i in range(n):
-        least[i] = 0.0
-    for j in range(inputs):
-        if scatter[k, j] == 0.0:
-            continue
-        for i in range(n):
-            moved[i] = 0.0
-        for side in (1.0, -1.0):
-            status = status or measure(model, window.inputs[k])
-            model.u[j] += side * scatter[k, j]
-            status = status or set_inputs(model, 0, inputs) or evaluate(model)
-            for i in range(n):
-                moved[i] += 0.5 * side * h * model.dx[i]
-        for i in range(n):
-            least[i] += moved[i] ** 2
-    for i in range(n):
-        window.noise[k, i] = max(window.noise[k, i], least[i] / window.wider[k, i])
-    return status
-
-
-@compiled
-def _filter_again(model, settings, memory, scatter):  # type: ignore[no-untyped-def]
+def _filter_again(model, settings, memory):  # type: ignore[no-untyped-def]
     """Lay the nodes along an extended Kalman filter with the noise of the window; a status."""
     window, seen, z, status = memory.window, settings.layout.seen, memory.filter.z, 0
     P, error = window.P, window.error
@@ -124,7 +94,6 @@ def _filter_again(model, settings, memory, scatter):  # type: ignore[no-untyped-
         for i in range(z.size):
             window.nodes[k, i] = z[i]
             error[i] = 0.0
-        status = status or _drive(model, window, scatter, k)
         for i in range(z.size):
             P[i, i] += window.noise[k, i] * window.wider[k, i]
         status = status or expand(model, settings, memory, k)
@@ -230,9 +199,9 @@ def _report(model, settings, memory, known, u, rows):  # type: ignore[no-untyped
 
 
 @compiled
-def _go_back(model, settings, memory, scatter):  # type: ignore[no-untyped-def]
+def _go_back(model, settings, memory):  # type: ignore[no-untyped-def]
     """Find the best trajectory from that of a filter; returns a status."""
-    return _filter_again(model, settings, memory, scatter) or _settle(model, settings, memory)
+    return _filter_again(model, settings, memory) or _settle(model, settings, memory)
 
 
 @compiled
@@ -276,13 +245,11 @@ class Smoother(MovingHorizonEstimator):
     outliers and jumps that it decides on the way forward, its bounds, steps and derivatives. An
     output whose errors are not white on that way has the noise that makes their sum as uncertain as
     it is: a wrong scale counts once, not with each sample (`excess`, over the time in which noise
-    is learnt). States move at least as far as the noise of inputs moves them. From a filter with
-    that noise, iterations of Gauss and Newton, damped where they would raise the cost, lead to the
-    least squares. NIS is that of the way forward. A linear model has the smoother of Rauch, Tung
-    and Striebel.
+    is learnt). From a filter with that noise, iterations of Gauss and Newton, damped where they
+    would raise the cost, lead to the least squares. NIS is that of the way forward. A linear model
+    has the smoother of Rauch, Tung and Striebel.
     Sources: B. Bell (1994), SIAM J. Optim. 4, 626-636; S. Särkkä, L. Svensson (2020),
-    Levenberg-Marquardt and line-search extended Kalman smoothers, ICASSP; S. Thrun, W. Burgard,
-    D. Fox (2005), Probabilistic Robotics, table 7.2 (noise of inputs as noise of the step).
+    Levenberg-Marquardt and line-search extended Kalman smoothers, ICASSP.
 
     Parameters
     ----------
@@ -332,28 +299,11 @@ class Smoother(MovingHorizonEstimator):
             start, levels = whole.covariance.copy(), whole.levels.copy()
             step = float(np.median(steps))
             self._doubt(whole, start, levels, y[1:] - rows[1:, : y.shape[1]], step)
-            checked(_go_back(model, settings, memory, self._scatter(u[1:])), self.fmu)
+            checked(_go_back(model, settings, memory), self.fmu)
             # A filter lags behind what drifts; what is left now is of sensors and model.
             self._doubt(whole, start, levels, whole.errors, step)
             checked(_finish(model, settings, memory, spread(nodes, s), u, rows), self.fmu)
         return self._split(rows)
-
-    def _scatter(self, u: Matrix) -> Matrix:
-        """Standard deviations of inputs, (n, m); 0 where levels are held, which then say it all.
-
-        What is measured drives the model with its sensor's noise. Walks that are learnt hold that
-        too, as far as outputs show it; where two bodies are pressed together, the force between
-        them answers it and no speed does. So states move by what was learnt of them, or by what
-        inputs make of them if that is more; the sum would count it twice.
-
-        Parameters
-        ----------
-        u : (n, m).
-        """
-        learns = self._settings.learning.within < np.inf
-        noise = [(one.noise * learns, one.relative_noise * learns) for one in self.system.inputs]
-        floor, share = np.array(noise).reshape(-1, 2).T
-        return given(floor + share * np.abs(u))
 
     def _doubt(
         self, whole: Window, start: Matrix, levels: Matrix, errors: Matrix, step: float

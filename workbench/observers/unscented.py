@@ -12,14 +12,15 @@ from workbench.observers.kalman import (
     ExtendedKalmanFilter,
     begin,
     buffers,
+    drive,
     ekf_law,
     finish,
+    model_noise,
     predict,
     put,
-    room,
     variance,
 )
-from workbench.observers.layout import clip, fading, measure
+from workbench.observers.layout import clip, fading
 from workbench.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -39,6 +40,7 @@ class PointsMemory(NamedTuple):
     system: Matrix
     spread: Matrix
     product: Matrix
+    least: Vector
     change: Vector
     column: Vector
     levels: Levels
@@ -196,11 +198,10 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         status = ekf_law(model, settings, memory, h, u, y, row)
         _covariance_to_root(memory)
         return status
-    status = measure(model, u)
+    status = drive(model, settings, memory, z, u, h)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
-        moves = np.sqrt(h * room(settings, memory.P, i) * memory.levels.walk[i]) * fade
-        moves *= settings.walk[i]
+        moves = np.sqrt(model_noise(settings, memory, fade, h, i))
         memory.start[i] = z[i]
         for j in range(size):
             stack[i, j] = root[i, j]
