@@ -291,7 +291,8 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         )
         of = self._settings
         self._settings = HorizonSettings(
-            *of,
+            *(of.layout, of.relative, of.floor, of.walk, of.spread, of.learning),
+            *(of.driven, of.driven_relative),
             iterations=round(iterations),
             limit=float(ndtri(1.0 - 0.5 * rare)),
             largest_nis=float(chdtri(outputs, rare)),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import stdtr
 from scipy.stats import norm, t
 
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.rare_events import Descent, descend
 from workbench.stopping.past import Known, places
@@ -22,6 +22,9 @@ from workbench.stopping.way import DrivingInputs, Halt, Stops
 from workbench.system import System
 from workbench.system_distance import Difference, Stopping
 from workbench.systems import open_model
+
+_TRIED = 8  # draws, which are all much alike in what a step leaves
+_SAME = 1e-4  # of a distance: what it is measured to, ten centimetres in a kilometre
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ class Forecaster:
     def __init__(self, fmu: FMU, system: System, stopping: Stopping) -> None:
         self._fmu, self._system, self._stopping = fmu, system, stopping
         self._stops = Stops(fmu, system, stopping)
+        self._stepped: tuple[Question, int] | None = None
 
     def halt(self, stop: Stop, values: Mapping[str, float]) -> Halt:
         """Stop with values of parameters, SI, and nothing that differs."""
@@ -82,7 +86,7 @@ class Forecaster:
         """
         names = [one.name for one in self._system.outputs]
         distances, outside = [], []
-        for halt, factor in self._halts(question, points):
+        for halt, factor in self._halts(question, points, readings=True):
             readings = dict(zip(names, halt.outputs.T, strict=True))
             distances.append(halt.distance * factor)
             outside.append(beyond(readings, self._system, self._stopping))
@@ -117,8 +121,41 @@ class Forecaster:
         count = dimension(question, self._system, self._stopping)
         return descend(shortness, count, decades, samples, seed), time.process_time() - begin
 
-    def _halts(self, question: Question, points: Matrix) -> Iterator[tuple[Halt, float]]:
-        """Stops, and factors of their distances for what the model leaves."""
+    def _samples(self, question: Question) -> int:
+        """Samples to a step: doubled while the distances of some draws stay the same.
+
+        A sample is as long as sensors need, which are far quicker than a machine that stops.
+        """
+        if self._stepped is None or self._stepped[0] is not question:
+            count = dimension(question, self._system, self._stopping)
+            points = np.random.default_rng(0).standard_normal((_TRIED, count))
+            most = self._stopping.longest / self._system.sample_time
+            every, finest = 1, self._tried(question, points, 1)
+            while 2 * every <= most:
+                off = np.log(self._tried(question, points, 2 * every) / finest)
+                if not np.abs(off).max() < _SAME:
+                    break
+                every *= 2
+            self._stepped = question, every
+        return self._stepped[1]
+
+    def _tried(self, question: Question, points: Matrix, every: int) -> Vector:
+        """Distances by the model, NaN if it does not bear such a step."""
+        try:
+            return np.array([one.distance for one, _ in self._halts(question, points, every)])
+        except FMUError:
+            return np.full(len(points), np.nan)
+
+    def _halts(
+        self, question: Question, points: Matrix, every: int = 0, *, readings: bool = False
+    ) -> Iterator[tuple[Halt, float]]:
+        """Stops, and factors of their distances for what the model leaves.
+
+        Parameters
+        ----------
+        every : samples to a step, 0: as many as serve.
+        """
+        every = every or self._samples(question)
         system, stop, known = self._system, question.stop, question.known
         tolerances = system.comparison.tolerances
         first, second = len(known.keys), len(known.keys) + len(tolerances)
@@ -133,7 +170,8 @@ class Forecaster:
             differing = replace(drive, to=drive.to.copy(), along=drive.along.copy())
             for one, u in zip(self._stopping.differences, point[second:-1], strict=True):
                 self._move(one, float(u), values, differing)
-            yield self._stops.halt(differing, values), float(factor)
+            halt = self._stops.halt(differing, values, every=every, readings=readings)
+            yield halt, float(factor)
 
     def _begun(self, stop: Stop) -> dict[str, float]:
         """States at the command, and parameters that conditions set."""

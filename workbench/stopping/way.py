@@ -46,7 +46,7 @@ class Halt:
     ----------
     distance : from the command to standstill [m].
     time : until then [s].
-    outputs : (n, l) readings of the outputs, by steps.
+    outputs : (n, l) readings of the outputs, by steps; none if they were not asked for.
     """
 
     distance: float
@@ -73,19 +73,20 @@ def _driven(drive, t, way, u):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stop(model, x0, drive, state, rest, h, y, found, work):  # type: ignore[no-untyped-def]
-    """Fill `y` (n, l) and `found` (distance, time, number of steps); returns a status."""
+def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: ignore[no-untyped-def]
+    """Fill `y` (n, l), as far as it goes, and `found` (distance, time, steps); returns a status."""
     for i in range(x0.size):
         model.x[i] = x0[i]
     _driven(drive, 0.0, 0.0, model.u)
     if place(model):
         return 1
     way, speed = 0.0, model.x[state]
-    for k in range(y.shape[0]):
-        if read(model):
-            return 1
-        for i in range(y.shape[1]):
-            y[k, i] = model.y[i]
+    for k in range(most):
+        if k < y.shape[0]:
+            if read(model):
+                return 1
+            for i in range(y.shape[1]):
+                y[k, i] = model.y[i]
         _driven(drive, (k + 1) * h, way + h * speed, work.to)
         status = advance(model, work, h)
         if status:
@@ -126,12 +127,21 @@ class Stops:
         # All states: how stiff one is changes on the way to standstill.
         self._work = steps(fmu, np.arange(len(fmu.states)), len(inputs))
 
-    def halt(self, drive: DrivingInputs, values: Mapping[str, float]) -> Halt:
+    def halt(
+        self,
+        drive: DrivingInputs,
+        values: Mapping[str, float],
+        *,
+        every: int = 1,
+        readings: bool = True,
+    ) -> Halt:
         """Stop once.
 
         Parameters
         ----------
         values : of parameters and states at the command, by name, SI; others keep their defaults.
+        every : samples to a step.
+        readings : whether outputs are asked for.
 
         Raises
         ------
@@ -143,7 +153,8 @@ class Stops:
         status = _stop(
             *(self._model, self._fmu.get_states()),
             *((drive.to, drive.delay, drive.lag, drive.along), self._state),
-            *(self._stopping.rest, self._h, self._y, self._found, self._work),
+            *(self._stopping.rest, every * self._h, len(self._y) // every),
+            *(self._y if readings else self._y[:0], self._found, self._work),
         )
         if status == _MOVING:
             raise FMUError(
@@ -153,4 +164,4 @@ class Stops:
         checked(status, self._fmu)
         assert status == OK
         distance, time, count = self._found
-        return Halt(float(distance), float(time), self._y[: int(count)].copy())
+        return Halt(float(distance), float(time), self._y[: int(count) * readings].copy())
