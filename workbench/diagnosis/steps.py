@@ -90,6 +90,12 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
 
 
 @inlined
+def restart(work):  # type: ignore[no-untyped-def]
+    """Forget the Jacobian, as where a motion begins anew."""
+    work.age[0] = _KEPT
+
+
+@inlined
 def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
     """Make the matrix of a step of h [s], with the Jacobian here or the one that is kept."""
     n, p = model.x.size, work.stiff.size

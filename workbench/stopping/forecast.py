@@ -142,20 +142,30 @@ class Forecaster:
     def _tried(self, question: Question, points: Matrix, every: int) -> Vector:
         """Distances by the model, NaN if it does not bear such a step."""
         try:
-            return np.array([one.distance for one, _ in self._halts(question, points, every)])
+            halts = [
+                self._stops.halt(drive, values, every=every, readings=False)
+                for drive, values, _ in self._draws(question, points)
+            ]
         except FMUError:
             return np.full(len(points), np.nan)
+        return np.array([one.distance for one in halts])
 
     def _halts(
-        self, question: Question, points: Matrix, every: int = 0, *, readings: bool = False
+        self, question: Question, points: Matrix, *, readings: bool = False
     ) -> Iterator[tuple[Halt, float]]:
-        """Stops, and factors of their distances for what the model leaves.
+        """Stops, and factors of their distances for what the model leaves."""
+        halt, every = self._stops.halt, self._samples(question)
+        for drive, values, factor in self._draws(question, points):
+            try:
+                found = halt(drive, values, every=every, readings=readings)
+            except FMUError:  # this one does not bear what serves the others
+                found = halt(drive, values, readings=readings)
+            yield found, factor
 
-        Parameters
-        ----------
-        every : samples to a step, 0: as many as serve.
-        """
-        every = every or self._samples(question)
+    def _draws(
+        self, question: Question, points: Matrix
+    ) -> Iterator[tuple[DrivingInputs, dict[str, float], float]]:
+        """What drives each stop, values of parameters and states, and what the model leaves."""
         system, stop, known = self._system, question.stop, question.known
         tolerances = system.comparison.tolerances
         first, second = len(known.keys), len(known.keys) + len(tolerances)
@@ -170,8 +180,7 @@ class Forecaster:
             differing = replace(drive, to=drive.to.copy(), along=drive.along.copy())
             for one, u in zip(self._stopping.differences, point[second:-1], strict=True):
                 self._move(one, float(u), values, differing)
-            halt = self._stops.halt(differing, values, every=every, readings=readings)
-            yield halt, float(factor)
+            yield differing, values, float(factor)
 
     def _begun(self, stop: Stop) -> dict[str, float]:
         """States at the command, and parameters that conditions set."""

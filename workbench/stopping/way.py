@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.diagnosis.steps import restart, steps
 from workbench.diagnosis.steps import step as advance
-from workbench.diagnosis.steps import steps
 from workbench.errors import FMUError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import OK, checked, compiled, instance, place, read
@@ -77,6 +77,7 @@ def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: igno
     """Fill `y` (n, l), as far as it goes, and `found` (distance, time, steps); returns a status."""
     for i in range(x0.size):
         model.x[i] = x0[i]
+    restart(work)
     _driven(drive, 0.0, 0.0, model.u)
     if place(model):
         return 1
