@@ -100,7 +100,7 @@ def test_friction_of_the_pads_is_recovered(
 def test_the_band_of_a_filter_holds_the_force_in_every_stop(
     stops: dict[str, KnownStop], filter_: str
 ) -> None:
-    """Noise of the pressure sensor moves the force and no speed: without it, one held 58 to 70 %."""
+    """Noise of the pressure sensor moves the force and no speed: without it one held 58 %."""
     shares = {name: coverage(stop, filter_)["Fx"] for name, stop in stops.items()}
     for name, share in shares.items():
         assert share > 0.93, name  # of 95 %, in some thousand samples that hardly hang together

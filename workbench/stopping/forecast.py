@@ -86,7 +86,8 @@ class Forecaster:
         """
         names = [one.name for one in self._system.outputs]
         distances, outside = [], []
-        for halt, factor in self._halts(question, points, readings=True):
+        for drive, values, factor in self._draws(question, points):
+            halt = self._stops.halt(drive, values)
             readings = dict(zip(names, halt.outputs.T, strict=True))
             distances.append(halt.distance * factor)
             outside.append(beyond(readings, self._system, self._stopping))
@@ -95,7 +96,14 @@ class Forecaster:
 
     def distances(self, question: Question, points: Matrix) -> Vector:
         """Distances for points (n, d), (n,) [m]."""
-        return np.array([one.distance * left for one, left in self._halts(question, points)])
+        every, distances = self._samples(question), []
+        for drive, values, factor in self._draws(question, points):
+            try:
+                halt = self._stops.halt(drive, values, every)
+            except FMUError:  # this one does not bear what serves the others
+                halt = self._stops.halt(drive, values)
+            distances.append(halt.distance * factor)
+        return np.array(distances)
 
     def plainly(self, question: Question, samples: int, seed: Sequence[int]) -> Vector:
         """Minus the logarithm of so many distances [m], (n,), each drawn by itself."""
@@ -143,24 +151,12 @@ class Forecaster:
         """Distances by the model, NaN if it does not bear such a step."""
         try:
             halts = [
-                self._stops.halt(drive, values, every=every, readings=False)
+                self._stops.halt(drive, values, every)
                 for drive, values, _ in self._draws(question, points)
             ]
         except FMUError:
             return np.full(len(points), np.nan)
         return np.array([one.distance for one in halts])
-
-    def _halts(
-        self, question: Question, points: Matrix, *, readings: bool = False
-    ) -> Iterator[tuple[Halt, float]]:
-        """Stops, and factors of their distances for what the model leaves."""
-        halt, every = self._stops.halt, self._samples(question)
-        for drive, values, factor in self._draws(question, points):
-            try:
-                found = halt(drive, values, every=every, readings=readings)
-            except FMUError:  # this one does not bear what serves the others
-                found = halt(drive, values, readings=readings)
-            yield found, factor
 
     def _draws(
         self, question: Question, points: Matrix

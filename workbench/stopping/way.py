@@ -46,7 +46,7 @@ class Halt:
     ----------
     distance : from the command to standstill [m].
     time : until then [s].
-    outputs : (n, l) readings of the outputs, by steps; none if they were not asked for.
+    outputs : (n, l) readings of the outputs, by samples; none where steps are longer.
     """
 
     distance: float
@@ -128,21 +128,13 @@ class Stops:
         # All states: how stiff one is changes on the way to standstill.
         self._work = steps(fmu, np.arange(len(fmu.states)), len(inputs))
 
-    def halt(
-        self,
-        drive: DrivingInputs,
-        values: Mapping[str, float],
-        *,
-        every: int = 1,
-        readings: bool = True,
-    ) -> Halt:
+    def halt(self, drive: DrivingInputs, values: Mapping[str, float], every: int = 1) -> Halt:
         """Stop once.
 
         Parameters
         ----------
         values : of parameters and states at the command, by name, SI; others keep their defaults.
-        every : samples to a step.
-        readings : whether outputs are asked for.
+        every : samples to a step; outputs are read where it is one.
 
         Raises
         ------
@@ -151,11 +143,12 @@ class Stops:
         """
         self._fmu.start(values)
         self._model.u[:] = 0.0
+        y = self._y if every == 1 else self._y[:0]
         status = _stop(
             *(self._model, self._fmu.get_states()),
             *((drive.to, drive.delay, drive.lag, drive.along), self._state),
             *(self._stopping.rest, every * self._h, len(self._y) // every),
-            *(self._y if readings else self._y[:0], self._found, self._work),
+            *(y, self._found, self._work),
         )
         if status == _MOVING:
             raise FMUError(
@@ -165,4 +158,4 @@ class Stops:
         checked(status, self._fmu)
         assert status == OK
         distance, time, count = self._found
-        return Halt(float(distance), float(time), self._y[: int(count) * readings].copy())
+        return Halt(float(distance), float(time), y[: int(count)].copy())
