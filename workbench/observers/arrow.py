@@ -33,8 +33,8 @@ from workbench.observers.block_slopes import slope, slopes_of_fed
 from workbench.observers.block_step import predict
 from workbench.observers.blocks import Blocks, blocks, widths
 from workbench.observers.gains import Gains
-from workbench.observers.kalman import ExtendedKalmanFilter, FilterSettings, put, variance
-from workbench.observers.layout import Layout, clip, fading, measure, report
+from workbench.observers.kalman import ExtendedKalmanFilter, FilterSettings, variance
+from workbench.observers.layout import Layout, clip, fading, measure, put, report
 from workbench.system import System
 
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from workbench.kernel import compiled, evaluate, inlined, solve, solve_part
 from workbench.observers.block_slopes import slopes
-from workbench.observers.kalman import put
-from workbench.observers.layout import lag, stick
+from workbench.observers.layout import lag, put, stick
 
 _ROUNDING = 1e-12  # share of a variance below which what is left of it is rounding
 

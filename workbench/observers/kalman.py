@@ -10,16 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import (
-    compiled,
-    evaluate,
-    implicit,
-    inlined,
-    linearise,
-    read,
-    set_inputs,
-    solve,
-)
+from workbench.kernel import compiled, evaluate, implicit, inlined, linearise, read, solve
 from workbench.observers.adaptive import Learning, Levels, learning, levels, reset
 from workbench.observers.contract import Estimator
 from workbench.observers.correction import update
@@ -27,14 +18,15 @@ from workbench.observers.gains import Gains, SearchSpace, noise_space
 from workbench.observers.layout import (
     Layout,
     clip,
-    correct,
     fading,
     lag,
     measure,
+    put,
     report,
     stick,
 )
 from workbench.observers.operating import walks
+from workbench.observers.process_noise import drive, process_noise
 from workbench.system import System
 
 _FAINTEST = 1e-3  # share of feedback that the noise of measurements is raised for
@@ -79,15 +71,6 @@ class FilterMemory(NamedTuple):
     change: Vector
     column: Vector
     levels: Levels
-
-
-@inlined
-def put(model, z):  # type: ignore[no-untyped-def]
-    """Put the FMU at states and corrections z, (n + q,); returns a status."""
-    n = model.x.size
-    for i in range(n):
-        model.x[i] = z[i]
-    return correct(model, z[n:])
 
 
 @compiled
@@ -154,62 +137,10 @@ def carry(F, P, work):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def room(settings, P, i):  # type: ignore[no-untyped-def]
-    """Share of a random walk that is left, where levels are learnt.
-
-    Nothing is known less of a quantity than at the start: a walk within a range. States have none.
-    """
-    if settings.learning.within == np.inf or i < P.shape[0] - settings.layout.nominal.size:
-        return 1.0
-    return max(1.0 - P[i, i] / settings.spread[i] ** 2, 0.0)
-
-
-@inlined
 def variance(settings, fade, y, j):  # type: ignore[no-untyped-def]
     """Variance of output j [its unit squared], raised where feedback fades."""
     deviation = settings.floor[j] + settings.relative[j] * abs(y[j])
     return (deviation / max(fade, _FAINTEST)) ** 2
-
-
-@compiled
-def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
-    """Variances by which noise of the inputs moves the states in a step from z; returns a status.
-
-    What is measured drives the model with its sensor's noise, (h df/du sigma)^2, in `memory.least`.
-    Walks that are learnt hold that too, as far as outputs show it; where two bodies are pressed
-    together, the force between them answers it and no speed does. So states move by what was learnt
-    of them, or by what inputs make of them if that is more; the sum would count it twice.
-    Source: S. Thrun, W. Burgard, D. Fox (2005), Probabilistic Robotics, table 7.2 (noise of inputs
-    as noise of the step).
-    """
-    n, least, low = model.x.size, memory.least, memory.change
-    for i in range(n):
-        least[i] = 0.0
-    status = measure(model, u) or put(model, z)
-    for j in range(u.size):
-        deviation = settings.driven[j] + settings.driven_relative[j] * abs(u[j])
-        if deviation == 0.0:
-            continue
-        model.u[j] = u[j] - deviation
-        status = status or set_inputs(model, j, 1) or evaluate(model)
-        for i in range(n):
-            low[i] = model.dx[i]
-        model.u[j] = u[j] + deviation
-        status = status or set_inputs(model, j, 1) or evaluate(model)
-        for i in range(n):
-            least[i] += (0.5 * h * (model.dx[i] - low[i])) ** 2
-        model.u[j] = u[j]
-        status = status or set_inputs(model, j, 1)
-    return status
-
-
-@inlined
-def model_noise(settings, memory, fade, h, i):  # type: ignore[no-untyped-def]
-    """Variance by which state or quantity i moves in a step, after `drive`; less where it fades."""
-    moves = h * room(settings, memory.P, i) * memory.levels.walk[i] * settings.walk[i] ** 2
-    if i < memory.least.size:
-        moves = max(moves, memory.least[i])
-    return fade * fade * moves
 
 
 @compiled
@@ -264,7 +195,7 @@ def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
     for i in range(size):
-        P[i, i] += model_noise(settings, memory, fade, h, i)
+        P[i, i] += process_noise(settings, memory, fade, h, i)
     for j in range(y.size):
         memory.levels.noise[j] = variance(settings, fade, y, j)
     status = status or transition(model, memory.spread, h)

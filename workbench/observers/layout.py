@@ -228,6 +228,15 @@ def correct(model, corrections):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def put(model, z):  # type: ignore[no-untyped-def]
+    """Put the FMU at states and corrections z, (n + q,); returns a status."""
+    n = model.x.size
+    for i in range(n):
+        model.x[i] = z[i]
+    return correct(model, z[n:])
+
+
+@inlined
 def report(model, layout, row):  # type: ignore[no-untyped-def]
     """Write the estimate that the FMU is at into a row; returns a status."""
     status = read(model)

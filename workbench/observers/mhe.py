@@ -14,15 +14,13 @@ from workbench.observers.kalman import (
     ExtendedKalmanFilter,
     FilterMemory,
     begin,
-    drive,
     finish,
     predict,
-    put,
-    room,
     transition,
     variance,
 )
-from workbench.observers.layout import Layout, fading, measure
+from workbench.observers.layout import Layout, fading, measure, put
+from workbench.observers.process_noise import drive, room
 from workbench.observers.window import (
     Window,
     assign,

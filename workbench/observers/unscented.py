@@ -12,15 +12,13 @@ from workbench.observers.kalman import (
     ExtendedKalmanFilter,
     begin,
     buffers,
-    drive,
     ekf_law,
     finish,
-    model_noise,
     predict,
-    put,
     variance,
 )
-from workbench.observers.layout import clip, fading
+from workbench.observers.layout import clip, fading, put
+from workbench.observers.process_noise import drive, process_noise
 from workbench.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -201,7 +199,7 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     status = drive(model, settings, memory, z, u, h)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
-        moves = np.sqrt(model_noise(settings, memory, fade, h, i))
+        moves = np.sqrt(process_noise(settings, memory, fade, h, i))
         memory.start[i] = z[i]
         for j in range(size):
             stack[i, j] = root[i, j]
