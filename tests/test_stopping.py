@@ -219,7 +219,7 @@ def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(
 def test_a_stop_does_not_depend_on_the_one_before(
     train: System, stopping: Stopping, forecaster: Forecaster
 ) -> None:
-    """A Jacobian at rest, kept for the first steps of the next stop, cost 1 % in one of 1500."""
+    """A Jacobian at rest that is kept for the first steps of the next stop moves one of these."""
     asked = question(train, asked_stop({}, train, stopping), left=0.0)
     points = np.random.default_rng(4).standard_normal((510, dimension(asked, train, stopping)))
     there, back = (forecaster.distances(asked, one) for one in (points, points[::-1]))

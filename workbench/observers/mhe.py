@@ -104,8 +104,8 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
         share = levels.walk[i] * room(settings, memory.filter.P, i)
         window.wider[k, i] = max(share, settings.fading * before)
     for i in range(memory.filter.least.size):
-        least = fade * fade * memory.filter.least[i]
-        window.noise[k, i] = max(window.noise[k, i], least / window.wider[k, i])
+        least = memory.filter.least[i] / window.wider[k, i]
+        window.noise[k, i] = max(window.noise[k, i], least)
 
 
 @inlined

@@ -51,8 +51,10 @@ def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
 
 @inlined
 def process_noise(settings, memory, fade, h, i):  # type: ignore[no-untyped-def]
-    """Variance by which state or quantity i moves in a step, after `drive`; less where it fades."""
-    moves = h * room(settings, memory.P, i) * memory.levels.walk[i] * settings.walk[i] ** 2
-    if i < memory.least.size:
-        moves = max(moves, memory.least[i])
-    return fade * fade * moves
+    """Variance by which state or quantity i moves in a step, after `drive`.
+
+    Walks fade with feedback; the noise of a sensor does not.
+    """
+    share = room(settings, memory.P, i) * memory.levels.walk[i]
+    moves = h * share * (fade * settings.walk[i]) ** 2
+    return max(moves, memory.least[i]) if i < memory.least.size else moves
