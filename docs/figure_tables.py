@@ -8,8 +8,9 @@ from figure import Summary, Table
 from workbench.lab import said
 from workbench.report.views import label
 from workbench.systems import load_system
-from workbench.wheelset.accuracy import COVERED, ROWS, Worst
+from workbench.wheelset.accuracy import ROWS, Worst
 from workbench.wheelset.accuracy_report import cell
+from workbench.wheelset.bands import COVERED
 
 TUNED = ("disturbance_observer", "parameter_estimator")
 SYSTEM = load_system("wheelset")
@@ -98,6 +99,23 @@ def covered(*summaries: Summary) -> Table:
             "" if one is None else f"{100.0 * np.mean(one):.1f} % ({100.0 * min(one):.0f} %)"
             for one in known
         ]
+        rows.append([quantity, *texts])
+    return rows
+
+
+def widths(*summaries: Summary) -> Table:
+    """What bands must be multiplied by to hold 95 %: mean of the seeds, and from least to most."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for summary in summaries:
+        for name, one in summary["bands"].items():
+            for quantity, factor in one.items():
+                found.setdefault(name, {}).setdefault(quantity, []).append(factor)
+    rows: Table = [["", *(titled(name) for name in found)]]
+    for quantity in (one for one in COVERED if any(one in known for known in found.values())):
+        texts = []
+        for factors in (known.get(quantity) for known in found.values()):
+            ends = f"{min(factors):.2f} to {max(factors):.2f}" if factors else ""
+            texts.append(f"{np.mean(factors):.2f} ({ends})" if factors else "")
         rows.append([quantity, *texts])
     return rows
 

@@ -115,6 +115,8 @@ class System:
     work : powers of friction by what they wear, in measured signals and parameters [W].
     loggers : measured signals by the logger that records them; others share one more.
     learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
+    bands : by estimator and quantity, reach of its 95 % bands over that by its own standard
+        deviations, where recordings whose truth is known say so [1].
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
     """
@@ -151,6 +153,7 @@ class System:
     settles: float = 10.0
     sample_time: float = 0.005
     learns: float = math.inf
+    bands: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     states: tuple[str, ...] | None = None
     cases: Path | None = None
     sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))

@@ -16,6 +16,7 @@ from workbench.system_comparison import Comparison
 from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
     positive,
+    read_bands,
     read_condition_kinds,
     read_derived,
     read_estimated,
@@ -47,7 +48,7 @@ def read_system(path: Path) -> System:
         "name title companion reported models parameters inputs outputs judged derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
         "export shortest fewest sample_time cases sampling redundancies next cutting distance work "
-        "loggers"
+        "loggers bands"
     )
     return _read(file, path, _models(file, path))
 
@@ -191,6 +192,7 @@ def _placed(file: Table, system: System) -> System:
         fading=read_fading(feedback.table("fades"), system) if "fades" in feedback else None,
         rolling=read_rolling(feedback.table("rolls")) if "rolls" in feedback else None,
         learns=positive(feedback, "learns"),
+        bands=read_bands(file, system),
         following=read_following(tuning.table("follows")) if "follows" in tuning else None,
         panels=tuple(read_view(table, system) for table in file.tables("figures")),
         export=read_export(file.table("export"), system),

@@ -61,6 +61,24 @@ def within(file: Table, group: str, name: str) -> Table:
     return Table(file.table(group).take(name, dict), f"{file.where}, [{group}.{name}]")
 
 
+def read_bands(file: Table, system: System) -> dict[str, dict[str, float]]:
+    """Reach of bands over that by standard deviations, by estimator and quantity."""
+    tables = {name: within(file, "bands", name) for name in file.table("bands").content}
+    for table in tables.values():
+        table.refuse_unknown(" ".join(system.columns))
+    return {
+        name: {quantity: _above_zero(table, quantity) for quantity in table.content}
+        for name, table in tables.items()
+    }
+
+
+def _above_zero(table: Table, key: str) -> float:
+    value = table.number(key, "1")
+    if not value > 0.0:
+        raise table.wrong(key, "a number above 0")
+    return value
+
+
 def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
     """Measured signals of a group: inputs, outputs or judged."""
     found = []

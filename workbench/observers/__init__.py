@@ -4,7 +4,7 @@ One file each; a new one is found by itself. A system's companion package may ha
 """
 
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from types import ModuleType
@@ -19,11 +19,20 @@ __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimator
 
 
 def estimators(system: System) -> dict[str, type[Estimator]]:
-    """All estimators that run on a system, by name, in the order of tables."""
+    """All estimators that run on a system, by name, in the order of tables.
+
+    Raises
+    ------
+    InputError
+        If the system has bands of an estimator that there is not.
+    """
     own = companion_part(system.companion, "estimators")
     packages = [__name__] + ([own.__name__] if own else [])
     found = [kind for package in packages for kind in _estimators(package)]
-    return {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
+    known = {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
+    for name in system.bands:
+        _refuse_unknown(name, known, f"{system.source}, [bands.{name}]")
+    return known
 
 
 def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
@@ -36,16 +45,20 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
     """
     known = estimators(system)
     for name in names:
-        if name not in known:
-            raise InputError(
-                where=f"estimator '{name}'",
-                found=f"no estimator of this name{closest(name, known)}",
-                expected=f"one of {', '.join(known)}",
-                remedy="correct the name",
-            )
+        _refuse_unknown(name, known, f"estimator '{name}'")
     return {
         name: kind for name, kind in known.items() if (name in names if names else kind.standard)
     }
+
+
+def _refuse_unknown(name: str, known: Mapping[str, type[Estimator]], where: str) -> None:
+    if name not in known:
+        raise InputError(
+            where=where,
+            found=f"no estimator of this name{closest(name, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
 
 
 @cache

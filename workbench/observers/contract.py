@@ -80,6 +80,7 @@ class Estimator(ABC):
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     told : conditions that it finds by itself.
+    bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
 
     Raises
     ------
@@ -115,6 +116,8 @@ class Estimator(ABC):
         self._layout = layout(fmu, system)
         self._t = 0.0
         self._width = 2 * len(system.columns) + len(self.modes) + 1
+        bands = system.bands.get(self.name, {})
+        self.bands = np.array([bands.get(name, 1.0) for name in system.columns])
 
     @property
     def models(self) -> tuple[FMU, ...]:
@@ -264,4 +267,4 @@ class Estimator(ABC):
     def _split(self, rows: Any) -> Estimate:
         width = len(self.system.columns)
         values, sigma, probability = np.split(rows[..., :-1], [width, 2 * width], axis=-1)
-        return Estimate(values, sigma, rows[..., -1], probability)
+        return Estimate(values, self.bands * sigma, rows[..., -1], probability)

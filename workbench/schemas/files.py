@@ -135,6 +135,7 @@ def system_schema() -> Schema:
         "loggers": by_name(listed(TEXT)),
         "next": _experiments(formula, made, measured),
         "cutting": closed(cutting, optional="released before after"),
+        "bands": by_name(by_name(NUMBER)),
         "work": by_name(closed({"is": formula, "label": TEXT}, optional="label")),
         "distance": _stopping(formula, level),
     }

@@ -14,16 +14,14 @@ from numpy.typing import NDArray
 from workbench.case import Case, sign
 from workbench.cosim import Ending, Run, replay
 from workbench.fmu import Vector
-from workbench.lab import BAND
 from workbench.objective import judged_window, low_pass
 from workbench.observers import Estimator
 from workbench.system import System
+from workbench.wheelset.bands import Held, held
 from workbench.wheelset.truth import BUILT_UP, Truth, lowest_speed, rolling_speed
 
 # Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
 NOISE = 0.03
-
-COVERED = ("Fx", "slip", "omegaW", "omegaR", "muDC", "muWR")  # by bands, where there are any
 
 _BUILDING_UP = 2.0  # [s] after the first contact
 _SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
@@ -97,8 +95,7 @@ class Accuracy:
     ----------
     failure : why the estimator did not run to the end; empty if it did.
     force .. muDC : see their metadata; infinite if a delay never ends.
-    covers : share of samples in which a 95 % band holds the truth, from first pressure to 1 m/s, by
-        quantity that has one.
+    bands : what 95 % bands hold from first pressure to 1 m/s, by quantity that has one.
     """
 
     failure: str = ""
@@ -138,7 +135,7 @@ class Accuracy:
         "largest error of the pads' friction, from 1 s after the first pad contact to 1 m/s, "
         "below 5 Hz",
     )
-    covers: Mapping[str, float] = field(default_factory=dict)
+    bands: Mapping[str, Held] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -242,22 +239,8 @@ def accuracy(stop: KnownStop, name: str) -> Accuracy:
         contact_too_low=too_low,
         oscillation=max(0.0, min(too_high, too_low)),
         muDC=friction_error(stop, name) if estimated else None,
-        covers=coverage(stop, name),
+        bands=held(stop, name),
     )
-
-
-def coverage(stop: KnownStop, name: str) -> dict[str, float]:
-    """Share of samples in which a 95 % band holds the truth, where that is judged and claimed."""
-    run, found = stop.runs[name], {}
-    for quantity in COVERED:
-        judged = np.zeros(stop.case.time.size, bool)
-        judged[judged_window(stop.case, stop.system)] = True
-        judged &= run.claimed.get(quantity, True)
-        error = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[judged]
-        reach = BAND * run.deviation(quantity)[judged]
-        if error.size and np.isfinite(reach).all():
-            found[quantity] = float(np.mean(error < reach))
-    return found
 
 
 def force_error(stop: KnownStop, name: str) -> float:

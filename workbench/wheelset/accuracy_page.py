@@ -9,8 +9,9 @@ from workbench.report.figures import ESTIMATORS
 from workbench.report.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 from workbench.report.views import label
 from workbench.system import System
-from workbench.wheelset.accuracy import COVERED, ROWS, StopAccuracy, worst
-from workbench.wheelset.accuracy_report import cell, covered
+from workbench.wheelset.accuracy import ROWS, StopAccuracy, worst
+from workbench.wheelset.accuracy_report import cell
+from workbench.wheelset.bands import COVERED, covered
 
 
 def write_accuracy_page(

@@ -6,7 +6,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from workbench.answer import Answer, Measure
@@ -15,7 +14,6 @@ from workbench.report.answers import with_answer
 from workbench.report.views import label, percent
 from workbench.system import System
 from workbench.wheelset.accuracy import (
-    COVERED,
     NOISE,
     ROWS,
     Accuracy,
@@ -24,6 +22,7 @@ from workbench.wheelset.accuracy import (
     Worst,
     worst,
 )
+from workbench.wheelset.bands import COVERED, covered, needed_bands
 
 _QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
 _CELL = 8  # characters, that of "+100.0 %"
@@ -38,7 +37,7 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
     lines = [
         {"case": stop.name, "estimator": name}
         | {f"{q} [{meta['unit']}]": getattr(result, q) for q, meta in _QUANTITIES.items()}
-        | {f"covers_{q} [1]": result.covers.get(q) for q in COVERED}
+        | {f"covers_{q} [1]": result.bands[q].share if q in result.bands else None for q in COVERED}
         | {"failure": result.failure}
         for stop in stops
         for name, result in stop.estimators.items()
@@ -52,6 +51,7 @@ def write_accuracy(
     """Write accuracy.json: each estimator in each stop, and the worst of them by row.
 
     What is not to be judged is left out; null is a delay that never ends, or of a failed run.
+    `bands` are those of the system file by which bands would hold 95 % in these stops.
     """
     summary = {
         "provenance": provenance,
@@ -72,6 +72,13 @@ def write_accuracy(
                 if (one := worst(row, stops, name)) is not None
             }
             for name in stops[0].estimators
+        },
+        "bands": {
+            name: {
+                quantity: system.bands.get(name, {}).get(quantity, 1.0) * factor
+                for quantity, factor in one.items()
+            }
+            for name, one in needed_bands(stops).items()
         },
     }
     write_json(path, with_answer(_answer(system, stops), summary))
@@ -120,7 +127,8 @@ def _plain(result: Accuracy) -> dict[str, Any]:
         return {"failure": result.failure}
     values = {name: getattr(result, name) for name in _QUANTITIES}
     plain = {name: _finite(value) for name, value in values.items() if value is not None}
-    return plain | ({"covers": dict(result.covers)} if result.covers else {})
+    shares = {name: one.share for name, one in result.bands.items()}
+    return plain | ({"covers": shares} if shares else {})
 
 
 def _finite(value: float) -> float | None:
@@ -156,21 +164,6 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
         if result.failure
     ]
     return "\n".join(lines + failures)
-
-
-def covered(
-    stops: Sequence[StopAccuracy], name: str, quantity: str, *, least: bool = False
-) -> float | None:
-    """Share of samples in which bands of an estimator hold a quantity: mean of the stops, or least.
-
-    In a stop whose share is low the filter is overconfident, which a mean may hide.
-    """
-    shares = [
-        stop.estimators[name].covers[quantity]
-        for stop in stops
-        if quantity in stop.estimators[name].covers
-    ]
-    return float(np.min(shares) if least else np.mean(shares)) if shares else None
 
 
 def _covers(

@@ -29,6 +29,7 @@ def _accuracy() -> Schema:
         "quantities": by_name(closed({"unit": TEXT, "text": TEXT})),
         "stops": by_name(closed(stop)),
         "worst": by_name(by_name(worst)),
+        "bands": by_name(by_name(NUMBER)),
     }
     provenance = {"run": RUN, "workbench": TEXT, "packages": by_name(TEXT)}
     provenance |= {"fmus": listed(FMU), "gains": by_name(TEXT)}
