@@ -20,7 +20,6 @@ from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import (
     KnownStop,
     contact_errors,
-    coverage,
     fall_delay,
     force_error,
     friction_error,
@@ -29,6 +28,7 @@ from workbench.wheelset.accuracy import (
     rise_delay,
     slide_error,
 )
+from workbench.wheelset.bands import COVERED, held
 from workbench.wheelset.claims import PeakForce
 from workbench.wheelset.rig import ORDINARY_PADS, Effects, select
 from workbench.wheelset.truth import read_truth
@@ -97,15 +97,17 @@ def test_friction_of_the_pads_is_recovered(
 
 
 @pytest.mark.parametrize("filter_", ["ekf", "ukf", "mhe", "imm", "smoother"])
-def test_the_band_of_a_filter_holds_the_force_in_every_stop(
-    stops: dict[str, KnownStop], filter_: str
-) -> None:
-    """Noise of the pressure sensor moves the force and no speed: without it one held 58 %."""
-    shares = {name: coverage(stop, filter_)["Fx"] for name, stop in stops.items()}
-    for name, share in shares.items():
-        assert share > 0.93, name  # of 95 %, in some thousand samples that hardly hang together
-    # Bands that hold 99 % are a third too wide (2.58 over 1.96 standard deviations).
-    assert np.mean(list(shares.values())) < 0.99
+def test_the_band_of_a_filter_holds_what_it_says(stops: dict[str, KnownStop], filter_: str) -> None:
+    """Stops of seeds 8 to 14 say how wide they are; these are of seed 1."""
+    shares = [held(stop, filter_) for stop in stops.values()]
+    for quantity in COVERED:
+        known = [one[quantity].share for one in shares if quantity in one]
+        if quantity != "muWR":  # which is claimed in the few stops that use much of the adhesion
+            # Of single seeds the slip asks for bands 9 % narrower to 9 % wider, 2 % more or less.
+            assert 0.93 < np.mean(known) < 0.97, quantity
+    # Noise of the pressure sensor moves the force and no speed: without it one held 58 %.
+    for name, one in zip(stops, shares, strict=True):
+        assert one["Fx"].share > 0.85, name
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)

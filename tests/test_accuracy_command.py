@@ -35,6 +35,7 @@ from workbench.wheelset.accuracy import (
     worst,
 )
 from workbench.wheelset.accuracy_report import format_accuracy
+from workbench.wheelset.bands import Held, covered, needed
 from workbench.wheelset.truth import Truth, read_truth
 
 from .page_rules import check_page
@@ -129,6 +130,15 @@ def test_friction_is_judged_from_a_second_after_the_first_contact() -> None:
     assert accuracy(estimated(FORCE, TRUTH.muDC), "one").muDC is None
 
 
+def test_friction_of_the_rail_is_judged_where_it_is_claimed() -> None:
+    stop = estimated(FORCE, TRUTH.muDC)
+    run, wrong = stop.runs["one"], np.where(TIME < 12.0, 0.1, 0.318)
+    run.estimate[:, list(SYSTEM.columns).index("muWR")] = wrong
+    assert accuracy(stop, "one").muWR is None
+    claiming = replace(stop, runs={"one": replace(run, claimed={"muWR": TIME > 12.0})})
+    assert accuracy(claiming, "one").muWR == pytest.approx(0.06)
+
+
 def test_only_the_first_slide_counts_and_creep_is_none() -> None:
     stop = estimated(FORCE, TRUTH.muDC)
     assert np.array_equal(stop.slide, SLIDING)
@@ -167,6 +177,7 @@ def test_the_worst_is_taken_over_the_stops_that_a_row_concerns() -> None:
         None,
         ("dry", 0.002),
         ("wet", 0.004),
+        None,
     ]
 
 
@@ -188,6 +199,30 @@ def test_a_band_that_holds_little_in_one_stop_is_not_hidden_by_the_mean() -> Non
     ]
     mean, least = (line.split() for line in format_accuracy(stops).splitlines() if line[:2] == "Fx")
     assert (mean, least) == (["Fx", "84.0", "%"], ["Fx", "70.0", "%"])
+
+
+@pytest.mark.parametrize("scale", [0.4, 1.7])
+def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale: float) -> None:
+    """Of stops alike whose errors have heavier tails than any normal distribution."""
+    rng, sigma = np.random.default_rng(3), 80.0
+
+    def stops(multiplied: float) -> list[StopAccuracy]:
+        found = []
+        for name in ("a", "b", "c", "d", "e", "f"):
+            wrong = FORCE + scale * sigma * rng.standard_t(4, TIME.size)
+            stop = estimated(wrong, TRUTH.muDC)
+            said = np.full_like(stop.runs["one"].sigma, multiplied * sigma)
+            run = replace(stop.runs["one"], sigma=said)
+            held_in = accuracy(replace(stop, runs={"one": run}), "one")
+            found.append(stop_of(name, False, False, held_in))
+        return found
+
+    factor = needed(stops(1.0), "one", "Fx")
+    assert factor is not None
+    # 1.96 standard deviations are the reach of a band, 2.776 that of Student's t with 4 degrees.
+    assert factor == pytest.approx(scale * 2.776 / 1.96, rel=0.03)
+    # Six stops of 3200 samples: a share of 95 % is known to 0.16 %.
+    assert covered(stops(factor), "one", "Fx") == pytest.approx(0.95, abs=0.005)
 
 
 # --- the command ---

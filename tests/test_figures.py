@@ -49,9 +49,9 @@ def test_tables_say_what_was_found() -> None:
     header, force, *_ = table = tables.worst(WORST)
     assert (header[1], force[:3]) == ("goal", ["force, dry discs", "2 %", "0.18 %"])
     assert {row[0]: row[2] for row in table}["delay at 90 % of the force"] == "never"
-    # Mean and least of the stops of all runs; an estimator without bands has no column.
-    (stops, *names), (_, *force), *_ = tables.covered(COVERED, COVERED)
-    assert (stops, len(names), force) == ("4 stops", 1, ["94.0 % (93 %)"])
+    # Mean and least of the stops; an estimator without bands has no column.
+    (stops, *names), (_, *force), *_ = tables.coverage(COVERED)
+    assert (stops, len(names), force) == ("2 stops", 1, ["94.0 % (93 %)"])
     found = tables.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
     estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
     assert found[1:] == [["BrakeFade", "fade 4.0 % per 100 K", estimate]]

@@ -201,7 +201,7 @@ def rails() -> dict[str, Run]:
 
 def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
     conditions = tuple(replace(one, parameters={}) for one in WHEELSET.conditions)
-    plain = replace(WHEELSET, conditions=conditions)
+    plain = replace(WHEELSET, conditions=conditions, bands={})
     case = read_case(ROOT / "cases" / "09_wet_160_4.2_wsp", plain)
     with open_model(plain) as opened:
         gains = ExtendedKalmanFilter.reasoned(opened, plain)

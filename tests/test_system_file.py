@@ -1,6 +1,7 @@
 """Mistakes in a system file are refused at the door: where, found, expected, what to do."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -173,6 +174,14 @@ MISTAKES = {
         ("[feedback]", '[states.omega]\nwalk = "1 rad/s"\n[feedback]'),
         r"\[states\.omega\]",
     ),
+    "band of an unknown quantity": (
+        ("muDC = 0.60 }", "MuDC = 0.60 }"),
+        r"\[bands\.smoother\]: found unknown key 'MuDC' \(closest: 'muDC'\)",
+    ),
+    "band without a width": (
+        ("muDC = 0.60 }", "muDC = 0.0 }"),
+        r"\[bands\.smoother\] muDC: found 0\.0; expected a number above 0",
+    ),
     "reading that the model lacks": (
         ('reading = "FxReading"', 'reading = "FxRead"'),
         r"Fx reading: found 'FxRead' \(closest: 'FxReading'\)",
@@ -289,6 +298,28 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
     with open_model(usual) as nominal:
         other = kind(nominal, usual, kind.reasoned(nominal, usual)).run(*samples)
     assert np.abs(found.values - other.values).max() > 1.0
+
+
+def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(
+    system: System, dry_case: Case
+) -> None:
+    plain = replace(system, bands={})
+    wider = replace(system, bands={"ekf": {"Fx": 1.5}})
+    part = slice(0, 2000)
+    samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
+    (kind,) = choose(plain, ["ekf"]).values()
+    with open_model(system) as fmu:
+        expected = kind(fmu, plain, kind.reasoned(fmu, plain)).run(*samples)
+        found = kind(fmu, wider, kind.reasoned(fmu, wider)).run(*samples)
+    assert_array_equal(found.values, expected.values)
+    assert_array_equal(found.nis, expected.nis)
+    factors = [1.5 if name == "Fx" else 1.0 for name in system.columns]
+    assert_array_equal(found.sigma, expected.sigma * factors)
+
+
+def test_bands_of_no_estimator_are_refused(system: System) -> None:
+    with pytest.raises(InputError, match=r"\[bands\.efk\]: .* name \(closest: 'ekf'\)"):
+        choose(replace(system, bands={"efk": {"Fx": 1.0}}), [])
 
 
 # --- the documentation ---

@@ -113,10 +113,10 @@ def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[lis
 def plain_filters(system: System) -> System:
     """The same system for filters as in a textbook, which what they are measured against are.
 
-    They begin at nominal quantities and learn no noise levels.
+    They begin at nominal quantities, learn no noise levels, and say what they know as they know it.
     """
     estimated = [replace(one, start=math.nan, relative_error=0.0) for one in system.estimated]
-    return replace(system, estimated=tuple(estimated), learns=math.inf)
+    return replace(system, estimated=tuple(estimated), learns=math.inf, bands={})
 
 
 def tuned_names(system: System) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.case import Case, sign
-from workbench.cosim import Ending, Run, replay
+from workbench.cosim import SURE, Ending, Run, replay
 from workbench.fmu import Vector
 from workbench.objective import judged_window, low_pass
 from workbench.observers import Estimator
@@ -94,7 +94,7 @@ class Accuracy:
     Attributes
     ----------
     failure : why the estimator did not run to the end; empty if it did.
-    force .. muDC : see their metadata; infinite if a delay never ends.
+    force .. muWR : see their metadata; infinite if a delay never ends.
     bands : what 95 % bands hold from first pressure to 1 m/s, by quantity that has one.
     """
 
@@ -134,6 +134,9 @@ class Accuracy:
         "1",
         "largest error of the pads' friction, from 1 s after the first pad contact to 1 m/s, "
         "below 5 Hz",
+    )
+    muWR: float | None = _quantity(
+        "1", "error of muWR over the truth, below which 95 % of the samples stay that claim it"
     )
     bands: Mapping[str, Held] = field(default_factory=dict)
 
@@ -189,6 +192,7 @@ ROWS = (
     Row("oscillation at first pad contact", "oscillation"),
     Row("muDC, dry discs", "muDC", wet=False),
     Row("muDC, wet discs", "muDC", wet=True),
+    Row("muWR, 95 % of what is claimed", "muWR"),
 )
 
 
@@ -239,6 +243,7 @@ def accuracy(stop: KnownStop, name: str) -> Accuracy:
         contact_too_low=too_low,
         oscillation=max(0.0, min(too_high, too_low)),
         muDC=friction_error(stop, name) if estimated else None,
+        muWR=rail_error(stop, name),
         bands=held(stop, name),
     )
 
@@ -333,6 +338,15 @@ def friction_error(stop: KnownStop, name: str) -> float:
     error = stop.smooth(stop.runs[name].signal("muDC") - stop.truth.muDC)
     moving = rolling_speed(stop.system, stop.case["omegaR"]) > lowest_speed(stop.system)
     return float(np.abs(error[stop.between(1.0, np.inf) & moving]).max())
+
+
+def rail_error(stop: KnownStop, name: str) -> float | None:
+    """Error of muWR over the truth, which 95 % of the claimed samples stay below; None without."""
+    claimed = stop.runs[name].claimed.get("muWR")
+    if claimed is None or not claimed.any():
+        return None
+    error = stop.runs[name].signal("muWR") / stop.truth.muWR - 1.0
+    return float(np.quantile(np.abs(error[claimed]), SURE))
 
 
 def worst(row: Row, stops: Sequence[StopAccuracy], estimator: str) -> Worst | None:

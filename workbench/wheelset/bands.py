@@ -41,16 +41,16 @@ def held(stop: "KnownStop", name: str) -> dict[str, Held]:
     window = np.zeros(stop.case.time.size, bool)
     window[judged_window(stop.case, stop.system)] = True
     for quantity in COVERED:
+        judged = window & run.claimed.get(quantity, True)
         if quantity == INNOVATIONS:
-            judged, outputs = window, len(stop.system.outputs)
-            errors = np.sqrt(run.nis[judged] / chi2.ppf(SURE, outputs))
+            reach = np.full(judged.sum(), chi2.ppf(SURE, len(stop.system.outputs)))
+            errors = run.nis[judged]
         else:
-            judged = window & run.claimed.get(quantity, True)
-            truth = getattr(stop.truth, quantity)
             reach = BAND * run.deviation(quantity)[judged]
-            errors = np.abs(run.signal(quantity) - truth)[judged] / reach
-        if errors.size and np.isfinite(errors).all():
-            found[quantity] = Held(float(np.mean(errors < 1.0)), np.quantile(errors, _RANKS))
+            errors = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[judged]
+        if (reach > 0.0).any() and np.isfinite(errors + reach).all():
+            shares = errors / reach
+            found[quantity] = Held(float(np.mean(shares < 1.0)), np.quantile(shares, _RANKS))
     return found
 
 

@@ -3,15 +3,19 @@
 import argparse
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.metadata import version
 
+from workbench.case import Case
 from workbench.commands.inputs import given_cases
 from workbench.commands.output import Done, Output, read_result
+from workbench.errors import InputError
 from workbench.files import claimed
 from workbench.observers import choose, estimators
 from workbench.observers.arrow import BlockKalmanFilter
 from workbench.observers.gains_file import usual_gains
 from workbench.provenance import run_of, sources
+from workbench.system import System
 from workbench.systems import load_system, open_model
 from workbench.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
 from workbench.wheelset.accuracy_page import write_accuracy_page
@@ -25,7 +29,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     # Of a wheelset, which has no like parts, the block filter is the extended one.
     every = [name for name in estimators(system) if name != BlockKalmanFilter.name]
     chosen = choose(system, options.estimator or every)
-    cases = given_cases(options, system)
+    cases = _stops(options, system)
     # All of them before the first run, so that one that is missing is told at once.
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []
@@ -57,3 +61,32 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
     units = {name: one["unit"] for name, one in summary["quantities"].items()}
     return Done(summary, units, page=page)
+
+
+def _stops(options: argparse.Namespace, system: System) -> list[Case]:
+    """The stops that are asked for; where folders hold several, each with its folder's name.
+
+    A rig calls its stops the same whatever its seed.
+
+    Raises
+    ------
+    InputError
+        If there are none, one cannot be read, or a folder is given twice.
+    """
+    if len(options.cases) < 2:
+        return given_cases(options, system)
+    found: dict[str, Case] = {}
+    for folder in options.cases:
+        alone = argparse.Namespace(**{**vars(options), "cases": [folder]})
+        before = "" if (folder / "case.toml").exists() else f"{folder.resolve().name}/"
+        for case in given_cases(alone, system):
+            name = before + case.name
+            if name in found:
+                raise InputError(
+                    where=str(case.source),
+                    found=f"a second stop '{name}' beside {found[name].source}",
+                    expected="a different name for each stop, because results are kept by name",
+                    remedy="rename one of the folders, or give it once",
+                )
+            found[name] = replace(case, name=name)
+    return list(found.values())
