@@ -302,6 +302,20 @@ def timed_observers(summary: Summary) -> Table:
     return rows
 
 
+def timed_horizon(summary: Summary) -> Table:
+    """A sample of the moving horizon, and the same problem by CasADi and IPOPT."""
+    one = summary["observers"]["horizon"]
+    return [
+        ["samples", "states and frictions", "us per sample", "by CasADi and IPOPT"],
+        [
+            f"{one['samples']}",
+            f"{one['unknowns']}",
+            f"{1e6 * one['ours']:.1f}",
+            f"{one['ratios']['ipopt']:.0f} times",
+        ],
+    ]
+
+
 def said_of_errors(summary: Summary) -> Table:
     """Verdict on sets of a rig that differs from its sheet."""
     rows: Table = [["wrong in the sheet", "what is said"]]

@@ -92,6 +92,7 @@ FIGURES = {
     ),
     "models": Figure(_BENCH, (Path("bench/bench.json"),), tables.timed_models),
     "observers": Figure(_BENCH, (Path("bench/bench.json"),), tables.timed_observers),
+    "horizon": Figure(_BENCH, (Path("bench/bench.json"),), tables.timed_horizon),
     "singles": Figure(
         tuple(f"diagnose {{recordings}}/labelled/{n} --out {{out}}/singles/{n}" for n in LABELLED),
         tuple(Path("singles", name, "summary.json") for name in LABELLED),

@@ -175,11 +175,11 @@ MISTAKES = {
         r"\[states\.omega\]",
     ),
     "band of an unknown quantity": (
-        ("muDC = 0.60 }", "MuDC = 0.60 }"),
+        ("muDC = 0.61 }", "MuDC = 0.60 }"),
         r"\[bands\.smoother\]: found unknown key 'MuDC' \(closest: 'muDC'\)",
     ),
     "band without a width": (
-        ("muDC = 0.60 }", "muDC = 0.0 }"),
+        ("muDC = 0.61 }", "muDC = 0.0 }"),
         r"\[bands\.smoother\] muDC: found 0\.0; expected a number above 0",
     ),
     "reading that the model lacks": (

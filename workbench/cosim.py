@@ -166,13 +166,14 @@ def replay(case: Case, estimator: Estimator) -> Run:
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)
+    values, sigma = with_indirect(system, np.asarray(estimate.values), np.asarray(estimate.sigma))
     return Run(
         case=case.name,
         estimator=estimator.name,
-        columns=system.columns,
+        columns={**system.columns, **{n: one.unit for n, (one, _) in system.indirect.items()}},
         time=case.time,
-        estimate=np.asarray(estimate.values),
-        sigma=np.asarray(estimate.sigma),
+        estimate=values,
+        sigma=sigma,
         nis=np.asarray(estimate.nis),
         ending=ending,
         message=message,
@@ -180,6 +181,24 @@ def replay(case: Case, estimator: Estimator) -> Run:
         claimed=claimed or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
         probability=dict(zip(estimator.modes, np.asarray(estimate.probability).T, strict=True)),
     )
+
+
+def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix, Matrix]:
+    """Estimates and standard deviations, (n, w + d), with those of `System.indirect` behind them.
+
+    Standard deviations to first order: by what a formula changes over both of its column's.
+    """
+    more, deviations = [values], [sigma]
+    for one, name in system.indirect.values():
+        at = list(system.columns).index(name)
+        value, reach = values[:, at], sigma[:, at]
+        middle, high, low = (
+            system.evaluate(one.formula, {name: column})
+            for column in (value, value + reach, value - reach)
+        )
+        more.append(middle[:, None])
+        deviations.append(0.5 * np.abs(high - low)[:, None])
+    return np.hstack(more), np.hstack(deviations)
 
 
 def _rules(estimator: Estimator) -> Mapping[str, object]:

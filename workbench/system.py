@@ -213,6 +213,17 @@ class System:
             **self.reported,
         }
 
+    @property
+    def indirect(self) -> dict[str, tuple[Derived, str]]:
+        """Derived signals of one column of an estimate, with it: who estimates one knows both."""
+        found = {}
+        for one in self.derived:
+            columns = one.formula.names & self.columns.keys()
+            known = one.formula.names - columns <= self.values.keys()
+            if len(columns) == 1 and known and one.name not in self.columns:
+                found[one.name] = one, min(columns)
+        return found
+
     def unit(self, name: str) -> str:
         """SI unit of a measured, derived or estimated signal."""
         derived = {one.name: one.unit for one in self.derived}

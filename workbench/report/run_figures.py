@@ -26,7 +26,7 @@ from workbench.report.views import (
     views,
 )
 from workbench.simulation import OVERCONFIDENT, CaseResult
-from workbench.system import View
+from workbench.system import System, View
 
 _REFERENCE = "raw"  # style
 
@@ -95,7 +95,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
             if below(system):
                 curves.insert(0, Curve("raw", case[name] / factor))
             curves.append(Curve("measured", measured))
-        elif name in case or any(one.name == name for one in system.derived):
+        elif name in case or _is_fed(system, name):
             values = system.signal(name, case.signals) / factor
             curves.append(Curve("measured", values, dashed=number > 0))
     signals = [curve.values for curve in curves]
@@ -108,6 +108,12 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
         view.height,
         tuple(curves),
     )
+
+
+def _is_fed(system: System, name: str) -> bool:
+    """Whether a signal is derived from what is fed; a sensor that only judges has its own panel."""
+    judged = {one.name for one in system.judged}
+    return any(one.name == name and not one.formula.names & judged for one in system.derived)
 
 
 def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
