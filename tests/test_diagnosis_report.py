@@ -460,7 +460,7 @@ def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict
 
 def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any]) -> None:
     assert browser["errors"] == []
-    assert [len(heights) for heights in browser["panels"]] == [8, 7, 8, 8]
+    assert [len(heights) for heights in browser["panels"]] == [8, 8, 8, 8]
     assert min(min(heights) for heights in browser["panels"]) > 35  # [px] that can be read
     assert min(browser["curves"]) > 0
     assert min(browser["sizes"]) > 100

@@ -66,6 +66,7 @@ def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
     texts = [file.read_text() for file in sorted(files) if file.suffix in (".py", ".c", ".h")]
     law = EstimatorLaw(estimator, "")
     parts = law.model, estimator.fmu.sha256, str(estimator.gains.summary()), str(fmi)
+    texts.append(estimator.system.source.read_text())
     shelf.fetch(
         shelf.key(estimator.system.library, *texts, *parts),
         path,

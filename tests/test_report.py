@@ -346,7 +346,7 @@ def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict
 
 def test_page_opens_without_errors_and_draws_every_panel(browser: dict[str, Any]) -> None:
     assert browser["errors"] == []
-    assert len(browser["visible"]) == 7
+    assert len(browser["visible"]) == 8
     assert min(browser["visible"]) > 40  # [px] a panel that can be read
     assert min(browser["curves"]) > 0
 
