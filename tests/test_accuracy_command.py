@@ -326,3 +326,22 @@ def test_command_refuses_a_stop_in_which_no_force_is_built_up(
     about.write_text(re.sub("brake_pressure = .*", 'brake_pressure = "0.01 bar"', text))
     assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
     assert "ends before its force is built up" in capsys.readouterr().err
+
+
+def test_stops_of_several_rigs_are_told_apart_by_their_folders(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for rig in ("one", "two"):
+        shutil.copytree(root / "cases" / DRY, tmp_path / rig / DRY)
+    rigs = [str(tmp_path / rig) for rig in ("one", "two")]
+    options = ["--estimator", "ekf", "--out", str(tmp_path / "out")]
+    assert main(["accuracy", *rigs, *options]) == 0
+    summary = json.loads((tmp_path / "out" / "accuracy.json").read_text())
+    assert set(summary["stops"]) == {f"one/{DRY}", f"two/{DRY}"}
+    # Of the same stop twice, what bands need is what they need of it once: not the system's own.
+    assert main(["accuracy", rigs[0], *options]) == 0
+    once = json.loads((tmp_path / "out" / "accuracy.json").read_text())
+    assert summary["bands"]["ekf"] == pytest.approx(once["bands"]["ekf"], rel=0.01)
+    capsys.readouterr()
+    assert main(["accuracy", rigs[0], rigs[0], *options]) == 2
+    assert f"found a second stop 'one/{DRY}'" in capsys.readouterr().err

@@ -234,7 +234,7 @@ def test_kalman_filters_know_how_much_they_know(
 def test_the_adhesion_that_is_used_is_estimated_with_the_force_and_its_band(
     made: dict[str, Estimator], dry_case: Case
 ) -> None:
-    """Reverse too: its sign is that of the force, its size is what counts. 80 kN: data sheet."""
+    """Over the load of both wheels, 80 kN each by the data sheet."""
     run = replay(dry_case, made["ekf"])
     assert_allclose(run.signal("adhesion"), np.abs(run.signal("Fx")) / 160e3)
     away = np.abs(run.signal("Fx")) > run.deviation("Fx")  # where the size has a slope

@@ -175,7 +175,7 @@ MISTAKES = {
         r"\[states\.omega\]",
     ),
     "band of an unknown quantity": (
-        ("muDC = 0.61 }", "MuDC = 0.60 }"),
+        ("muDC = 0.61 }", "MuDC = 0.61 }"),
         r"\[bands\.smoother\]: found unknown key 'MuDC' \(closest: 'muDC'\)",
     ),
     "band without a width": (
@@ -315,6 +315,14 @@ def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(
     assert_array_equal(found.nis, expected.nis)
     factors = [1.5 if name == "Fx" else 1.0 for name in system.columns]
     assert_array_equal(found.sigma, expected.sigma * factors)
+
+
+def test_what_is_derived_by_a_sensor_that_only_judges_is_asked_of_no_model(system: System) -> None:
+    """Another model may have no wheel load: then the adhesion that is used is not estimated."""
+    assert system.constants == {"rR"}
+    assert set(system.indirect) == {"speed", "adhesion"}
+    without = {name: value for name, value in system.values.items() if name != "Fz"}
+    assert set(replace(system, values=without).indirect) == {"speed"}
 
 
 def test_bands_of_no_estimator_are_refused(system: System) -> None:

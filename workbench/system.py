@@ -199,9 +199,11 @@ class System:
 
     @property
     def constants(self) -> frozenset[str]:
-        """Parameters of the model that formulas of derived signals use."""
+        """Parameters of the model that formulas of derived signals use, of those that are fed."""
         known = {*self.signals, *(one.name for one in self.derived)}
-        return frozenset(n for one in self.derived for n in one.formula.names if n not in known)
+        judged = {one.name for one in self.judged}
+        fed = [one.formula.names for one in self.derived if not one.formula.names & judged]
+        return frozenset(name for names in fed for name in names if name not in known)
 
     @property
     def columns(self) -> dict[str, str]:
