@@ -171,6 +171,21 @@ def test_the_readme_says_what_the_table_says() -> None:
     assert f"the Kalman filters up to {max(observers[2:]):.2f} %" in text
 
 
+def test_the_readme_says_of_machines_what_the_page_says() -> None:
+    page, readme = (
+        re.findall(r"^\| (.*) \|$", (ROOT / name).read_text(), re.M)
+        for name in ("docs/accuracy.md", "README.md")
+    )
+    rows = [row.split(" | ") for row in readme if row.count(" | ") == 4][1:]
+    assert len(rows) == 8
+    for machine, published, *found in rows:
+        (there,) = (row.split(" | ") for row in page if row.startswith(machine))
+        assert there[2:] == found
+        numbers, known = (re.findall(r"\d+(?:\.\d+)?", text) for text in (published, there[1]))
+        assert numbers
+        assert set(numbers) <= set(known)
+
+
 def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis() -> None:
     picture = ROOT / "docs" / "pictures" / "diagnosis.svg"
     assert picture.stat().st_size < 200_000

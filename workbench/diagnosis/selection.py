@@ -39,7 +39,7 @@ class Selection:
     less : the best fit without each of the effects.
     steps : how they were found.
     trial : of all other effects about the best point.
-    twins : fits of effects that explain the data as well as each of them, by name.
+    twins : fits of effects that explain the data as well as each of them, by name, best first.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
     interrupted : whether the search was ended before its end.
     validation : of the fits.
@@ -124,7 +124,12 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
         report(f"{better.active[-1].name} explains more than what it replaces")
         best, trial, interrupted = seek(fit, catalogue, better, steps, dropped, report)
     twins = {
-        one: {name: other for name, other in fits.items() if _close(fit, less[one], other, best)}
+        one: dict(
+            sorted(
+                (pair for pair in fits.items() if _close(fit, less[one], pair[1], best)),
+                key=lambda pair: beyond(pair[1], best),
+            )
+        )
         for one, fits in alike.items()
     }
     return Selection(
