@@ -190,7 +190,7 @@ TRAIN = {
     ),
     "named": Figure(
         (
-            "power --system train --clean 30 --sizes 4 --repeats 1 --pairs 0 --resume "
+            "power --system train --clean 300 --sizes 4 --repeats 2 --pairs 0 --resume "
             "--out {out}/train/power",
         ),
         (Path("train/power/power.json"),),

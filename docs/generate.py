@@ -21,11 +21,12 @@ from mkdocs.structure.pages import Page
 import workbench
 from workbench.commands.options import command_line, parsers
 from workbench.diagnosis import Effect, read_effects
-from workbench.diagnosis.thresholds import RATE, Soundness, Thresholds, thresholds
+from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
 from workbench.installed import system_files
 from workbench.modelica import Library, read_library
 from workbench.schemas import case_schema, gains_schema, summaries, system_schema
 from workbench.system import OBSERVER, System
+from workbench.system_comparison import RATE
 from workbench.systems import load_system
 
 _WIDE = 90  # characters of a line of code on a page
@@ -293,7 +294,11 @@ def decisions() -> str:
     """What every threshold is, and why."""
     usual = thresholds(28)
     text = ["# Thresholds of the diagnosis", ""]
-    text += [f"Rate of false alarms: {RATE:g} of clean sets. For a catalogue of 28 effects:", ""]
+    text += [
+        f"Rate of false alarms: {RATE:g} of clean sets, unless a system says otherwise.",
+        "For a catalogue of 28 effects:",
+        "",
+    ]
     for kind, value in ((Thresholds, usual), (Soundness, usual.samples)):
         meanings = dict(
             re.findall(r"^(\w+) : (.*?)(?=^\w+ :|\Z)", inspect.getdoc(kind) or "", re.S | re.M)

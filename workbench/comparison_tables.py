@@ -6,6 +6,7 @@ from workbench.errors import InputError
 from workbench.expression import Expression
 from workbench.system import System
 from workbench.system_comparison import (
+    RATE,
     Channel,
     Comparison,
     Exclusion,
@@ -13,6 +14,7 @@ from workbench.system_comparison import (
     Leading,
     Level,
     Rest,
+    Wander,
 )
 from workbench.system_tables import read_threshold
 from workbench.tables import Table
@@ -26,8 +28,8 @@ _WAYS = ("value", "size", "rate", "integral", "turn")
 def read_comparison(table: Table, system: System) -> Comparison:
     """How the diagnosis compares."""
     table.refuse_unknown(
-        "begins rest leads channels tolerances levels excluded influences block lasting "
-        "least settling left"
+        "begins rest leads channels tolerances levels wander excluded influences block lasting "
+        "least settling left false_alarms"
     )
     block = table.number("block", "s", _BLOCK * system.sample_time)
     lasting = table.number("lasting", "s", _LASTING * block)
@@ -38,15 +40,24 @@ def read_comparison(table: Table, system: System) -> Comparison:
         least=table.number("least", "s", 2.0 * lasting),
         settling=table.number("settling", "s", 0.0),
         left=table.number("left", "1", _LEFT),
+        false_alarms=_rate(table),
         channels=read_channels(table.table("channels"), system),
         leading=read_leading(table.table("leads")) if "leads" in table else None,
         begins=read_threshold(table.table("begins"), system) if "begins" in table else None,
         rest=read_rest(table.table("rest"), system) if "rest" in table else None,
         tolerances={name: tolerances.number(name, "1") for name in tolerances.content},
         levels={name: read_level(levels, name) for name in levels.content},
+        wander=read_wander(table.table("wander")),
         exclusions=tuple(read_exclusion(one, system) for one in table.tables("excluded")),
         influences=read_influences(table.table("influences")),
     )
+
+
+def _rate(table: Table) -> float:
+    rate = table.number("false_alarms", "1", RATE)
+    if not 0.0 < rate < 1.0:
+        raise table.wrong("false_alarms", "a share between 0 and 1")
+    return rate
 
 
 def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
@@ -103,6 +114,16 @@ def read_level(levels: Table, name: str) -> Level:
     table = Table(levels.take(name, dict), f"{levels.where} {name}")
     table.refuse_unknown("by spread")
     return Level(table.text("by", ""), table.number("spread", "1", math.inf))
+
+
+def read_wander(table: Table) -> dict[str, Wander]:
+    """What differs along a recording."""
+    found = {}
+    for name in table.content:
+        own = Table(table.take(name, dict), f"{table.where} {name}")
+        own.refuse_unknown("share over")
+        found[name] = Wander(own.number("share", "1"), own.number("over", "s"))
+    return found
 
 
 def read_exclusion(table: Table, system: System) -> Exclusion:

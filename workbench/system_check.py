@@ -127,6 +127,7 @@ def _of_experiments(system: System) -> Iterator[_Reference]:
 def _parameters(system: System) -> Iterator[_Reference]:
     tables = [
         ("diagnosis.tolerances", system.comparison.tolerances),
+        ("diagnosis.wander", system.comparison.wander),
         ("diagnosis.levels", system.comparison.levels),
         *(("diagnosis.excluded", one.uncertain) for one in system.comparison.exclusions),
         *(

@@ -56,6 +56,12 @@ class Rest:
     zero: float
 
 
+RATE = 0.002
+"""Sets of a sound machine that may be called something else, unless its system says otherwise: a
+tenth of the 2 % that power allows, since noise of real sensors has heavier tails, and tests on one
+set are several."""
+
+
 @dataclass(frozen=True)
 class Level:
     """A parameter that differs by nature from recording to recording, and needs no cause.
@@ -68,6 +74,20 @@ class Level:
 
     by: str
     spread: float
+
+
+@dataclass(frozen=True)
+class Wander:
+    """What a parameter differs by along one recording, for each channel by itself.
+
+    Attributes
+    ----------
+    share : relative standard deviation.
+    over : [s] correlation time.
+    """
+
+    share: float
+    over: float
 
 
 @dataclass(frozen=True)
@@ -129,12 +149,14 @@ class Comparison:
     least : [s] of a recording that must count.
     settling : [s] at the start, in which the simulation finds its states.
     left : share of lasting errors that right causes may leave: what the model simplifies [1].
+    false_alarms : share of sets of a sound machine that may be called something else [1].
     channels : what is compared, in this order.
     leading : a motion that is led, or None.
     begins : input that is applied in each recording, and by how much above its rest.
     rest : readings before that.
     tolerances : relative standard deviation of parameters from recording to recording.
     levels : parameters that differ by nature.
+    wander : parameters that differ along a recording.
     exclusions : samples that do not count.
     influences : what errors may go with, besides the measured signals.
     """
@@ -144,11 +166,13 @@ class Comparison:
     least: float
     settling: float
     left: float
+    false_alarms: float
     channels: tuple[Channel, ...]
     leading: Leading | None
     begins: Threshold | None
     rest: Rest | None
     tolerances: Mapping[str, float]
     levels: Mapping[str, Level]
+    wander: Mapping[str, Wander]
     exclusions: tuple[Exclusion, ...]
     influences: tuple[Influence, ...]

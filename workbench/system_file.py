@@ -161,7 +161,9 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         design=OperatingPoint({}, {}, {}),
         tested=OperatingPoint({}, {}, {}),
         objective=Objective("", {}, 0.0, None, None, ""),
-        comparison=Comparison(0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, (), ()),
+        comparison=Comparison(
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, {}, (), ()
+        ),
         companion=file.text("companion", ""),
         shortest=file.number("shortest", "s", 0.0),
         fewest=round(file.number("fewest", "1", 20.0)),

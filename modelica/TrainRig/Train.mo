@@ -19,12 +19,17 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   parameter Real pRelease(unit="Pa", min=0.0) = 25000.0 "Pressure below which springs hold pads off";
   parameter Real K0(unit="N", min=1.0) = 12.4e6
     "Creep force of one wheel per creepage at zero slip, at 80 kN";
+  parameter Real profile[n](each unit="1", each min=0.5, each max=2.0) = fill(1.0, n)
+    "Share of K0 that the profiles of an axle's wheels have";
+  parameter Real share[n](each unit="1", each min=0.5, each max=1.5) = fill(1.0, n)
+    "Share of an axle in its vehicle's weight, of a quarter";
   parameter Real muWR(unit="1", min=0.02, max=1.0) = 0.40 "Friction wheel-rail at zero slip";
   parameter Rig.Contact.PolachParameters polach "Law of the creep force";
   parameter Real A(unit="N", min=0.0) = 1100.0 "Running resistance at rest";
   parameter Real B(unit="N.s/m", min=0.0) = 12.0 "Its growth with speed";
   parameter Real C(unit="N.s2/m2", min=0.0) = 5.5 "Resistance of the air";
-  parameter Real mass(unit="1", min=0.5, max=2.0) = 1.0 "Mass, of the weighed one";
+  parameter Real mass[vehicles](each unit="1", each min=0.5, each max=2.0) = fill(1.0, vehicles)
+    "Mass of a vehicle, of the weighed one";
   parameter Real bias(unit="m/s2", min=-1.0, max=1.0) = 0.0 "Of the accelerometer, at rest";
   parameter Real omega0(unit="rad/s", min=1e-6) = 0.05 "Speed below which torques are smoothed";
   constant Real g(unit="m/s2") = 9.81 "Gravity";
@@ -70,7 +75,7 @@ equation
         Fperp[4*k + 2*j + i - 6] =
           perPressure*noEvent(max(0.0, pC[2*k + j - 2] - pRelease));
         // By torques, in place of the forces that follow from loads themselves.
-        Q[4*k + 2*j + i - 6] = 0.5*(m[k]*(g/4.0 + braking*1.3/38.0*(3 - 2*j))
+        Q[4*k + 2*j + i - 6] = 0.5*(m[k]*(g/4.0*share[4*k + 2*j + i - 6] + braking*1.3/38.0*(3 - 2*j))
           + (tauB[4*k + 2*j - 5] + tauB[4*k + 2*j - 4])/0.46*0.2*(3 - 2*i));
       end for;
     end for;
@@ -80,7 +85,7 @@ equation
       (muDC[i] + dmuDC[i])*pads, v, Fperp[i], T[i], speedLaw, vRef, exponent, fade);
     tauB[i] = acting[i]*mu[i]*Fperp[i]*rB;
     Fx[i] = 2.0*Rig.Contact.creepForce(
-      v - rA[i]*omega[i], v, Q[i], Rig.Contact.kalkerStiffness(Q[i], K0, 80000.0),
+      v - rA[i]*omega[i], v, Q[i], Rig.Contact.kalkerStiffness(Q[i], K0*profile[i], 80000.0),
       mu0, polach);
     tauL[i] = 25.0 + 0.6*noEvent(abs(omega[i])) + 0.004*omega[i]^2;
     JW*rate[i] = rA[i]*Fx[i] - (tauB[i] + tauL[i])*tanh(omega[i]/omega0) - drag[i];

@@ -51,8 +51,8 @@ model TwoVehicles "Two vehicles with four axles each"
     constrainedby Slots.PartialDrag(omega=omega) "What else brakes an axle";
   replaceable Slots.UnchangedAxles radius(u=r)
     constrainedby Slots.PartialAxles(u=r) "Wheel radius";
-  replaceable Slots.UnchangedVehicles weighed(u={mass*mass1, mass*mass2})
-    constrainedby Slots.PartialVehicles(u={mass*mass1, mass*mass2}) "Mass of the vehicles";
+  replaceable Slots.UnchangedVehicles weighed(u={mass[1]*mass1, mass[2]*mass2})
+    constrainedby Slots.PartialVehicles(u={mass[1]*mass1, mass[2]*mass2}) "Mass of the vehicles";
   replaceable Common.Signals.Unchanged adhesion(u=muWR)
     constrainedby Common.Interfaces.Signal(u=muWR) "Friction wheel-rail";
   replaceable Common.Signals.Unchanged gradient(u=(mass1*slope1 + mass2*slope2)/(mass1 + mass2))

@@ -59,7 +59,9 @@ class Fit:
     ) -> None:
         self._simulations = simulations
         self._compare = simulations.system.comparison
-        self.decides = decides or thresholds(len(effects), left=self._compare.left)
+        self.decides = decides or thresholds(
+            len(effects), self._compare.false_alarms, self._compare.left
+        )
         self.unknowns = Unknowns(simulations, effects, beside)
         self._hidden = slice(0)  # blocks that do not count
         if self.unknowns.count == 1 and not beside and self.parts < 2:

@@ -151,17 +151,20 @@ class Samples:
             return np.zeros(len(self.blocks), np.bool_)
         return self.restarts.at[self.blocks[:, 0]]
 
-    def loosened(self, moved: Sequence[Matrix]) -> "Samples":
+    def loosened(self, moved: Sequence[Matrix], apart: Sequence[Matrix]) -> "Samples":
         """The same with errors that are uncertain by more, apart from each other.
 
         Parameters
         ----------
         moved : by how much one standard deviation of each cause moves block means, (b, c).
+        apart : the same of causes that each channel has by itself.
         """
         inverse = np.linalg.inv(self.whitening)
         covariance = np.einsum("bij,bkj->bik", inverse, inverse)
         for one in moved:
             covariance += one[:, :, None] * one[:, None, :]
+        for one in apart:
+            covariance += one[:, :, None] ** 2 * np.eye(one.shape[1])
         return replace(self, whitening=np.linalg.inv(np.linalg.cholesky(covariance)))
 
     def channels(self, errors: Matrix) -> Matrix:

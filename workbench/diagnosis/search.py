@@ -304,6 +304,7 @@ def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> li
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
+    What levels could stand for must be there without any one of the stops, too.
     """
     hinted = best.linearised.inflation.max() > decides.wrong
     clear = decides.hint if hinted else decides.significant
@@ -311,11 +312,13 @@ def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> li
     for one in scores:
         phases = len(one.phases) if one.effect.order_locked else 0
         needed = 0.0 if hinted else decides.fall_of(1 + phases)
-        significant = (
-            abs(one.size) > clear * one.sigma and min(one.gain, one.held_out.sum()) > needed
-        )
+        if one.like_levels:
+            shown = one.gain > needed and one.least > min(needed, decides.immaterial**2)
+        else:
+            shown = min(one.gain, one.held_out.sum()) > needed
+        significant = abs(one.size) > clear * one.sigma and shown
         if significant and abs(one.size) >= one.effect.matters:
             able.setdefault(one.effect.name, []).append(one)
     ranked = list(able.values())[: decides.rivals]
-    best_score = ranked[0][0].held_out.sum() if ranked else 0.0
-    return [one for one in ranked if one[0].held_out.sum() > decides.near * best_score]
+    best_score = ranked[0][0].score if ranked else 0.0
+    return [one for one in ranked if one[0].score > decides.near * best_score]

@@ -188,28 +188,39 @@ class Simulator:
         return np.column_stack([(one - now) / step for one in later])
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
-        """A recording whose errors are weighed by how sharply they depend on each restart.
+        """A recording whose errors are weighed by how sharply they depend on what is not known.
 
         Where a motion runs away, the noise of what a restart reads grows until the next one, and a
-        law that is simplified shows by more. Both are linear within a block.
+        law that is simplified shows by more. Both are linear within a block. What a parameter
+        wanders by along the recording counts as noise of blocks that moves means by as much: a
+        variance over a correlation time, twice, is one over so many blocks.
 
         Parameters
         ----------
         values : of the FMU's variables, SI, at which this is judged.
         """
         one = self._recordings[number]
-        if one.restarts is None:
+        compare = self._system.comparison
+        if one.restarts is None and not compare.wander:
             return one
         values = {**dict.fromkeys((name for name, _ in self._delays.values()), 0.0), **values}
         nominal, moved = self._means(number, one.y, values), []
-        for name, noise in one.restarts.noise.items():
-            y, read = one.y.copy(), np.flatnonzero(one.restarts.at) - 1
-            y[read, one.signals.index(name)] += noise[read]
-            moved.append(self._means(number, y, values) - nominal)
-        for name, share in one.restarts.uncertain.items():
+
+        def shifted(name: str, share: float) -> Matrix:
             value = (1.0 + share) * values.get(name, self._fmu.defaults[name])
-            moved.append(self._means(number, one.y, {**values, name: value}) - nominal)
-        return one.loosened(moved)
+            return self._means(number, one.y, {**values, name: value}) - nominal
+
+        if one.restarts is not None:
+            for name, noise in one.restarts.noise.items():
+                y, read = one.y.copy(), np.flatnonzero(one.restarts.at) - 1
+                y[read, one.signals.index(name)] += noise[read]
+                moved.append(self._means(number, y, values) - nominal)
+            moved.extend(shifted(name, share) for name, share in one.restarts.uncertain.items())
+        apart = [
+            shifted(name, by.share) * max(1.0, 2.0 * by.over / compare.block) ** 0.5
+            for name, by in compare.wander.items()
+        ]
+        return one.loosened(moved, apart)
 
     def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""

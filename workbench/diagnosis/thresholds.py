@@ -9,9 +9,7 @@ from dataclasses import dataclass
 
 from scipy.stats import chi2, norm
 
-RATE = 0.002
-"""Clean sets that may be called something else: a tenth of the 2 % that power allows, since noise
-of real sensors has heavier tails, and tests on one set are several."""
+from workbench.system_comparison import RATE
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,8 @@ class Thresholds:
     ----------
     significant : standard deviations of a size; the largest of all candidates' by chance.
     fall : of chi-squared on held-out recordings; likewise, its square.
-    immaterial : standard deviations from zero to a size that matters, of a companion too small to.
+    immaterial : standard deviations from zero to a size that matters, of a companion too small to;
+        of one effect alone, what is significant.
     tied : chi-squared by which fits are equals: odds that chance turns at the rate.
     wrong : variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5
         of a hundred means, and 4.3 of five; laws that differ a little in form may make as much.
@@ -113,7 +112,7 @@ def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.lef
     Parameters
     ----------
     candidates : effects that are tried; any of them may raise an alarm (Bonferroni).
-    rate : of false alarms, between 0 and 1.
+    rate : of false alarms, between 0 and 1; a system says which it allows.
     left : see `Thresholds`; a system says what its models simplify.
 
     Notes

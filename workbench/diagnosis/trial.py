@@ -24,6 +24,8 @@ class Prospect:
     size, sigma : estimate of its size and standard deviation.
     units : of the size and of the parameters of the shape, by name.
     gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
+    by_levels : what of it is that levels, or the one recording's own, are less far from expected.
+    least : the same fall without any one of the stops, the least.
     held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
     phases : (K,) [rad] of an order-locked effect.
     """
@@ -34,8 +36,23 @@ class Prospect:
     sigma: float
     units: Mapping[str, str]
     gain: float
+    by_levels: float
+    least: float
     held_out: Vector
     phases: Vector
+
+    @property
+    def like_levels(self) -> bool:
+        """Whether it is mostly how far levels are from expected that tells of it.
+
+        They explain a held-out stop as well as the effect does, which tells nothing then.
+        """
+        return self.by_levels > 0.5 * self.gain
+
+    @property
+    def score(self) -> float:
+        """By what fall of chi-squared it is ranked."""
+        return self.gain if self.like_levels else float(self.held_out.sum())
 
 
 def shapes(effect: Effect) -> list[dict[str, float]]:
@@ -60,7 +77,8 @@ class Trial:
     """All candidates about one point.
 
     Each may be present at a size that does not matter, as part of the baseline: a candidate must
-    explain what all others together, too small to matter, do not. On held-out stops it is judged
+    explain what all others together, too small to matter, do not. Where levels can stand for one,
+    their spread says already how much of it does not matter. On held-out stops it is judged
     alone, since what companions cost, by their size, shows only where they are fitted.
     """
 
@@ -79,11 +97,24 @@ class Trial:
             if not effect.order_locked:
                 at = joint.shared.index((variant(effect, shape), effect.size))
                 middle[effect.name] = (at, effect.matters)
-        self._immaterial = middle
+        share = self._beside_levels()
+        self._immaterial = {
+            name: one for name, one in middle.items() if share[one[0]] > 2.0 * fit.decides.twin
+        }
         self._without = _held_out(*self._select({}, alone=True))
         base = self._select({})
         total = add([*base[0], base[1]])
-        self._reference = total.at(minimum(total))
+        best = minimum(total)
+        self._reference, self._expected = total.at(best), base[1].at(best)
+        self._lacking = [one.at(minimum(one)) for one in _without_each(total, base[0])]
+
+    def _beside_levels(self) -> Vector:
+        """(p,) Share of the information on each unknown that levels, left free, do not take."""
+        N, at = add(self._stops).N, [self.joint.shared.index(key) for key in self.levels]
+        solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at], rcond=None)[0]
+        taken = np.einsum("ij,ij->j", N[at], solved)
+        share: Vector = 1.0 - taken / np.maximum(np.diag(N), 1e-300)
+        return share
 
     def _select(
         self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
@@ -115,7 +146,7 @@ class Trial:
     def scores(self) -> list[Prospect]:
         """All candidates, best first."""
         found = [self._score(effect, shape) for effect, shape in self._candidates]
-        return sorted(found, key=lambda one: -one.held_out.sum())
+        return sorted(found, key=lambda one: -one.score)
 
     def _score(self, effect: Effect, shape: Mapping[str, float]) -> Prospect:
         at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
@@ -133,13 +164,15 @@ class Trial:
         if not low <= size <= high:
             # What its bounds allow of it: the rest of the unknowns do their best beside that.
             size = float(np.clip(size, low, high))
-            total = _fixed(total, size)
+            stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
+            total = add([*stops, prior])
             best = minimum(total)
-        alone, prior = self._select(own, alone=True)
-        single = float(minimum(add([*alone, prior]))[-1])
+        lacking = [one.at(minimum(one)) for one in _without_each(total, stops)]
+        alone, own_prior = self._select(own, alone=True)
+        single = float(minimum(add([*alone, own_prior]))[-1])
         if not low <= single <= high:
             single = float(np.clip(single, low, high))
-            alone, prior = [_fixed(stop, single) for stop in alone], _fixed(prior, single)
+            alone, own_prior = [_fixed(stop, single) for stop in alone], _fixed(own_prior, single)
         return Prospect(
             effect=effect,
             shape=shape,
@@ -147,7 +180,9 @@ class Trial:
             sigma=sigma,
             units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
             gain=self._reference - total.at(best),
-            held_out=self._without - _held_out(alone, prior),
+            by_levels=self._expected - prior.at(best),
+            least=float(np.min(np.subtract(self._lacking, lacking))),
+            held_out=self._without - _held_out(alone, own_prior),
             phases=phases,
         )
 
@@ -166,11 +201,15 @@ def _fixed(one: Quadratic, last: float) -> Quadratic:
     return Quadratic(N, g, float(c), one.rows)
 
 
+def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadratic]:
+    """Chi-squared without each of the stops."""
+    return [
+        Quadratic(total.N - one.N, total.g - one.g, total.c - one.c, total.rows - one.rows)
+        for one in stops
+    ]
+
+
 def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
     """Chi-squared of each stop at the optimum of the others, (K,)."""
-    total = add([*stops, prior])
-    result = np.zeros(len(stops))
-    for k, stop in enumerate(stops):
-        others = Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0)
-        result[k] = stop.at(minimum(others))
-    return result
+    others = _without_each(add([*stops, prior]), stops)
+    return np.array([stop.at(minimum(rest)) for stop, rest in zip(stops, others, strict=True)])

@@ -69,7 +69,7 @@ def foresee(
         build_everything(system, effects, setup.everything)
         cases = setup.recorded(Planting("clean", seed, 0.0, {}, ()), rig.simulate(seed, {}))
         found = diagnose_set(system, effects, setup.everything, cases)
-    decides = thresholds(len(effects), left=system.comparison.left)
+    decides = thresholds(len(effects), system.comparison.false_alarms, system.comparison.left)
     known = {one.name: one for one in effects}
     return [
         _foreseen(known[one.effect], one, found, sizes, decides)

@@ -123,7 +123,9 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
-    usual = thresholds(len(setup.effects), left=setup.system.comparison.left)
+    usual = thresholds(
+        len(setup.effects), setup.system.comparison.false_alarms, setup.system.comparison.left
+    )
     variants = {
         (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
     }

@@ -92,7 +92,9 @@ def propose(
         fitted.setdefault(_called(one.law), one)
     estimates = list(fitted.values())
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
-    decides = thresholds(len(scan.prospects), left=system.comparison.left)
+    decides = thresholds(
+        len(scan.prospects), system.comparison.false_alarms, system.comparison.left
+    )
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
     tied = [one for one in estimates if estimates[0].evidence - one.evidence < near]
     if not tied or tied[0].evidence < odds:
@@ -178,7 +180,7 @@ def _surviving(
         given = given_values(path, system)
         steps: list[Step] = []
         with Simulations(path, system, given, cases, workers, report=report) as simulations:
-            decides = thresholds(len(own), left=system.comparison.left)
+            decides = thresholds(len(own), system.comparison.false_alarms, system.comparison.left)
             fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
             seek(fit, own, anew(fit, about.point, about.active), steps, (), report)
     if not steps:

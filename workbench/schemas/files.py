@@ -223,9 +223,12 @@ def _comparison(formula: Schema, level: Schema) -> Schema:
         "channels": by_name(closed(channel, optional="label shown")),
         "tolerances": by_name(NUMBER),
         "levels": by_name(closed({"by": TEXT, "spread": NUMBER}, optional="*")),
+        "wander": by_name(closed({"share": NUMBER, "over": QUANTITY})),
         "excluded": listed(_exclusion(formula, level)),
         "influences": by_name(closed(influence, optional="way")),
-        **dict.fromkeys(("block", "lasting", "least", "settling", "left"), QUANTITY),
+        **dict.fromkeys(
+            ("block", "lasting", "least", "settling", "left", "false_alarms"), QUANTITY
+        ),
     }
     return closed(entries, optional="*")
 

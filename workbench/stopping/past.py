@@ -82,7 +82,9 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
     given = (path, system, system.given, cases, workers)
     with Simulations(*given, report=report, restarting=False) as simulations:
         # Of effects none is tried; the thresholds bound steps alone.
-        fit = Fit(simulations, [], thresholds(1, left=system.comparison.left))
+        fit = Fit(
+            simulations, [], thresholds(1, system.comparison.false_alarms, system.comparison.left)
+        )
         best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)
         joint = fit.quadratics(fit.linearise(best, []))
         values = fit.unknowns.values(best.point)
