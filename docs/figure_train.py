@@ -110,7 +110,7 @@ def _share(one: Summary) -> str:
 def named(summary: Summary) -> Table:
     """How often faults of the virtual train are named, all places of one kind together."""
     rows: Table = [["planted", "right, with its place or group (95 %)", "said of the others"]]
-    effects = sorted(summary["effects"].items())
+    effects, wrong = sorted(summary["effects"].items()), 0
     for kind, some in groupby(effects, lambda item: item[0].partition("[")[0]):
         places = dict(some)
         hits, of, others = 0, 0, dict.fromkeys(("nothing", "unexplained", "failed"), 0)
@@ -121,11 +121,12 @@ def named(summary: Summary) -> Table:
                 others[word] += summary["confusion"][name].get(word, 0)
         ((multiple, _),) = one["right_first"].items()
         (size,), unit = said([one["size"] * float(multiple)], one["unit"])
+        wrong += of - hits - sum(others.values())
         text = ", ".join(f"{count} {word}" for word, count in others.items() if count)
         rows.append([f"{kind}, {size:.3g} {unit}", f"{hits} of {of}", text])
     sound = summary["false_alarms"]
     rows += [
-        ["all faults", _share(summary["right_first"]), f"{len(summary['wrong'])} a wrong name"],
+        ["all faults", _share(summary["right_first"]), f"{wrong} a wrong name"],
         ["sound trains: false alarms", _share(sound), ""],
         ["95 % intervals that hold what was planted", _share(summary["coverage"]), ""],
     ]

@@ -108,6 +108,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
         inputs=(*pressures, *vehicle, given["curve"]),
         outputs=(*speeds, accelerometer),
         estimated=(*estimated("muDC"), *estimated("r"), known["bias"]),
+        reported={"force": system.reported["force"]},
         states=(),
     )
 

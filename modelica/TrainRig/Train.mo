@@ -53,6 +53,8 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   Real acceleration(unit="m/s2") "Rate of v";
   Real felt(unit="m/s2") "What an accelerometer in the first vehicle feels";
   Real Fx[n](each unit="N") "Creep force of both wheels of an axle, braking";
+  output Real axleForce[n](each unit="N") = Fx "The same, of which an observer reports";
+  output Real utilised[n](each unit="1") "Adhesion that an axle uses, of the load that acts";
   Real tauB[n](each unit="N.m") "Torque of an axle's pads";
   Real Q[n](each unit="N") "Load of one wheel";
   Real T[n](each unit="K", each start=323.15, each fixed=true, each nominal=300.0)
@@ -89,6 +91,7 @@ equation
       mu0, polach);
     tauL[i] = 25.0 + 0.6*noEvent(abs(omega[i])) + 0.004*omega[i]^2;
     JW*rate[i] = rA[i]*Fx[i] - (tauB[i] + tauL[i])*tanh(omega[i]/omega0) - drag[i];
+    utilised[i] = Fx[i]/(2.0*Q[i]);
     frictionPower[i] = tauB[i]*omega[i]*tanh(omega[i]/omega0);
     slipPower[i] = Fx[i]*(v - rA[i]*omega[i]);
     lossPower[i] = (tauL[i]*tanh(omega[i]/omega0) + drag[i])*omega[i];

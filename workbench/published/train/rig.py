@@ -105,6 +105,7 @@ class Ridden:
     time, v, s, a : (n,) [s], [m/s], [m] of the first axle, [m/s2] as an accelerometer feels it.
     omega : (n, 8) [rad/s].
     pressure : (n, 4) behind the relay valves [Pa].
+    force, load : (n, 8) creep force of an axle, and load of its two wheels [N].
     standstill : [s].
     """
 
@@ -114,6 +115,8 @@ class Ridden:
     a: Vector
     omega: Matrix
     pressure: Matrix
+    force: Matrix
+    load: Matrix
     standstill: float
 
 
@@ -255,7 +258,10 @@ def _turn(train, way, work, i, v, s):  # type: ignore[no-untyped-def]
 
 @compiled
 def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped-def]
-    """Fill rows (n, 4 + 8 + 4) of t, v, s, a, speeds, pressures; number of the last that moves."""
+    """Fill rows of t, v, s, a, speeds, forces, loads, pressures; number of the last that moves.
+
+    Rows are (n, 4 + 3*8 + 4).
+    """
     s, slowing, m = 0.0, 0.0, train.mass[0] + train.mass[1]
     A, B, C = train.resistance[0], train.resistance[1], train.resistance[2]
     for k in range(rows.shape[0]):
@@ -276,10 +282,13 @@ def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped
         slowing = -rate
         rows[k, 0], rows[k, 1], rows[k, 2] = t, v, s
         rows[k, 3] = rate + _GRAVITY * first
-        for i in range(work.omega.size):
+        n = work.omega.size
+        for i in range(n):
             rows[k, 4 + i] = work.omega[i]
+            rows[k, 4 + n + i] = work.force[i]
+            rows[k, 4 + 2 * n + i] = 2.0 * work.loads[i]
         for j in range(work.supply.size):
-            rows[k, 4 + work.omega.size + j] = work.supply[j]
+            rows[k, 4 + 3 * n + j] = work.supply[j]
         s += STEP * (v + 0.5 * STEP * rate)
         v += STEP * rate
         if v < _STANDSTILL:
@@ -309,7 +318,7 @@ def ride(
     InputError
         If the train does not stand after 150 s.
     """
-    rows = np.zeros((round(_LONGEST / STEP), 4 + AXLES + BOGIES))
+    rows = np.zeros((round(_LONGEST / STEP), 4 + 3 * AXLES + BOGIES))
     none = np.zeros(AXLES)
     work = _Work(
         speed / train.radius,
@@ -334,6 +343,7 @@ def ride(
     end = min(last + round(_REST / STEP), len(rows) - 1)
     rest = rows[last + 1 : end]
     rest[:, 0] = STEP * np.arange(last + 1, end)
-    rest[:, 2], rest[:, 12:] = rows[last, 2], rows[last, 12:]
+    rest[:, 2], rest[:, 28:] = rows[last, 2], rows[last, 28:]
     t, v, s, a = rows[:end, :4].T
-    return Ridden(t, v, s, a, rows[:end, 4:12], rows[:end, 12:], float(rows[last, 0]))
+    omega, force, load, pressure = np.split(rows[:end, 4:], (8, 16, 24), axis=1)
+    return Ridden(t, v, s, a, omega, pressure, force, load, float(rows[last, 0]))

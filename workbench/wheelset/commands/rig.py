@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.commands.output import Done, Output
+from workbench.commands.planted import make_planted
+from workbench.errors import InputError
 from workbench.files import claimed
 from workbench.fmu import CoSimulation
 from workbench.pool import Pool
@@ -29,6 +31,8 @@ from workbench.wheelset.rig import (
     simulate,
     write_recording,
 )
+
+COMPANION = "workbench.wheelset"
 
 
 def _listed() -> str:
@@ -53,6 +57,9 @@ effects, zero if not given:
 
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Make the recordings, or list what can be made."""
+    system = load_system(options.system)
+    if system.companion != COMPANION:
+        return _of_another(options, output, system)
     if options.list:
         output.result(_listed())
         return Done(
@@ -61,12 +68,25 @@ def run(options: argparse.Namespace, output: Output) -> Done:
                 "effects": {one.name: dict(one.metadata) for one in dataclasses.fields(Effects)},
             }
         )
-    system = load_system(options.system)
     scenarios = [proposed_stop(options.next, system)] if options.next else select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     with claimed(options.out):
         return _recorded(options, output, system, scenarios, effects)
+
+
+def _of_another(options: argparse.Namespace, output: Output, system: System) -> Done:
+    """What another machine's companion makes, which has nothing of this rig's own."""
+    own = {"next": None, "pads": "ordinary", "rate": 200, "truth_every": 1}
+    for name, usual in own.items():
+        if getattr(options, name) != usual:
+            raise InputError(
+                where=f"--{name.replace('_', '-')} {getattr(options, name)}",
+                found="an option of the roller rig",
+                expected=f"none of that of '{system.name}'",
+                remedy="leave it out",
+            )
+    return make_planted(options, output, system)
 
 
 def _recorded(
