@@ -454,7 +454,7 @@ MISTAKES = {
         r"inputs: found no 'mass1'",
     ),
     "two spreads": (
-        ("share = 0.01", "spread = 100.0\nshare = 0.01"),
+        ("share = 0.01  #", "spread = 100.0\nshare = 0.01  #"),
         r"differs\]\] 2: found 'spread' and 'share'; expected one of the two",
     ),
     "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected command or end"),

@@ -101,20 +101,34 @@ class Trial:
         self._immaterial = {
             name: one for name, one in middle.items() if share[one[0]] > 2.0 * fit.decides.twin
         }
-        self._without = _held_out(*self._select({}, alone=True))
+        alone = self._select({}, alone=True)
+        self._without, self._prior = _held_out(*alone), alone[1]
         base = self._select({})
         total = add([*base[0], base[1]])
         best = minimum(total)
-        self._reference, self._expected = total.at(best), base[1].at(best)
+        self._reference, self._away = total.at(best), self._far(best)
         self._lacking = [one.at(minimum(one)) for one in _without_each(total, base[0])]
 
+    def _far(self, z: Vector) -> float:
+        """Chi-squared of known unknowns against what is expected of them."""
+        return self._prior.at(z[: len(self._known)])
+
     def _beside_levels(self) -> Vector:
-        """(p,) Share of the information on each unknown that levels, left free, do not take."""
-        N, at = add(self._stops).N, [self.joint.shared.index(key) for key in self.levels]
+        """(p,) Share of what stops say of each unknown that levels with a spread do not take.
+
+        Beside levels of which nothing is expected; what these take is nobody's.
+        """
+        levels = [self.joint.shared.index(key) for key in self.levels]
+        expected = np.diag(self.joint.prior.N) > 0.0
+        free, every = (self._beside([j for j in levels if not expected[j]]), self._beside(levels))
+        return np.divide(every, free, out=np.ones_like(free), where=free > 0.0)
+
+    def _beside(self, at: Sequence[int]) -> Vector:
+        """(p,) What stops say of each unknown, where others are fitted freely."""
+        N = add(self._stops).N
         solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at], rcond=None)[0]
-        taken = np.einsum("ij,ij->j", N[at], solved)
-        share: Vector = 1.0 - taken / np.maximum(np.diag(N), 1e-300)
-        return share
+        left: Vector = np.diag(N) - np.einsum("ij,ij->j", N[at], solved)
+        return left
 
     def _select(
         self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
@@ -180,7 +194,7 @@ class Trial:
             sigma=sigma,
             units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
             gain=self._reference - total.at(best),
-            by_levels=self._expected - prior.at(best),
+            by_levels=self._away - self._far(best),
             least=float(np.min(np.subtract(self._lacking, lacking))),
             held_out=self._without - _held_out(alone, own_prior),
             phases=phases,
