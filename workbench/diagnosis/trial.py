@@ -98,6 +98,7 @@ class Trial:
                 at = joint.shared.index((variant(effect, shape), effect.size))
                 middle[effect.name] = (at, effect.matters)
         share = self._beside_levels()
+        # Of twins, by their cosine, levels take all but 1 - (1 - twin)^2.
         self._immaterial = {
             name: one for name, one in middle.items() if share[one[0]] > 2.0 * fit.decides.twin
         }
@@ -120,7 +121,8 @@ class Trial:
         """
         levels = [self.joint.shared.index(key) for key in self.levels]
         expected = np.diag(self.joint.prior.N) > 0.0
-        free, every = (self._beside([j for j in levels if not expected[j]]), self._beside(levels))
+        free = self._beside([j for j in levels if not expected[j]])
+        every = self._beside(levels)
         return np.divide(every, free, out=np.ones_like(free), where=free > 0.0)
 
     def _beside(self, at: Sequence[int]) -> Vector:
