@@ -161,6 +161,7 @@ def case_from_frame(
         signals=found,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(one.name for one in system.outputs),
+        aids=tuple(one.name for one in system.aids),
         source=Path(name),
         doubts=doubts(time_, found, given, system, origin),
     )

@@ -32,13 +32,15 @@ class Case:
     title : one line for reports.
     conditions : what was set before, by name: quantities in SI, words, whole numbers, tuples.
     time : (n,) s, strictly increasing, not necessarily in even steps.
-    signals : (n,) each, by name; one that is only there to judge by may be missing.
+    signals : (n,) each, by name; one that is only there to judge by may be missing, and an aid is
+        NaN where it was not measured.
     inputs, outputs : names of the signals that drive a model, and that correct it.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
     date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
     doubts : what is unlikely in the recording, in words.
+    aids : names of the signals that correct a model where they are measured.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Case:
     date: str = ""
     counts_from: float = -np.inf
     doubts: tuple[str, ...] = ()
+    aids: tuple[str, ...] = ()
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -68,14 +71,15 @@ class Case:
 
     @property
     def y(self) -> Matrix:
-        """(n, l) measured outputs, SI."""
-        return self._table(self.outputs)
+        """(n, l) measured outputs and aids, SI."""
+        return self._table((*self.outputs, *self.aids))
 
     def _table(self, names: Sequence[str]) -> Matrix:
         """Some signals as columns, also none."""
-        table = np.empty((self.time.size, len(names)))
+        table = np.full((self.time.size, len(names)), np.nan)
         for j, name in enumerate(names):
-            table[:, j] = self.signals[name]
+            if name not in self.aids or name in self:
+                table[:, j] = self.signals[name]
         return read_only(table)
 
     def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
@@ -178,6 +182,7 @@ def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(one.name for one in system.outputs),
+        aids=tuple(one.name for one in system.aids),
         source=path,
         doubts=doubts(measured.time, signals, conditions, system, origin),
     )
@@ -220,6 +225,7 @@ def read_case(folder: Path, system: System) -> Case:
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(one.name for one in system.outputs),
+        aids=tuple(one.name for one in system.aids),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         date=document.date("date"),
@@ -375,10 +381,12 @@ def _refuse_shared(names: Mapping[str, str], where: str, kind: str) -> None:
 def _read_signals(
     source: Path, columns: dict[str, str], system: System
 ) -> tuple[Vector, dict[str, Vector]]:
-    """Time and signals in SI units; what only judges may be missing under its own name."""
-    optional = [one.name for one in system.judged if columns[one.name] == one.name]
+    """Time and signals in SI units; what only judges or aids may be missing under its own name."""
+    spare = (*system.judged, *system.aids)
+    optional = [one.name for one in spare if columns[one.name] == one.name]
     required = [column for signal, column in columns.items() if signal not in optional]
-    recorded = read_columns(source, required, optional)
+    with_gaps = [columns[one.name] for one in system.aids]
+    recorded = read_columns(source, required, optional, with_gaps)
     units = {"time": "s", **{name: one.unit for name, one in system.signals.items()}}
     signals = {}
     for signal, column in columns.items():

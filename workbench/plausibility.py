@@ -136,7 +136,8 @@ def _still(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
     outputs = [one.name for one in system.outputs]
     for name, values in signals.items():
         signal = system.signals[name]
-        if signal.exact or values.min() < values.max():
+        values = values[np.isfinite(values)]  # an aid is missing elsewhere
+        if signal.exact or not values.size or values.min() < values.max():
             continue
         yield _Finding(
             # Steps coarser than noise may hide it; an input may rest.

@@ -3,7 +3,7 @@
 import csv
 import re
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ _HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?
 _NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")
 _NUMBER = re.compile(r" *[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)? *")
 _THOUSANDS = re.compile(r" *[+-]?[1-9][0-9]{0,2}[.,][0-9]{3} *")
+_STAND_IN = "0"  # in empty fields that may be, while numbers are read
 _LARGEST = 1e100  # no measurement comes near; leaves room for the factors of units
 
 
@@ -29,7 +30,8 @@ class Column:
     Attributes
     ----------
     unit : as the header spells it.
-    values : (n,) finite numbers in that unit; row i stands on line i + 2 of the file.
+    values : (n,) finite numbers in that unit, NaN where a field may be empty and is; row i stands
+        on line i + 2 of the file.
     """
 
     unit: str
@@ -101,7 +103,10 @@ def header(cell: str) -> tuple[str, str | None]:
 
 
 def read_columns(
-    path: Path, required: Sequence[str], optional: Sequence[str] = ()
+    path: Path,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    with_gaps: Collection[str] = (),
 ) -> dict[str, Column]:
     """Read named columns of a recording.
 
@@ -113,6 +118,7 @@ def read_columns(
     ----------
     path : CSV file with one header line, `name [unit]` per column.
     required, optional : names of columns, matched exactly; all others are ignored.
+    with_gaps : names of those that may have empty fields.
 
     Returns
     -------
@@ -138,11 +144,20 @@ def read_columns(
         )
     table = list(zip(*rows, strict=True))
     cells = {name: table[index] for name, (index, _) in found.items()}
-    values = _numbers(list(cells.values()), separator)
+    gaps = {
+        name: np.array([not cell.strip() for cell in column])
+        for name, column in cells.items()
+        if name in with_gaps
+    }
+    filled = {
+        name: np.where(gaps[name], _STAND_IN, column).tolist() if name in gaps else column
+        for name, column in cells.items()
+    }
+    values = _numbers(list(filled.values()), separator)
     if values is None:
-        raise _first_problem(path, cells, separator)
+        raise _first_problem(path, filled, separator)
     return {
-        name: Column(unit, column)
+        name: Column(unit, np.where(gaps[name], np.nan, column) if name in gaps else column)
         for (name, (_, unit)), column in zip(found.items(), values, strict=True)
     }
 

@@ -63,9 +63,12 @@ class CaseResult:
 
     def surprise(self, name: str) -> float:
         """Variance of innovations over what a method says, where judged; 0 for one without."""
-        nis = self.runs[name].nis[judged_window(self.case, self.system)]
-        known = nis.size and np.isfinite(nis).all()
-        return float(nis.mean()) / len(self.system.outputs) if known else 0.0
+        window, run = judged_window(self.case, self.system), self.runs[name]
+        nis = run.nis[window]
+        if not (nis.size and np.isfinite(nis).all()):
+            return 0.0
+        fed = [one in run.columns for one in (*self.case.outputs, *self.case.aids)]
+        return float(nis.mean() / np.isfinite(self.case.y[window][:, fed]).sum(axis=1).mean())
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.

@@ -99,6 +99,7 @@ class System:
     spreads : standard deviation of states at the start that no output shows, by name [unit].
     inputs, outputs : measured; inputs drive the models, outputs correct estimates.
     judged : measured, but only there to judge by.
+    aids : measured at times, and missing in other samples: they correct Kalman filters alone.
     reported : outputs of the model that estimates hold, with their units.
     export : estimators as FMUs.
     companion : Python package with a virtual rig and more estimators, or a module; empty: none.
@@ -134,6 +135,7 @@ class System:
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     judged: tuple[Signal, ...]
+    aids: tuple[Signal, ...]
     derived: tuple[Derived, ...]
     estimated: tuple[Estimated, ...]
     reported: Mapping[str, str]
@@ -177,7 +179,7 @@ class System:
     @property
     def signals(self) -> dict[str, Signal]:
         """All measured signals by name."""
-        return {one.name: one for one in (*self.inputs, *self.outputs, *self.judged)}
+        return {one.name: one for one in (*self.inputs, *self.outputs, *self.judged, *self.aids)}
 
     @property
     def corrections(self) -> tuple[str, ...]:
@@ -187,7 +189,7 @@ class System:
     @property
     def variables(self) -> dict[str, str]:
         """What is asked of a model, with units; one with other names is mapped onto these."""
-        measured = {one.name: one.unit for one in (*self.inputs, *self.outputs)}
+        measured = {one.name: one.unit for one in (*self.inputs, *self.outputs, *self.aids)}
         corrected = {one.correction: one.unit for one in self.estimated}
         return {
             **measured,

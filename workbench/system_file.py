@@ -15,6 +15,7 @@ from workbench.system_check import check_model, check_references
 from workbench.system_comparison import Comparison
 from workbench.system_parts import Model, Objective, OperatingPoint, Signal
 from workbench.system_tables import (
+    GROUPS,
     positive,
     read_bands,
     read_condition_kinds,
@@ -45,7 +46,7 @@ def read_system(path: Path) -> System:
     """
     file = read_table(path, "give a system file, or the name of an installed one", 'title = "..."')
     file.refuse_unknown(
-        "name title companion reported models parameters inputs outputs judged derived "
+        "name title companion reported models parameters inputs outputs judged aids derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
         "export shortest fewest sample_time cases sampling redundancies next cutting distance work "
         "loggers bands"
@@ -119,7 +120,7 @@ def _models(file: Table, path: Path) -> dict[str, Model]:
 
 def _measured(file: Table) -> dict[str, tuple[Signal, ...]]:
     """Measured signals by group."""
-    groups = {group: read_measured(file, group) for group in ("inputs", "outputs", "judged")}
+    groups = {group: read_measured(file, group) for group in GROUPS}
     if not groups["outputs"]:
         raise InputError(
             where=file.where,
@@ -153,6 +154,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         inputs=groups["inputs"],
         outputs=groups["outputs"],
         judged=groups["judged"],
+        aids=groups["aids"],
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
         work=read_derived(file.table("work"), "W"),

@@ -136,6 +136,8 @@ class Estimated:
         proportion to that. Empty: none.
     claimed : conditions in which it may be claimed, by name; elsewhere it stands in for something
         that the model has not.
+    watched : whether it is a quantity of the machine, which is followed over its recordings; else
+        of a recording, which tells it only together with what is known before.
     """
 
     name: str
@@ -154,6 +156,7 @@ class Estimated:
     useful: float
     acts_on: str
     claimed: Mapping[str, str]
+    watched: bool
 
 
 @dataclass(frozen=True)
@@ -314,7 +317,8 @@ class Condition:
     least : smallest quantity; `exclusive`: above it.
     choices : words or whole numbers that it may be.
     count : of entries, where it is a list; 0: no list.
-    parameters : of the model by choice, which it sets.
+    parameters : of the model by choice, which it sets; `told`: for estimators, too, that are then
+        told of it and need not find out.
     lasts : mean time until another choice takes its place, under way; infinite: never [s].
     sign : whether it is the sign of the recording's signals.
     label : for people.
@@ -329,6 +333,7 @@ class Condition:
     choices: tuple[str | int, ...]
     count: int
     parameters: Mapping[str, Mapping[str, float]]
+    told: bool
     lasts: float
     sign: bool
     agrees: Agreement | None

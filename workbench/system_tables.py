@@ -31,6 +31,8 @@ from workbench.system_parts import (
 from workbench.tables import Table
 from workbench.units import si_factor
 
+GROUPS = ("inputs", "outputs", "judged", "aids")  # of measured signals
+
 
 def read_model(table: Table, path: Path) -> Model:
     """A model in a role, whose FMU stands beside the system file."""
@@ -80,7 +82,7 @@ def _above_zero(table: Table, key: str) -> float:
 
 
 def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
-    """Measured signals of a group: inputs, outputs or judged."""
+    """Measured signals of one of the GROUPS."""
     found = []
     for name in file.table(group).content:
         table = within(file, group, name)
@@ -175,7 +177,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
         own = Table(table.take(name, dict), f"{table.where} {name}")
         own.refuse_unknown(
             "correction label unit range prior walk start spread relative_error scatter memory "
-            "useful acts_on claimed"
+            "useful acts_on claimed watched"
         )
         unit = own.unit("unit", "1")
         low, high = own.numbers("range", unit, 2)
@@ -203,6 +205,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
                 claimed={
                     key: own.table("claimed").take(key, str) for key in own.table("claimed").content
                 },
+                watched="watched" not in own or own.take("watched", bool),
             )
         )
     return tuple(found)
@@ -213,7 +216,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("label unit least above choices count parameters lasts sign agrees")
+        own.refuse_unknown("label unit least above choices count parameters told lasts sign agrees")
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -242,6 +245,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                     }
                     for choice in parameters.content
                 },
+                told="told" in own and own.take("told", bool),
                 lasts=positive(own, "lasts"),
                 sign="sign" in own and own.take("sign", bool),
                 agrees=_agreement(own) if "agrees" in own else None,

@@ -38,14 +38,14 @@ class RecordingEstimate:
 
 
 def watched(system: System) -> tuple[Estimated, ...]:
-    """Quantities that are watched: those that no condition sets to a value of its own."""
+    """Quantities of the machine that no condition sets to a value of its own."""
     set_by = {
         name
         for condition in system.conditions
         for parameters in condition.parameters.values()
         for name in parameters
     }
-    return tuple(one for one in system.estimated if one.name not in set_by)
+    return tuple(one for one in system.estimated if one.watched and one.name not in set_by)
 
 
 def reach(one: Estimated) -> float:
@@ -72,7 +72,9 @@ class Appraiser:
 
     def __init__(self, system: System, model: FMU) -> None:
         self.system = system
-        constant = [replace(one, walk=0.0, spread=reach(one)) for one in system.estimated]
+        constant = [
+            replace(one, walk=0.0, spread=reach(one)) for one in system.estimated if one.watched
+        ]
         self._constant = replace(system, estimated=tuple(constant), learns=math.inf)
         self._model = model
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}

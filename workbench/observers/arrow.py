@@ -139,7 +139,7 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
     count = parts.first.size - 2
     for j in range(y.size):
         place, i = parts.place[j], parts.home[j]
-        if place >= 0:
+        if place >= 0 and not np.isnan(y[j]):
             known = variance(settings.filter, fade, y, j)
             own = place - parts.first[i]
             if i == count:
@@ -202,7 +202,7 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        self._blocks = blocks(fmu, system, self._layout)
+        self._blocks = blocks(fmu, self.system, self._layout)
         if self._blocks.first.size > 3:
             self._divide()
 

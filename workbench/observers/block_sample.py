@@ -25,6 +25,8 @@ def absorb(model, settings, memory, y, fade, row):  # type: ignore[no-untyped-de
     for k in range(change.size):
         change[k] = 0.0
     for j in range(y.size):
+        if np.isnan(y[j]):
+            continue  # not measured
         i, at, place = parts.home[j], layout.seen[j], parts.place[j]
         begin = parts.first[i]
         size = parts.first[i + 1] - begin if i < count else 0

@@ -1,11 +1,13 @@
 """What every estimator does, and what they share."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from workbench.conditions import Value
 from workbench.errors import InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.kernel import Instance, checked, given, instance
@@ -80,6 +82,7 @@ class Estimator(ABC):
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     told : conditions that it finds by itself.
+    aided : whether samples may be missing, so that it takes aids as outputs, too.
     bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
 
     Raises
@@ -99,15 +102,16 @@ class Estimator(ABC):
     offline: ClassVar[bool] = False
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
+    aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     told: frozenset[str] = frozenset()
     _law: Any
     _loop: Any
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
-        check_model(system, fmu.description)
         self.fmu = fmu
-        self.system = system
+        self.system = system = self.fed(system)
+        check_model(system, fmu.description)
         self.gains = gains
         inputs = [one.name for one in system.inputs]
         unseen = [one.name for one in system.outputs if one.name not in fmu.states]
@@ -115,6 +119,7 @@ class Estimator(ABC):
         self._model: Any = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
         self._t = 0.0
+        self._known: dict[str, float] = {}
         self._width = 2 * len(system.columns) + len(self.modes) + 1
         bands = system.bands.get(self.name, {})
         self.bands = np.array([bands.get(name, 1.0) for name in system.columns])
@@ -123,6 +128,12 @@ class Estimator(ABC):
     def models(self) -> tuple[FMU, ...]:
         """What it runs on: the model, or one of each mode."""
         return (self.fmu,)
+
+    @classmethod
+    def fed(cls, system: System) -> System:
+        """A system as the estimator sees it: outputs are all that corrects its estimates."""
+        aids = system.aids if cls.aided else ()
+        return replace(system, outputs=(*system.outputs, *aids), aids=())
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:
@@ -199,14 +210,33 @@ class Estimator(ABC):
         models = self._model if several else (self._model,)
         return Parts(self._law, models, several, settings, memory, self._width)
 
+    def tell(self, conditions: Mapping[str, Value]) -> None:
+        """Take the parameters of a recording's conditions from its next start on.
+
+        Those that estimators are told, and it does not find by itself; estimates of quantities
+        start there.
+        """
+        self._known = {
+            name: value
+            for one in self.system.conditions
+            if one.told and one.name not in self.told
+            for name, value in one.parameters.get(str(conditions[one.name]), {}).items()
+        }
+
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
-        measured = zip(self.system.outputs, y, strict=True)
-        begin = {one.name: float(value) for one, value in measured if one.name in self.fmu.states}
+        measured = zip(self.system.outputs, self._measured(y), strict=True)
+        begin = {
+            one.name: float(value)
+            for one, value in measured
+            if one.name in self.fmu.states and not np.isnan(value)
+        }
         rolling = self.system.rolling
         if rolling is not None and rolling.follower not in begin and rolling.leader in begin:
             begin[rolling.follower] = rolling_ratio(self.fmu, self.system) * begin[rolling.leader]
-        self.fmu.start(begin)
+        estimated = {one.name for one in self.system.estimated}
+        held = {name: value for name, value in self._known.items() if name not in estimated}
+        self.fmu.start(begin, held)
         self._model.u[:] = 0.0
         self._begin(u, y)
 
@@ -227,7 +257,7 @@ class Estimator(ABC):
         Parameters
         ----------
         time : (n,) [s].
-        u, y : (n, m) and (n, l) measured inputs and outputs.
+        u, y : (n, m) and (n, l) measured inputs and outputs; y of a case holds aids, too.
 
         Raises
         ------
@@ -243,7 +273,7 @@ class Estimator(ABC):
         Parameters
         ----------
         steps : (n,) from the sample before [s].
-        u, y : (n, m) and (n, l) measured inputs and outputs.
+        u, y : (n, m) and (n, l) measured inputs and outputs; y of a case holds aids, too.
 
         Raises
         ------
@@ -260,9 +290,16 @@ class Estimator(ABC):
         """Rows of estimates, as laws write them."""
         rows = np.full((steps.size, self._width), np.nan)
         settings, memory = self._arguments()
-        status = self._loop(self._model, settings, memory, steps, given(u), given(y), rows)
+        y = given(self._measured(y))
+        status = self._loop(self._model, settings, memory, steps, given(u), y, rows)
         checked(status, self.fmu)
         return rows
+
+    def _measured(self, y: Any) -> Any:
+        """Outputs that the estimator takes of those given, (l,) or (n, l), NaN for more."""
+        count = len(self.system.outputs)
+        missing = [(0, 0)] * (y.ndim - 1) + [(0, max(count - y.shape[-1], 0))]
+        return np.pad(y[..., :count], missing, constant_values=np.nan)
 
     def _split(self, rows: Any) -> Estimate:
         width = len(self.system.columns)

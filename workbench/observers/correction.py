@@ -25,6 +25,9 @@ def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
     for i in range(size):
         memory.change[i] = 0.0
     for j in range(y.size):
+        if np.isnan(y[j]):  # not measured: its level stays
+            memory.levels.scatter[j] = memory.levels.sample[j]
+            continue
         at = layout.seen[j]
         if at >= 0:
             innovation = y[j] - z[at] - memory.change[at]

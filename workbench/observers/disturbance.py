@@ -271,7 +271,8 @@ class DisturbanceObserver(Estimator):
         Raises
         ------
         InputError
-            If the outputs do not show a state of the model, or there is nothing to estimate.
+            If the outputs do not show a state of the model, there is nothing to estimate, or a
+            quantity does not move, which no gain that stays can find.
         """
         names = corrected_states(fmu, system)
         model = linearised(fmu, system).of(names)
@@ -282,6 +283,13 @@ class DisturbanceObserver(Estimator):
                 found="a model without states, and no [estimated] quantities",
                 expected="something to estimate",
                 remedy="add a table [estimated.NAME], or run the open loop: --estimator open_loop",
+            )
+        if constant := [one.name for one in system.estimated if one.walk == 0.0]:
+            raise InputError(
+                where=f"{system.source}, [estimated.{constant[0]}] walk, {cls.name}",
+                found="0: a constant, on which a gain that stays must be zero",
+                expected="quantities that walk",
+                remedy="give it a walk, or estimate with a Kalman filter: --estimator ekf",
             )
         decay = np.array([-1.0 / one.memory for one in system.estimated])
         extended = np.block([[model.A, model.B], [np.zeros((q, s)), np.diag(decay)]])

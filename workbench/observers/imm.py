@@ -256,7 +256,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
             change=np.zeros((k, 2 * k)),
             z=np.zeros((k, size)),
             P=np.zeros((k, size, size)),
-            rows=np.zeros((k, 2 * len(system.columns) + 1)),
+            rows=np.zeros((k, 2 * len(self.system.columns) + 1)),
             evidence=np.zeros(k),
         )
 

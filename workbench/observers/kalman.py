@@ -181,7 +181,7 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
     layout, fade = settings.layout, fading(settings.layout, y)
     for j in range(y.size):
         at = layout.seen[j]
-        if at >= 0:
+        if at >= 0 and not np.isnan(y[j]):
             memory.P[at, at] = variance(settings, fade, y, j)
     return measure(model, u)
 
@@ -247,6 +247,7 @@ class ExtendedKalmanFilter(Estimator):
     label = "extended Kalman filter"
     rank = 40
     adapts = True
+    aided = True
     meaning = "standard deviations of samples, and random walks"
     sticks = True
     _law = staticmethod(ekf_law)
@@ -254,6 +255,7 @@ class ExtendedKalmanFilter(Estimator):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
+        system = self.system
         n, q = len(fmu.states), len(system.estimated)
         of_states = gains["model"] * walks(fmu, system)
         initial = [gains["initial"] * one.spread for one in system.estimated]
@@ -293,7 +295,8 @@ class ExtendedKalmanFilter(Estimator):
 
     def _start_values(self) -> Vector:
         """States and deviations of the quantities at the start, (n + q,)."""
-        begins = np.array([one.start for one in self.system.estimated]) - self._layout.nominal
+        starts = [self._known.get(one.name, one.start) for one in self.system.estimated]
+        begins = np.array(starts) - self._layout.nominal
         return np.concatenate([self.fmu.get_states(), np.nan_to_num(begins)])
 
     @classmethod
@@ -303,7 +306,7 @@ class ExtendedKalmanFilter(Estimator):
             "model": ("random walk of every state, over what the system says", "1"),
             "initial": ("what is known of quantities at the start, over what it says", "1"),
         }
-        for output in system.outputs:
+        for output in cls.fed(system).outputs:
             told[output.name] = f"scatter of {output.name}", output.unit
             told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
         for one in system.estimated:
@@ -313,10 +316,11 @@ class ExtendedKalmanFilter(Estimator):
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:
         """The noise of the sensors and what the system says of states and quantities."""
-        levels = {one.name: one.noise for one in system.outputs}
+        outputs = cls.fed(system).outputs
+        levels = {one.name: one.noise for one in outputs}
         levels |= {
             f"{one.name}_relative": one.relative_error
-            for one in system.outputs
+            for one in outputs
             if one.relative_error > 0.0
         }
         levels |= {"model": 1.0, **{one.name: one.walk for one in system.estimated}, "initial": 1.0}

@@ -165,7 +165,8 @@ def fading(layout, y):  # type: ignore[no-untyped-def]
         return 1.0
     pace = 0.0
     for j in range(y.size):
-        pace += layout.pace[j] * y[j]
+        if layout.pace[j] != 0.0:  # times NaN that would be NaN
+            pace += layout.pace[j] * y[j]
     return pace * pace / (pace * pace + layout.half**2)
 
 

@@ -283,7 +283,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        n, outputs = len(fmu.states), len(system.outputs)
+        n, outputs = len(fmu.states), len(self.system.outputs)
         samples, iterations, rare = (
             float(gains.design[name][0]) for name in ("horizon", "iterations", "rare")
         )

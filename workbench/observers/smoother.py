@@ -288,7 +288,7 @@ class Smoother(MovingHorizonEstimator):
         """Smooth a recording; see Estimator."""
         self.start(u[0], y[0])
         rows = np.full((time.size, self._width), np.nan)
-        steps, u, y = np.diff(time, prepend=time[0]), given(u), given(y)
+        steps, u, y = np.diff(time, prepend=time[0]), given(u), given(self._measured(y))
         horizon, nodes, s = self._memory, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
         whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
@@ -319,7 +319,7 @@ class Smoother(MovingHorizonEstimator):
             return
         whole.covariance[:] = start
         relative = errors * np.sqrt(whole.weight / levels)
-        faded = np.abs(whole.samples @ self._layout.pace) < self._layout.half
+        faded = np.abs(np.nan_to_num(whole.samples) @ self._layout.pace) < self._layout.half
         relative[faded] = np.nan  # what is seen there is not judged
         for j, at in enumerate(self._layout.seen):
             more = excess(relative[:, j], round(within / step))

@@ -143,16 +143,18 @@ def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-
     size, outputs = z.size, y.size
     share = np.sqrt(0.5) / spread
     for j in range(outputs):
-        mean = 0.0
+        missing, mean = np.isnan(y[j]), 0.0
         for i in range(2 * size):
             mean += memory.seen[i, j]
         mean /= 2 * size
         for i in range(2 * size):
-            stack[i, j] = share * (memory.seen[i, j] - mean)
+            stack[i, j] = 0.0 if missing else share * (memory.seen[i, j] - mean)
         for i in range(outputs):
             stack[2 * size + i, j] = 0.0
-        stack[2 * size + j, j] = np.sqrt(levels.sample[j] * variance(settings, fade, y, j))
-        memory.column[j] = y[j] - mean
+        # What is missing is one that no unknown moves, and nothing is made of it.
+        noise = 1.0 if missing else levels.sample[j] * variance(settings, fade, y, j)
+        stack[2 * size + j, j] = np.sqrt(noise)
+        memory.column[j] = 0.0 if missing else y[j] - mean
     for j in range(size):
         memory.change[j] = levels.before[j, j] = 0.0
         for i in range(2 * size):
@@ -167,8 +169,11 @@ def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-
         white = memory.column[j]
         for i in range(j):
             white -= triangle[i, j] * memory.column[outputs + i]
-        noise = variance(settings, fade, y, j)
-        note(levels, j, white, triangle[j, j] ** 2 - levels.sample[j] * noise, noise)
+        if np.isnan(y[j]):
+            levels.scatter[j] = levels.sample[j]
+        else:
+            noise = variance(settings, fade, y, j)
+            note(levels, j, white, triangle[j, j] ** 2 - levels.sample[j] * noise, noise)
         white /= triangle[j, j]
         memory.column[outputs + j] = white
         row[row.size - 1] += white * white
@@ -256,7 +261,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        size, outputs = len(self._settings.walk), len(system.outputs)
+        size, outputs = len(self._settings.walk), len(self.system.outputs)
         self._memory = PointsMemory(
             *buffers(len(fmu.states), len(system.estimated)),
             np.zeros(max(size, 2 * outputs)),

@@ -40,7 +40,6 @@ class LiveWindow:
         self._units = np.array(
             [per_shown(system, n, u) for n, u in zip(self._signals, units, strict=True)]
         )
-        self._columns = [list(system.columns).index(name) for name in self._signals]
         try:
             self._figure, axes = plt.subplots(
                 len(self._signals),
@@ -98,11 +97,13 @@ class LiveWindow:
 
     def _step(self, case: Case, estimator: Estimator, lines: Sequence[Line2D]) -> None:
         u, y = case.u, case.y
+        columns = [list(estimator.system.columns).index(name) for name in self._signals]
+        estimator.tell(case.conditions)
         values = np.full((case.time.size, len(self._signals)), np.nan)
         drawn = time.monotonic()
         for k, t in enumerate(case.time):
             advance = estimator.init if k == 0 else estimator.step
-            values[k] = advance(t, u[k], y[k]).values[self._columns] / self._units
+            values[k] = advance(t, u[k], y[k]).values[columns] / self._units
             last = k == case.time.size - 1
             if last or time.monotonic() - drawn > _PAUSE:
                 if not self._open():

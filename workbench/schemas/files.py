@@ -116,6 +116,7 @@ def system_schema() -> Schema:
         "inputs": measured,
         "outputs": {**measured, "minProperties": 1},
         "judged": measured,
+        "aids": measured,
         "derived": derived,
         "estimated": by_name(_estimated()),
         "states": by_name(closed({"walk": QUANTITY, "spread": QUANTITY}, optional="*")),
@@ -191,6 +192,7 @@ def _estimated() -> Schema:
             ("walk", "start", "spread", "relative_error", "scatter", "memory", "useful"), QUANTITY
         ),
         "claimed": by_name(TEXT),
+        "watched": FLAG,
     }
     needed = {"correction", "range", "walk"}
     return closed(entries, optional=" ".join(name for name in entries if name not in needed))
@@ -204,7 +206,7 @@ def _condition_kind(formula: Schema) -> Schema:
         "choices": {"type": "array", "minItems": 1},
         "count": {"type": "integer", "minimum": 1},
         "parameters": by_name(by_name(QUANTITY)),
-        "sign": FLAG,
+        **dict.fromkeys(("told", "sign"), FLAG),
         "agrees": closed(agrees, optional="at slack"),
     }
     either = [{"required": ["unit"]}, {"required": ["choices"]}]

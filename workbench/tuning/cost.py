@@ -11,6 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from workbench.case import Case
+from workbench.conditions import Value
 from workbench.errors import FMUError, InputError
 from workbench.fmu import FMU, Matrix, Vector
 from workbench.objective import corner, integrate, samples, weights
@@ -34,6 +35,7 @@ class Recording(NamedTuple):
     u, y : (n, m) and (n, l) measured inputs and outputs.
     judged : (n, w) measured signals that the objective weighs.
     shares : (n,) weight of each sample in the time average (trapezoidal rule) [1].
+    conditions : of the case.
     """
 
     name: str
@@ -43,6 +45,17 @@ class Recording(NamedTuple):
     y: Matrix
     judged: Matrix
     shares: Vector
+    conditions: Mapping[str, Value]
+
+    def part(self, samples: slice) -> "Recording":
+        """A piece of it."""
+        return self._replace(
+            steps=self.steps[samples],
+            u=self.u[samples],
+            y=self.y[samples],
+            judged=self.judged[samples],
+            shares=self.shares[samples],
+        )
 
 
 def recordings(
@@ -84,7 +97,8 @@ def recording(case: Case, system: System) -> Recording:
         )
     steps, shares = samples(case.time)
     judged = np.column_stack([case[name] for name in names])
-    return Recording(case.name, case.name, steps, case.u.copy(), case.y.copy(), judged, shares)
+    signals = case.u.copy(), case.y.copy(), judged
+    return Recording(case.name, case.name, steps, *signals, shares, case.conditions)
 
 
 def _scaled(one: Recording, case: Case, output: str, error: float, system: System) -> Recording:
@@ -167,11 +181,12 @@ class Evaluator:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._fmu = load_model(job)
-        kind, names = estimators(job.system)[job.estimator], list(job.system.columns)
+        kind = estimators(job.system)[job.estimator]
+        names = list(kind.fed(job.system).columns)
         self._settling = Settling(self._fmu, job.system, kind) if job.follows else None
         self._judged = [names.index(name) for name in job.system.objective.weights]
         # The loop is compiled here, so that no candidate's time is spent on it.
-        start = Recording("", "", *(values[:PIECES] for values in job.recordings[0][2:]))
+        start = job.recordings[0].part(slice(PIECES))
         self._evaluate_case(job_estimator(job, self._fmu, job.gains), start, np.inf)
 
     def __enter__(self) -> Self:
@@ -221,6 +236,7 @@ class Evaluator:
         low_pass, pole = np.zeros((2, shares.size)), corner(objective)
         end = 0
         try:
+            estimator.tell(case.conditions)
             estimator.start(case.u[0], case.y[0])
             for begin, end in pairwise(edges):
                 part = slice(begin, end)
