@@ -50,6 +50,7 @@ def model_of(vehicles: int, *, pitching: bool) -> str:
     states += ['a(unit="m/s2", nominal=1.0', 'vTrain(unit="m/s", nominal=20.0']
     states = [f"{one}, start=0.0, fixed=true)" for one in states]
     outputs = ['slip(unit="m/s") = v - rA[1]*omega1', 'force(unit="N") = sum(Fx)']
+    outputs += ['vGNSS(unit="m/s") = v']
     return "\n".join(
         [
             f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
@@ -60,7 +61,7 @@ def model_of(vehicles: int, *, pitching: bool) -> str:
             "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
             f"  {shifting};",
             "  uphill = sum(m[k]*slope[k] for k in 1:vehicles)/sum(m);",
-            "  air = C;\n  curves = curve;\n  v = vTrain;",
+            "  rest = A;\n  air = C;\n  curves = curve;\n  v = vTrain;",
             f"  pC = {_vector('pB', bogies)};\n  m = {_vector('mass', vehicles)};",
             f"  slope = {_vector('slope', vehicles)};\n  dmuDC = {_vector('dmuDC', axles)};",
             f"  rA = r + {_vector('dr', axles)};\n  omega = {_vector('omega', axles)};",
@@ -107,6 +108,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
         models={OBSERVER: replace(system.models[OBSERVER], path=fmu)},
         inputs=(*pressures, *vehicle, given["curve"]),
         outputs=(*speeds, accelerometer),
+        aids=(),
         estimated=(*estimated("muDC"), *estimated("r"), known["bias"]),
         reported={"force": system.reported["force"]},
         states=(),

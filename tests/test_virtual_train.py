@@ -33,9 +33,8 @@ def stop(folder: Path, gains: dict[str, float], rig: PlantedTrain = RIG) -> Case
 
 def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) -> None:
     case = stop(tmp_path, TRUE_TO_SHEET)
-    outputs = [one.name for one in SYSTEM.outputs]
     with open_model(SYSTEM) as model:
-        start = dict(zip(outputs, case.y[0], strict=True))
+        start = {one.name: case[one.name][0] for one in SYSTEM.outputs}
         model.start({**start, "vTrain": 0.46 * start["omega1"]}, {})
         inputs = model.variables([one.name for one in SYSTEM.inputs])
         found = []

@@ -30,6 +30,8 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   parameter Real C(unit="N.s2/m2", min=0.0) = 5.5 "Resistance of the air";
   parameter Real mass[vehicles](each unit="1", each min=0.5, each max=2.0) = fill(1.0, vehicles)
     "Mass of a vehicle, of the weighed one";
+  parameter Real gradientError(unit="1", min=-0.02, max=0.02) = 0.0
+    "True gradient less that of the track file";
   parameter Real bias(unit="m/s2", min=-1.0, max=1.0) = 0.0 "Of the accelerometer, at rest";
   parameter Real omega0(unit="rad/s", min=1e-6) = 0.05 "Speed below which torques are smoothed";
   constant Real g(unit="m/s2") = 9.81 "Gravity";
@@ -42,6 +44,7 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   Real rA[n](each unit="m") "Wheel radius that acts";
   Real m[vehicles](each unit="kg") "Mass of a vehicle";
   Real mu0(unit="1") "Friction wheel-rail that acts";
+  Real rest(unit="N") "Running resistance at rest that acts";
   Real air(unit="N.s2/m2") "Resistance of the air that acts";
   Real slope[vehicles](each unit="1") "Gradient under the middle of a vehicle";
   Real uphill(unit="1") "Gradient under the train that acts";
@@ -97,7 +100,7 @@ equation
     lossPower[i] = (tauL[i]*tanh(omega[i]/omega0) + drag[i])*omega[i];
     units*37500.0*der(T[i]) = 0.93*frictionPower[i] - units*cooling*(T[i] - 293.15);
   end for;
-  weight*acceleration = -sum(Fx) - (A + B*v + air*v*noEvent(abs(v)))*tanh(v/0.01)
+  weight*acceleration = -sum(Fx) - (rest + B*v + air*v*noEvent(abs(v)))*tanh(v/0.01)
     - g*weight*(uphill + curves*tanh(v/0.01));
   felt = acceleration + g*slope[1] + bias;
   annotation (Documentation(info="<html>

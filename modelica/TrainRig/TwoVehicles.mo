@@ -26,6 +26,12 @@ model TwoVehicles "Two vehicles with four axles each"
   input Real dr6(unit="m") "Correction of r[6]";
   input Real dr7(unit="m") "Correction of r[7]";
   input Real dr8(unit="m") "Correction of r[8]";
+  input Real dmass1(unit="1") "Correction of mass[1]";
+  input Real dmass2(unit="1") "Correction of mass[2]";
+  input Real dmuWR(unit="1") "Correction of muWR";
+  input Real dA(unit="N") "Correction of A";
+  input Real dC(unit="N.s2/m2") "Correction of C";
+  input Real dgradient(unit="1") "Correction of gradientError";
   input Real dbias(unit="m/s2") "Correction of bias";
   output Real omega1(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 1";
   output Real omega2(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 2";
@@ -37,6 +43,7 @@ model TwoVehicles "Two vehicles with four axles each"
   output Real omega8(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 8";
   output Real omegaReading[8](each unit="rad/s") = speedSensor.y "Readings of the speed sensors";
   output Real slip(unit="m/s") = v - rA[1]*omega1 "Slip velocity of axle 1";
+  output Real vGNSS(unit="m/s") = v "Speed that satellites tell";
   output Real force(unit="N") = sum(Fx) "Braking force of all axles";
   output Real a(unit="m/s2", start=0.0, fixed=true, nominal=1.0) "Of the accelerometer";
   output Real vTrain(unit="m/s", start=0.0, fixed=true, nominal=20.0) "Speed of the train";
@@ -51,8 +58,10 @@ model TwoVehicles "Two vehicles with four axles each"
     constrainedby Slots.PartialDrag(omega=omega) "What else brakes an axle";
   replaceable Slots.UnchangedAxles radius(u=r)
     constrainedby Slots.PartialAxles(u=r) "Wheel radius";
-  replaceable Slots.UnchangedVehicles weighed(u={mass[1]*mass1, mass[2]*mass2})
-    constrainedby Slots.PartialVehicles(u={mass[1]*mass1, mass[2]*mass2}) "Mass of the vehicles";
+  replaceable Slots.UnchangedVehicles weighed(
+      u={(mass[1] + dmass1)*mass1, (mass[2] + dmass2)*mass2})
+    constrainedby Slots.PartialVehicles(
+      u={(mass[1] + dmass1)*mass1, (mass[2] + dmass2)*mass2}) "Mass of the vehicles";
   replaceable Common.Signals.Unchanged adhesion(u=muWR)
     constrainedby Common.Interfaces.Signal(u=muWR) "Friction wheel-rail";
   replaceable Common.Signals.Unchanged gradient(u=(mass1*slope1 + mass2*slope2)/(mass1 + mass2))
@@ -70,10 +79,11 @@ equation
   drag = dragging.tau;
   rA = radius.y + {dr1, dr2, dr3, dr4, dr5, dr6, dr7, dr8};
   m = weighed.y;
-  mu0 = adhesion.y;
-  air = airResistance.y;
-  uphill = gradient.y;
-  slope = {slope1, slope2};
+  mu0 = adhesion.y + dmuWR;
+  rest = A + dA;
+  air = airResistance.y + dC;
+  uphill = gradient.y + gradientError + dgradient;
+  slope = {slope1, slope2} + fill(gradientError + dgradient, vehicles);
   curves = curve;
   dmuDC = {dmuDC1, dmuDC2, dmuDC3, dmuDC4, dmuDC5, dmuDC6, dmuDC7, dmuDC8};
   omega = {omega1, omega2, omega3, omega4, omega5, omega6, omega7, omega8};

@@ -12,6 +12,7 @@ model OneVehicleStopsAsTwo "A train of one vehicle and one of two, all alike, sl
     rA = r;
     m = fill(50e3, vehicles);
     mu0 = muWR;
+    rest = A;
     air = C*vehicles;
     uphill = 0.0;
     slope = zeros(vehicles);

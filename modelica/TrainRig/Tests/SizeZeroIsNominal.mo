@@ -6,6 +6,7 @@ model SizeZeroIsNominal "With every effect at size zero the train moves as the n
     pB1=p, pB2=p, pB3=p, pB4=p, mass1=47e3, mass2=53e3, slope1=1e-3, slope2=0.0, curve=0.0,
     dmuDC1=0.0, dmuDC2=0.0, dmuDC3=0.0, dmuDC4=0.0, dmuDC5=0.0, dmuDC6=0.0, dmuDC7=0.0, dmuDC8=0.0,
     dr1=0.0, dr2=0.0, dr3=0.0, dr4=0.0, dr5=0.0, dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0,
+    dmuWR=0.0, dmass1=0.0, dmass2=0.0, dA=0.0, dC=0.0, dgradient=0.0,
     vTrain(start=30.0), omega1(start=65.0), omega2(start=65.0), omega3(start=65.0),
     omega4(start=65.0), omega5(start=65.0), omega6(start=65.0), omega7(start=65.0),
     omega8(start=65.0));
@@ -13,6 +14,7 @@ model SizeZeroIsNominal "With every effect at size zero the train moves as the n
     pB1=p, pB2=p, pB3=p, pB4=p, mass1=47e3, mass2=53e3, slope1=1e-3, slope2=0.0, curve=0.0,
     dmuDC1=0.0, dmuDC2=0.0, dmuDC3=0.0, dmuDC4=0.0, dmuDC5=0.0, dmuDC6=0.0, dmuDC7=0.0, dmuDC8=0.0,
     dr1=0.0, dr2=0.0, dr3=0.0, dr4=0.0, dr5=0.0, dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0,
+    dmuWR=0.0, dmass1=0.0, dmass2=0.0, dA=0.0, dC=0.0, dgradient=0.0,
     vTrain(start=30.0), omega1(start=65.0), omega2(start=65.0), omega3(start=65.0),
     omega4(start=65.0), omega5(start=65.0), omega6(start=65.0), omega7(start=65.0),
     omega8(start=65.0),

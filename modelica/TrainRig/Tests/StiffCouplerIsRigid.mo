@@ -9,7 +9,8 @@ model StiffCouplerIsRigid "With a stiff coupler the reference model stops as the
     pB1=pressure, pB2=pressure, pB3=0.5*pressure, pB4=0.5*pressure, mass1=46e3, mass2=54e3,
     slope1=4e-3, slope2=6e-3, curve=5e-4, dmuDC1=0.0, dmuDC2=0.0, dmuDC3=0.0, dmuDC4=0.0,
     dmuDC5=0.0, dmuDC6=0.0, dmuDC7=0.0, dmuDC8=0.0, dr1=0.0, dr2=0.0, dr3=0.0, dr4=0.0, dr5=0.0,
-    dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0, vTrain(start=30.0), omega1(start=65.2),
+    dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0,
+    dmuWR=0.0, dmass1=0.0, dmass2=0.0, dA=0.0, dC=0.0, dgradient=0.0, vTrain(start=30.0), omega1(start=65.2),
     omega2(start=65.2), omega3(start=65.2), omega4(start=65.2), omega5(start=65.2),
     omega6(start=65.2), omega7(start=65.2), omega8(start=65.2));
 equation

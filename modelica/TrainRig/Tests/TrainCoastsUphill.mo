@@ -4,7 +4,8 @@ model TrainCoastsUphill "Without brakes and resistance a gradient acts on all th
     A=0.0, B=0.0, C=0.0, pB1=0.0, pB2=0.0, pB3=0.0, pB4=0.0, mass1=44e3, mass2=56e3, slope1=0.01,
     slope2=0.0, curve=1e-3, dmuDC1=0.0, dmuDC2=0.0, dmuDC3=0.0, dmuDC4=0.0, dmuDC5=0.0, dmuDC6=0.0,
     dmuDC7=0.0, dmuDC8=0.0,
-    dr1=0.0, dr2=0.0, dr3=0.0, dr4=0.0, dr5=0.0, dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0, vTrain(start=4.6), omega1(start=10.0), omega2(start=10.0),
+    dr1=0.0, dr2=0.0, dr3=0.0, dr4=0.0, dr5=0.0, dr6=0.0, dr7=0.0, dr8=0.0, dbias=0.0,
+    dmuWR=0.0, dmass1=0.0, dmass2=0.0, dA=0.0, dC=0.0, dgradient=0.0, vTrain(start=4.6), omega1(start=10.0), omega2(start=10.0),
     omega3(start=10.0), omega4(start=10.0), omega5(start=10.0), omega6(start=10.0),
     omega7(start=10.0), omega8(start=10.0));
 protected

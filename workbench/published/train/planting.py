@@ -13,11 +13,12 @@ import numpy as np
 from workbench.errors import InputError, closest
 from workbench.power.planting import Plantable, SheetError
 from workbench.prepare import write_cases
-from workbench.published.train.rig import AXLES, BOGIES, AskedStop
+from workbench.published.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
 from workbench.published.train.stops import USUAL, Faults, Made, draw_train, make, write_stop
 
 # A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
-# one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off.
+# one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off,
+# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off.
 _SINGLE = (
     ("pads", "WeakPads", AXLES, "1", 0.15, False),
     ("units", "IsolatedUnit", AXLES, "1", 1.0, False),
@@ -26,6 +27,7 @@ _SINGLE = (
     ("late", "LateSpeed", AXLES, "s", 0.1, False),
     ("lag", "CylinderLag", BOGIES, "s", 0.4, False),
     ("reading", "PressureSensorGain", BOGIES, "1", 0.10, True),
+    ("mass", "WrongMass", VEHICLES, "1", 0.15, True),
 )
 PLANTABLE = (
     *(
@@ -33,6 +35,7 @@ PLANTABLE = (
         for name, effect, count, unit, size, signed in _SINGLE
         for i in range(1, count + 1)
     ),
+    Plantable("gradient", "1", "WrongGradient", signed=True, unit_size=4e-3 / 4),
     Plantable("glazing", "1", "Glazing", signed=False, unit_size=0.15 / 4),
 )
 SHEET_ERRORS = (SheetError("noise", 2.0), SheetError("tolerances", 1.0))

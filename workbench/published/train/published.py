@@ -19,6 +19,8 @@ _CASE = "case.toml"
 _STEP = 0.1  # of a case [s]
 _PRESSURES = ("pB1", "pB2", "pB3", "pB4")
 _SPEEDS = tuple(f"omega{axle}" for axle in range(1, 9))
+_AID = "vGNSS"  # new at 10 Hz, then held
+_NONE: Mapping[str, str] = {}
 _MIDDLES = (10.75, 37.15)  # of the vehicles, behind the first axle [m]
 _CURVE = 0.6  # resistance over weight, times the radius [m]
 
@@ -40,7 +42,7 @@ def _recording(folder: Path) -> PublishedRecording:
     conditions = document.table("conditions")
     measured = folder / document.table("measurement").take("file", str)
     signals = dict.fromkeys(_PRESSURES, "Pa") | dict.fromkeys(_SPEEDS, "rad/s") | {"a": "m/s2"}
-    read = _columns(measured, {"time": "s", **signals, "s": "m"})
+    read = _columns(measured, {"time": "s", **signals, "s": "m"}, {_AID: "m/s"})
     steps = np.diff(read["time"])
     if not (steps.size and (steps > 0.0).all()):
         raise InputError(
@@ -50,9 +52,12 @@ def _recording(folder: Path) -> PublishedRecording:
             remedy="take the recording from the train again",
         )
     size = max(1, round(_STEP / float(np.median(steps))))
+    aid = read.pop(_AID, None)
     means = {name: _means(values, size) for name, values in read.items()}
     columns = {"time [s]": means["time"]}
     columns |= {f"{name} [{unit}]": means[name] for name, unit in signals.items()}
+    if aid is not None:
+        columns[f"{_AID} [m/s]"] = _held(read["time"], aid, means["time"])
     masses = np.array([conditions.number(f"mass{k}", "kg") for k in (1, 2)])
     slopes, curves = _along(folder / document.table("track").take("file", str), means["s"])
     for k, (mass, slope) in enumerate(zip(masses, slopes, strict=True), 1):
@@ -68,16 +73,19 @@ def _recording(folder: Path) -> PublishedRecording:
         (
             f"means of {size} samples",
             "gradients and curves from the track file, at the middles of the vehicles",
-            "satellite speed left out: it is missing in tunnels",
+            "satellite speed in lines between its samples, empty where it has none",
         ),
         {"rail": conditions.take("rail", str)},
         date=conditions.text("date", ""),
     )
 
 
-def _columns(file: Path, units: Mapping[str, str]) -> dict[str, Vector]:
-    """Columns of a file, by name, in these units."""
-    found = read_columns(file, list(units))
+def _columns(
+    file: Path, needed: Mapping[str, str], aids: Mapping[str, str] = _NONE
+) -> dict[str, Vector]:
+    """Columns of a file, by name, in these units; aids may be missing, in fields or wholly."""
+    found = read_columns(file, list(needed), list(aids), list(aids))
+    units = {name: unit for name, unit in {**needed, **aids}.items() if name in found}
     where = f"{file}, line 1, column"
     return {
         name: found[name].values * si_factor(found[name].unit, unit, f"{where} '{name}'")
@@ -89,6 +97,16 @@ def _means(values: Vector, size: int) -> Vector:
     """Means of so many samples each; what is left over is dropped."""
     means: Vector = values[: values.size // size * size].reshape(-1, size).mean(axis=1)
     return means
+
+
+def _held(time: Vector, values: Vector, at: Vector) -> Vector:
+    """A signal that is new every 0.1 s and then held, (k,), in lines between its samples.
+
+    A line from or to a sample that is missing is missing.
+    """
+    new = np.flatnonzero(np.diff(np.floor(time / _STEP + 1e-6), prepend=-1.0) > 0.0)
+    found: Vector = np.interp(at, time[new], values[new], right=np.nan)
+    return found
 
 
 def _along(file: Path, position: Vector) -> tuple[Matrix, Matrix]:

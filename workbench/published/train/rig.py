@@ -15,7 +15,7 @@ from workbench.errors import InputError
 from workbench.kernel import compiled
 from workbench.recording import Matrix, Vector
 
-AXLES, BOGIES, DISCS = 8, 4, 3
+AXLES, BOGIES, VEHICLES, DISCS = 8, 4, 2, 3
 PLACES = np.array([0.0, 2.5, 19.0, 21.5, 26.4, 28.9, 45.4, 47.9])  # of the axles [m]
 STEP = 2e-3  # [s]
 

@@ -11,6 +11,7 @@ from workbench.published.train.rig import (
     BOGIES,
     DISCS,
     STEP,
+    VEHICLES,
     AskedStop,
     Ridden,
     Train,
@@ -24,6 +25,8 @@ _RADIUS = 0.460  # of the sheet [m]
 _POLACH = {"dry": (1.0, 0.4, 0.4, 0.6), "wet": (0.3, 0.1, 0.4, 0.2)}  # kA, kS, A, B
 _START = 10_000.0  # kilometrage of the first axle at the start [m]
 _PERIOD = 0.02  # of the computer's samples [s]
+_SATELLITES = 5  # samples until their speed is new
+_TUNNELS, _TUNNEL = 1 / 8, (200.0, 800.0)  # share of stops with one, and how long it is [m]
 
 USUAL = (
     AskedStop("01_120_service_dry", 120 / 3.6, 2.7e5, "dry"),
@@ -41,6 +44,10 @@ def _bogies() -> Vector:
     return np.zeros(BOGIES)
 
 
+def _vehicles() -> Vector:
+    return np.zeros(VEHICLES)
+
+
 @dataclass(frozen=True)
 class Faults:
     """What a train has that its sheet does not say, SI.
@@ -54,6 +61,8 @@ class Faults:
     late : (8,) delay of a speed sensor.
     lag : (4,) time constant of a bogie's cylinders behind their valve.
     reading : (4,) relative error of a pressure sensor.
+    mass : (2,) true mass of a vehicle over the reported one, less one.
+    gradient : true less that of the track file, everywhere [1].
     glazing : share of the friction that is lost on a disc far above 110 degrees C.
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
@@ -65,6 +74,8 @@ class Faults:
     late: Vector = field(default_factory=_axles)
     lag: Vector = field(default_factory=_bogies)
     reading: Vector = field(default_factory=_bogies)
+    mass: Vector = field(default_factory=_vehicles)
+    gradient: float = 0.0
     glazing: float = 0.0
     noise: float = 0.0
     tolerances: float = 0.0
@@ -109,16 +120,19 @@ class Made:
     Attributes
     ----------
     command : when the brake was told [s].
-    weighed : (2,) masses as reported [kg].
+    mass, weighed : (2,) of the vehicles, true and as reported [kg].
     track : (k, 3) rows of the file: position [m], gradient [permille], radius [m].
+    gradient : (w,) true one, at the `points` of the way [1].
     fixed : of the train.
     """
 
     stop: AskedStop
     ridden: Ridden
     command: float
+    mass: Vector
     weighed: Vector
     track: Matrix
+    gradient: Vector
     fixed: Fixed
 
 
@@ -153,8 +167,9 @@ def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
     """
     rng, t = np.random.default_rng([seed, stop.number, 1]), 1.0 + faults.tolerances
     mass = 44e3 + rng.uniform(0.0, 12e3, 2)
-    weighed = mass * (1.0 + fixed.weighed + t * rng.normal(0.0, 0.013, 2))
+    weighed = mass * (1.0 + fixed.weighed + t * rng.normal(0.0, 0.013, 2)) / (1.0 + faults.mass)
     track, gradient, curve = _line(rng, t)
+    track[:, 1] -= 1e3 * faults.gradient
     mu0 = 0.40 * (1.0 + t * rng.normal(0.0, 0.02)) if stop.rail == "dry" else rng.uniform(0.25, 0.3)
     way = Way(
         mu0 * (1.0 + t * 0.03 * _walk(rng, 80.0)), gradient, curve, t * 1e-5 * _walk(rng, 150.0)
@@ -183,7 +198,7 @@ def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
     slowing = (1100.0 + 5.5 * at_command**2 + 1500.0 + faults.drag.sum() / _RADIUS) / mass.sum()
     temperature = 50.0 + t * rng.normal(0.0, 8.0, (AXLES, DISCS))
     ridden = ride(train, way, stop, at_command + slowing * command, command, temperature)
-    return Made(stop, ridden, command, weighed, track, fixed)
+    return Made(stop, ridden, command, mass, weighed, track, gradient, fixed)
 
 
 def _law(fixed: Fixed) -> tuple[float, float, float]:
@@ -235,6 +250,7 @@ def write_stop(made: Made, seed: int, faults: Faults, folder: Path) -> None:
         columns[f"omega{i + 1} [rad/s]"] = speeds[i]
     felt = np.interp(time, ridden.time, _filtered(ridden.a)) * (1.0 + fixed.gain) + fixed.bias
     columns["a [m/s2]"] = felt + n * 0.02 * rng.standard_normal(time.size)
+    columns["vGNSS [km/h]"] = _satellites(ridden, time, seed, stop.number, n)
     rolled = _PERIOD * np.cumsum(_RADIUS * np.median(speeds, axis=0))
     columns["s [m]"] = _START + rng.normal(0.0, 5.0) + rolled
     write_whole(folder / "measured.csv", _table(columns, "%.6g"))
@@ -242,6 +258,18 @@ def write_stop(made: Made, seed: int, faults: Faults, folder: Path) -> None:
     track = dict(zip(names, made.track.T, strict=True))
     write_whole(folder / "track.csv", _table(track, "%.2f"))
     write_whole(folder / "case.toml", _case(stop, made))
+
+
+def _satellites(ridden: Ridden, time: Vector, seed: int, number: int, n: float) -> Vector:
+    """Speed by satellites [km/h], (n,): new at 10 Hz, then held, NaN in a tunnel."""
+    rng, new = np.random.default_rng([seed, number, 3]), time[::_SATELLITES]
+    v, s = (np.interp(new, ridden.time, values) for values in (ridden.v, ridden.s))
+    read = np.abs(np.round(3.6 * v + n * 0.06 * rng.standard_normal(new.size), 2))
+    begins, length = rng.uniform(-_TUNNEL[1], ridden.s[-1]), rng.uniform(*_TUNNEL)
+    if rng.random() < _TUNNELS:
+        read[(s > begins) & (s < begins + length)] = np.nan
+    held: Vector = np.repeat(read, _SATELLITES)[: time.size]
+    return held
 
 
 def _filtered(values: Vector) -> Vector:
@@ -254,7 +282,8 @@ def _filtered(values: Vector) -> Vector:
 
 def _table(columns: dict[str, Vector], form: str) -> str:
     row = ",".join([form] * len(columns))
-    lines = (row % tuple(line) for line in np.column_stack(list(columns.values())).tolist())
+    rows = np.column_stack(list(columns.values())).tolist()
+    lines = ((row % tuple(one)).replace("nan", "") for one in rows)
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 
