@@ -50,8 +50,8 @@ model TwoVehicles "Two vehicles with four axles each"
 
   replaceable Slots.UnchangedBogies cylinder(u={pB1, pB2, pB3, pB4})
     constrainedby Slots.PartialBogies(u={pB1, pB2, pB3, pB4}) "From a bogie's valve to its cylinders";
-  replaceable Slots.UnchangedPads padFriction(u=ordinary, T=T)
-    constrainedby Slots.PartialPads(u=ordinary, T=T) "Pads";
+  replaceable Slots.UnchangedPads padFriction(u=ordinary, T=T, power=frictionPower)
+    constrainedby Slots.PartialPads(u=ordinary, T=T, power=frictionPower) "Pads";
   replaceable Slots.UnchangedAxles brakeUnits(u=fill(units, n))
     constrainedby Slots.PartialAxles(u=fill(units, n)) "Brake units that act";
   replaceable Slots.FreeAxles dragging(omega=omega)

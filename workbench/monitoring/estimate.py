@@ -75,7 +75,8 @@ class Appraiser:
         constant = [
             replace(one, walk=0.0, spread=reach(one)) for one in system.estimated if one.watched
         ]
-        self._constant = replace(system, estimated=tuple(constant), learns=math.inf)
+        # Recordings with an aid and without would be compared, and what wears as it should be told.
+        self._constant = replace(system, estimated=tuple(constant), learns=math.inf, aids=())
         self._model = model
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
 

@@ -1,9 +1,13 @@
 within TrainRig.Tests;
 model EffectsActInTheirPlace "An effect changes the axle, bogie or vehicle that its size names, no other"
-  Effects.WeakPads pads(u=fill(0.3, 8), T=fill(350.0, 8), loss={0, 0, 0.2, 0, 0, 0, 0, 0});
-  Effects.AllPads every(u=fill(0.3, 8), T=fill(350.0, 8), loss=0.1);
+  Effects.WeakPads pads(u=fill(0.3, 8), T=fill(350.0, 8), power=zeros(8), loss={0, 0, 0.2, 0, 0, 0, 0, 0});
+  Effects.AllPads every(u=fill(0.3, 8), T=fill(350.0, 8), power=zeros(8), loss=0.1);
   Effects.Glazing glazing(
-    u=fill(0.3, 8), T={383.15, 320.0, 450.0, 320.0, 320.0, 320.0, 320.0, 320.0}, loss=0.2);
+    u=fill(0.3, 8), T={383.15, 320.0, 450.0, 320.0, 320.0, 320.0, 320.0, 320.0},
+    power=zeros(8), loss=0.2);
+  Effects.WaterFilm water(
+    u=fill(0.3, 8), T=fill(350.0, 8), film=1.0, E0=0.45e6,
+    power={0.0, 1.35e6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
   Effects.IsolatedUnit unit(u=fill(3.0, 8), lost={0, 0, 0, 0, 0, 1.0, 0, 0});
   Effects.DraggingBrake drag(omega=fill(50.0, 8), torque={0, 0, 0, 0, 0, 0, 0, 900.0});
   Effects.CylinderLag lag(u=fill(2e5, 4), lag={0, 0.5, 0, 0});
@@ -20,6 +24,8 @@ equation
   assert(abs(sum(every.y) - 8.0*0.27) < 1e-12, "Pads of all axles");
   assert(abs(glazing.y[1] - 0.27) < 1e-12 and abs(glazing.y[3] - 0.24) < 1e-5
     and abs(glazing.y[2] - 0.3) < 1e-5, "Half is lost at 110 degrees, all far above, none below");
+  assert(abs(water.y[1] - 0.12) < 1e-12 and abs(water.y[2] - (0.3 - 0.18*exp(-time))) < 1e-6,
+    "A film of three discs leaves with 0.45 MJ of each, and where nothing rubs it stays");
   assert(abs(unit.y[6] - 2.0) < 1e-12 and abs(sum(unit.y) - 23.0) < 1e-12, "Unit of axle 6");
   assert(abs(drag.tau[8] - 900.0) < 1e-9 and abs(sum(drag.tau) - 900.0) < 1e-9, "Drag of axle 8");
   // A first-order lag with a smoothing of 10 ms beside it: 2 in 10 000 of the step at once.

@@ -18,7 +18,7 @@ from workbench.published.train.stops import USUAL, Faults, Made, draw_train, mak
 
 # A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
 # one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off,
-# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off.
+# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off, wet discs.
 _SINGLE = (
     ("pads", "WeakPads", AXLES, "1", 0.15, False),
     ("units", "IsolatedUnit", AXLES, "1", 1.0, False),
@@ -36,6 +36,7 @@ PLANTABLE = (
         for i in range(1, count + 1)
     ),
     Plantable("gradient", "1", "WrongGradient", signed=True, unit_size=4e-3 / 4),
+    Plantable("water", "1", "WaterFilm", signed=False, unit_size=1.0 / 4),
     Plantable("glazing", "1", "Glazing", signed=False, unit_size=0.15 / 4),
 )
 SHEET_ERRORS = (SheetError("noise", 2.0), SheetError("tolerances", 1.0))

@@ -20,6 +20,7 @@ PLACES = np.array([0.0, 2.5, 19.0, 21.5, 26.4, 28.9, 45.4, 47.9])  # of the axle
 STEP = 2e-3  # [s]
 
 _BRAKE_RADIUS, _GRAVITY = 0.300, 9.81  # m, m/s2
+_WET, _DRIES = 0.12, 0.45e6  # friction of a wet disc, work that leaves 1/e of its water [J]
 _GRID = 5.0  # of what differs along the rail [m]
 _LEAD = 100.0  # of the rail before the start [m]
 _END = 6000.0  # of the rail [m]
@@ -60,7 +61,7 @@ class Train(NamedTuple):
     target, begin, lag : (4,) pressure of each bogie, when it begins to rise, lag of its cylinders.
     mass : (2,) of each vehicle.
     resistance : (3,) A, B, C.
-    law : (4,) of the pads: speed, exponent, fade, glazing.
+    law : (5,) of the pads: speed, exponent, fade, glazing, film of water at the start.
     polach : (4,) kA, kS, A, B.
     """
 
@@ -126,7 +127,8 @@ class _Work(NamedTuple):
     Attributes
     ----------
     omega, before : (8,) speeds of the axles, and when slide protection last looked [rad/s].
-    T, heat : (8, 3) temperature of each disc [degrees C], and torque of its pads [N.m].
+    T, heat, rubbed : (8, 3) temperature of each disc [degrees C], torque of its pads [N.m], and
+        their work [J].
     supply : (4,) pressure behind the relay valves [Pa].
     cylinder, passed : (8,) pressure in the cylinders of an axle [Pa], and share of what its valve
         passes on.
@@ -138,6 +140,7 @@ class _Work(NamedTuple):
     before: Vector
     T: Matrix
     heat: Matrix
+    rubbed: Matrix
     supply: Vector
     cylinder: Vector
     passed: Vector
@@ -229,7 +232,9 @@ def _pads(train, work, i, v):  # type: ignore[no-untyped-def]
         T = work.T[i, d]
         glazed = 1.0 - glazing / (1.0 + math.exp(-(T - 110.0) / 6.0))
         acting = min(max(train.units[i] - d, 0.0), 1.0)
-        work.heat[i, d] = acting * common * (1.0 - fade * (T - 60.0)) * glazed
+        dry = common * (1.0 - fade * (T - 60.0)) * glazed
+        film = train.law[4] * math.exp(-work.rubbed[i, d] / _DRIES)
+        work.heat[i, d] = acting * (dry + film * (_WET * force * _BRAKE_RADIUS - dry))
         torque += work.heat[i, d]
     return torque
 
@@ -252,6 +257,7 @@ def _turn(train, way, work, i, v, s):  # type: ignore[no-untyped-def]
     for d in range(DISCS):
         T = work.T[i, d]
         cooling = 1.1 * (25.0 + 8.0 * (0.65 * v) ** 0.8) * (T - 20.0)
+        work.rubbed[i, d] += STEP * work.heat[i, d] * omega
         work.T[i, d] = T + STEP / 37.5e3 * (0.93 * work.heat[i, d] * omega - cooling)
     return abs(work.force[i] * w) / max(v, 1.0)
 
@@ -324,6 +330,7 @@ def ride(
         speed / train.radius,
         none.copy(),
         T.copy(),
+        np.zeros((AXLES, DISCS)),
         np.zeros((AXLES, DISCS)),
         np.zeros(BOGIES),
         none.copy(),

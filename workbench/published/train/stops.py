@@ -64,6 +64,7 @@ class Faults:
     mass : (2,) true mass of a vehicle over the reported one, less one.
     gradient : true less that of the track file, everywhere [1].
     glazing : share of the friction that is lost on a disc far above 110 degrees C.
+    water : film on all discs at the start of each stop, 1 where they are wet.
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
 
@@ -77,6 +78,7 @@ class Faults:
     mass: Vector = field(default_factory=_vehicles)
     gradient: float = 0.0
     glazing: float = 0.0
+    water: float = 0.0
     noise: float = 0.0
     tolerances: float = 0.0
 
@@ -191,7 +193,7 @@ def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
         lag=faults.lag,
         mass=mass,
         resistance=np.array([1100.0 * (1.0 + fixed.A) * wind, 12.0, 5.5 * (1.0 + fixed.C) * wind]),
-        law=np.array([*_law(fixed), faults.glazing]),
+        law=np.array([*_law(fixed), faults.glazing, faults.water]),
         polach=np.array(_POLACH[stop.rail]),
     )
     at_command = stop.speed * (1.0 + t * rng.normal(0.0, 0.01))
