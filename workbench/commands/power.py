@@ -10,7 +10,7 @@ from typing import Any
 from workbench.commands.extras import require_compiler
 from workbench.commands.output import Done, Output, read_result
 from workbench.diagnosis import Effect
-from workbench.diagnosis.thresholds import thresholds
+from workbench.diagnosis.thresholds import of_system
 from workbench.errors import InputError, closest
 from workbench.files import claimed
 from workbench.modelica import read_library
@@ -178,7 +178,7 @@ def _thresholds(
     results, interrupted = vary_sets(
         sets, system, rig, effects, workers=options.workers, report=output.stage
     )
-    usual = values(thresholds(len(effects)))
+    usual = values(of_system(system.comparison, len(effects)))
     out = options.out / "thresholds"
     write_thresholds(results, usual, _provenance(options, system, rig, interrupted), out)
     return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)

@@ -21,7 +21,7 @@ from workbench.diagnosis.linearised import Linearised, Point, between, lasting, 
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, RecordingSystem, part_edges
 from workbench.diagnosis.simulator import Evidence
-from workbench.diagnosis.thresholds import Thresholds, thresholds
+from workbench.diagnosis.thresholds import Thresholds, of_system
 from workbench.diagnosis.unknowns import SENSOR, Unknowns
 from workbench.errors import FMUError, InputError
 from workbench.fmu import Vector
@@ -59,9 +59,7 @@ class Fit:
     ) -> None:
         self._simulations = simulations
         self._compare = simulations.system.comparison
-        self.decides = decides or thresholds(
-            len(effects), self._compare.false_alarms, self._compare.left
-        )
+        self.decides = decides or of_system(self._compare, len(effects))
         self.unknowns = Unknowns(simulations, effects, beside)
         self._hidden = slice(0)  # blocks that do not count
         if self.unknowns.count == 1 and not beside and self.parts < 2:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from scipy.stats import chi2, norm
 
-from workbench.system_comparison import RATE
+from workbench.system_comparison import RATE, Comparison
 
 
 @dataclass(frozen=True)
@@ -134,3 +134,8 @@ def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.lef
         tied=-2.0 * math.log(rate),
         left=left,
     )
+
+
+def of_system(comparison: Comparison, candidates: int) -> Thresholds:
+    """Thresholds by the rate that a system allows, and by what its models simplify."""
+    return thresholds(candidates, comparison.false_alarms, comparison.left)

@@ -10,7 +10,7 @@ from scipy.special import chndtrinc
 from scipy.stats import ncx2
 
 from workbench.diagnosis import Diagnosis, Effect
-from workbench.diagnosis.thresholds import Thresholds, thresholds
+from workbench.diagnosis.thresholds import Thresholds, of_system
 from workbench.power.diagnosing import build_everything, diagnose_set
 from workbench.power.planting import Plantable, Planting
 from workbench.power.run import Setup
@@ -69,7 +69,7 @@ def foresee(
         build_everything(system, effects, setup.everything)
         cases = setup.recorded(Planting("clean", seed, 0.0, {}, ()), rig.simulate(seed, {}))
         found = diagnose_set(system, effects, setup.everything, cases)
-    decides = thresholds(len(effects), system.comparison.false_alarms, system.comparison.left)
+    decides = of_system(system.comparison, len(effects))
     known = {one.name: one for one in effects}
     return [
         _foreseen(known[one.effect], one, found, sizes, decides)
@@ -112,6 +112,7 @@ def chance(distance: float, unknowns: int, decides: Thresholds) -> float:
     --------
     What stands at the threshold itself is found in every other set:
 
+    >>> from workbench.diagnosis.thresholds import thresholds
     >>> decides = thresholds(28)
     >>> round(chance(decides.significant, 1, decides), 3), round(chance(0.0, 1, decides), 6)
     (0.5, 7.1e-05)

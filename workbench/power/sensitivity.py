@@ -18,7 +18,7 @@ from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.simulator import Evidence
-from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
+from workbench.diagnosis.thresholds import Soundness, Thresholds, of_system
 from workbench.diagnosis.verdict import conclude
 from workbench.errors import InputError, WorkerError
 from workbench.fmu import Matrix
@@ -123,9 +123,7 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
-    usual = thresholds(
-        len(setup.effects), setup.system.comparison.false_alarms, setup.system.comparison.left
-    )
+    usual = of_system(setup.system.comparison, len(setup.effects))
     variants = {
         (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
     }
@@ -198,7 +196,7 @@ def vary_sets(
         setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
         build_everything(system, effects, setup.everything)
         with Pool(workers, nullcontext, setup, isolated=True) as pool:
-            names = list(values(thresholds(len(effects))))
+            names = list(values(of_system(system.comparison, len(effects))))
             tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
             try:
                 for done, task in enumerate(as_completed(tasks), start=1):

@@ -24,7 +24,7 @@ from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.search import Fitted, Reporter, Step, beyond, seek
 from workbench.diagnosis.selection import anew
-from workbench.diagnosis.thresholds import Thresholds, thresholds
+from workbench.diagnosis.thresholds import Thresholds, of_system
 from workbench.diagnosis.verdict import Diagnosis
 from workbench.files import write_whole
 from workbench.modelica import Library
@@ -92,9 +92,7 @@ def propose(
         fitted.setdefault(_called(one.law), one)
     estimates = list(fitted.values())
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
-    decides = thresholds(
-        len(scan.prospects), system.comparison.false_alarms, system.comparison.left
-    )
+    decides = of_system(system.comparison, len(scan.prospects))
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
     tied = [one for one in estimates if estimates[0].evidence - one.evidence < near]
     if not tied or tied[0].evidence < odds:
@@ -180,7 +178,7 @@ def _surviving(
         given = given_values(path, system)
         steps: list[Step] = []
         with Simulations(path, system, given, cases, workers, report=report) as simulations:
-            decides = thresholds(len(own), system.comparison.false_alarms, system.comparison.left)
+            decides = of_system(system.comparison, len(own))
             fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
             seek(fit, own, anew(fit, about.point, about.active), steps, (), report)
     if not steps:

@@ -14,7 +14,7 @@ from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic, add, covariance, minimum
 from workbench.diagnosis.search import ROUNDS, Reporter
-from workbench.diagnosis.thresholds import thresholds
+from workbench.diagnosis.thresholds import of_system
 from workbench.diagnosis.unknowns import choice_of
 from workbench.errors import InputError
 from workbench.fmu import Matrix, Vector
@@ -82,9 +82,7 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
     given = (path, system, system.given, cases, workers)
     with Simulations(*given, report=report, restarting=False) as simulations:
         # Of effects none is tried; the thresholds bound steps alone.
-        fit = Fit(
-            simulations, [], thresholds(1, system.comparison.false_alarms, system.comparison.left)
-        )
+        fit = Fit(simulations, [], of_system(system.comparison, 1))
         best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)
         joint = fit.quadratics(fit.linearise(best, []))
         values = fit.unknowns.values(best.point)
