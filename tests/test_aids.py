@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from workbench.__main__ import main
 from workbench.api import observe
 from workbench.case import Case, read_case, read_cases
 from workbench.conditions import Value
@@ -188,6 +189,22 @@ def test_other_fields_are_not_empty_and_gaps_are_no_words(
     folder = recorded(tmp_path, "\n".join(rows), "time [s],filling [m/s],coarse [m],fine [m]")
     with pytest.raises(InputError, match=f"line 9, column '{where}'.*expected a finite number"):
         read_case(folder, still)
+
+
+def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(
+    still: System, tmp_path: Path
+) -> None:
+    """It has none at first, nor at last; and a fine sensor that is slower is in lines between."""
+    fields = ["" if k < 5 or k > 90 or k % 2 else f"{1.5 + 0.01 * k:.3f}" for k in range(100)]
+    rows = [f"{k};0.0;1.{k:02d};{one}" for k, one in enumerate(fields)]
+    table = "\n".join(["t [s];filling [m/s];coarse [m];fine [m]", *rows])
+    (tmp_path / "logged.csv").write_text(table + "\n")
+    command = ["import", str(tmp_path / "logged.csv"), "--system", str(still.source)]
+    assert main([*command, "--yes", "--quiet", "--out", str(tmp_path / "cases")]) == 0
+    (case,) = read_cases([tmp_path / "cases"], still)
+    assert case.time.size == 100
+    assert_array_equal(np.flatnonzero(np.isfinite(case["fine"])), np.arange(6, 91))
+    assert_allclose(case["fine"][6:91], 1.5 + 0.01 * np.arange(6, 91), rtol=1e-9)
 
 
 # --- conditions that estimators are told ---

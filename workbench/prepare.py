@@ -6,7 +6,6 @@ companion has as `PUBLISHED`, a package in its module `published`.
 
 import hashlib
 import json
-import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,7 +20,7 @@ from workbench.companion import companion_part
 from workbench.errors import InputError
 from workbench.files import claimed, write_json, write_whole
 from workbench.provenance import commit
-from workbench.recording import Vector
+from workbench.recording import Vector, cell
 from workbench.system import System
 from workbench.systems import system_path
 from workbench.tables import read_table
@@ -308,11 +307,6 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
                 path.parent.rmdir()
 
 
-def _field(value: float) -> str:
-    """All digits of a number; nothing where nothing was measured."""
-    return "" if math.isnan(value) else repr(value)
-
-
 def _texts(one: PublishedRecording) -> dict[str, str]:
     """Files of a case folder, by name."""
     measurement = {"file": "measured.csv"}
@@ -322,7 +316,7 @@ def _texts(one: PublishedRecording) -> dict[str, str]:
     case = {"title": one.title, **dated, "measurement": measurement}
     conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
     rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
-    lines = [",".join(one.columns), *(",".join(map(_field, row)) for row in rows)]
+    lines = [",".join(one.columns), *(",".join(map(cell, row)) for row in rows)]
     return {
         _CASE: tomli_w.dumps(case | conditions),
         "measured.csv": "\n".join(lines) + "\n",

@@ -1,6 +1,7 @@
 """The text of a recording: CSV to columns of numbers, nothing guessed."""
 
 import csv
+import math
 import re
 import stat
 from collections.abc import Collection, Mapping, Sequence
@@ -100,6 +101,15 @@ def header(cell: str) -> tuple[str, str | None]:
     """
     match = _HEADER_CELL.fullmatch(cell.strip())
     return (match["name"], match["unit"] or None) if match else (cell, None)
+
+
+def cell(value: float) -> str:
+    """A number as it stands in a recording, with all digits; empty where nothing was measured.
+
+    >>> cell(0.1), cell(float("nan"))
+    ('0.1', '')
+    """
+    return "" if math.isnan(value) else repr(value)
 
 
 def read_columns(

@@ -22,7 +22,7 @@ from workbench.importing.cutting import Cut, cut
 from workbench.mapping import COLUMNS, Measured, NamedChannel, ProposedRecording, merge
 from workbench.plausibility import Origin, doubts
 from workbench.provenance import commit
-from workbench.recording import Vector
+from workbench.recording import Vector, cell
 from workbench.system import System
 from workbench.tables import Table
 
@@ -208,7 +208,7 @@ def write(one: Import, out: Path, system: System) -> None:
         units = {"time": "s", **{n: system.signals[n].unit for n in piece.signals}}
         rows = zip(*(values.tolist() for values in columns.values()), strict=True)
         lines = [",".join(f"{name} [{units[name]}]" for name in columns)]
-        lines += [",".join(map(repr, row)) for row in rows]
+        lines += [",".join(map(cell, row)) for row in rows]
         written[f"{piece.name}/measured.csv"] = "\n".join(lines) + "\n"
     for path, text in written.items():
         write_whole(out / path, text)

@@ -55,6 +55,7 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     The times are those of the slowest output, where all have samples. Other signals are
     interpolated between two samples of their own, in a straight line, or held where the system says
     that they are; where these are further apart than a recording may have gaps, there is no sample.
+    An aid is NaN there, and holds up no other.
 
     Raises
     ------
@@ -69,8 +70,9 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     ]
     outputs = {one.name for one in system.outputs}
     slowest = max((one for one in tracks if one.signal.name in outputs), key=lambda t: t.step)
-    begin = max(float(one.times[0]) for one in tracks)
-    end = min(float(one.times[-1]) for one in tracks)
+    asked = [one for one in tracks if one.signal not in system.aids]
+    begin = max(float(one.times[0]) for one in asked)
+    end = min(float(one.times[-1]) for one in asked)
     inside = (slowest.times >= begin) & (slowest.times <= end)
     time = slowest.times[inside]
     limit = system.sampling.gap if math.isfinite(system.sampling.gap) else system.comparison.block
@@ -83,8 +85,11 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     signals: dict[str, Vector] = {}
     for one in tracks:
         values, near = _at(one, time, max(limit, _LATE * one.step))
+        if one in asked:
+            known &= near
+        else:
+            values = np.where(near, values, np.nan)
         signals[one.signal.name] = values
-        known &= near
         if not np.isin(time, one.times).all():
             way = "held" if one.signal.held else "interpolated"
             notes.append(f"{one.signal.name}: {way} from samples every {one.step:.6g} s")
@@ -173,5 +178,6 @@ def _at(one: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
     exact = one.times[after] == time
     before = np.where(exact, after, np.maximum(after - 1, 0))
     near = one.times[after] - one.times[before] <= limit * (1.0 + 1e-9)
+    near &= (time >= one.times[0]) & (time <= one.times[-1])
     values = one.values[before] if one.signal.held else np.interp(time, one.times, one.values)
     return values, near
