@@ -228,7 +228,7 @@ def _claims(
     for name in _doubted(estimator):
         one = next(one for one in system.estimated if one.name == name)
         met = all(
-            key in estimator.told or case.conditions[key] == value
+            key in estimator.finds or case.conditions[key] == value
             for key, value in one.claimed.items()
         )
         if met and name in rules:

@@ -81,7 +81,7 @@ class Estimator(ABC):
     tuned_as : estimator whose gains it takes; empty: its own.
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
-    told : conditions that it finds by itself.
+    finds : conditions that it finds out by itself.
     aided : whether samples may be missing, so that it takes aids as outputs, too.
     bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
 
@@ -104,7 +104,7 @@ class Estimator(ABC):
     sticks: ClassVar[bool] = False
     aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
-    told: frozenset[str] = frozenset()
+    finds: frozenset[str] = frozenset()
     _law: Any
     _loop: Any
 
@@ -219,7 +219,7 @@ class Estimator(ABC):
         self._known = {
             name: value
             for one in self.system.conditions
-            if one.told and one.name not in self.told
+            if one.told and one.name not in self.finds
             for name, value in one.parameters.get(str(conditions[one.name]), {}).items()
         }
 
@@ -297,9 +297,10 @@ class Estimator(ABC):
 
     def _measured(self, y: Any) -> Any:
         """Outputs that the estimator takes of those given, (l,) or (n, l), NaN for more."""
-        count = len(self.system.outputs)
-        missing = [(0, 0)] * (y.ndim - 1) + [(0, max(count - y.shape[-1], 0))]
-        return np.pad(y[..., :count], missing, constant_values=np.nan)
+        more = len(self.system.outputs) - y.shape[-1]
+        if more <= 0:
+            return y[..., : len(self.system.outputs)]
+        return np.concatenate([y, np.full((*y.shape[:-1], more), np.nan)], axis=-1)
 
     def _split(self, rows: Any) -> Estimate:
         width = len(self.system.columns)

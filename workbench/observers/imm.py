@@ -234,7 +234,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         found = hypotheses(system)
         self.modes = tuple(one.name for one in found)
-        self.told = frozenset(name for one in found for name in one.choices)
+        self.finds = frozenset(name for one in found for name in one.choices)
         super().__init__(fmu, system, gains)
         names = [one.name for one in system.estimated]
         filters = [
