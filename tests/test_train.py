@@ -218,6 +218,23 @@ def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(
     assert np.sqrt(np.mean(np.square(radii))) < (0.15 if "dragging" in name else 0.025)
 
 
+def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(
+    train: System, tmp_path: Path
+) -> None:
+    """`imm` weighs both, whatever the crew says; slides are on patches, which are neither."""
+    said = []
+    for name in ("healthy", "labelled/pads_axle", "labelled/cylinder_lag_bogie"):
+        cases, truth = cases_of(name, train, tmp_path / name)
+        for case in cases:
+            told = truth["cases"][case.name]
+            if told["patch"] is None:
+                probability = wb.observe(train, case, "imm").probability
+                at = int(np.searchsorted(case.time, told["standstill"] - 5.0))
+                said.append(probability[f"rail_{case.conditions['rail']}"][at])
+    assert len(said) >= 13
+    assert min(said) > 0.95
+
+
 def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(
     train: System, tmp_path: Path
 ) -> None:
