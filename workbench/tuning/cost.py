@@ -47,15 +47,15 @@ class Recording(NamedTuple):
     shares: Vector
     conditions: Mapping[str, Value]
 
+    @property
+    def sampled(self) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
+        """Steps, inputs, outputs, what is judged, and shares."""
+        return self.steps, self.u, self.y, self.judged, self.shares
+
     def part(self, samples: slice) -> "Recording":
         """A piece of it."""
-        return self._replace(
-            steps=self.steps[samples],
-            u=self.u[samples],
-            y=self.y[samples],
-            judged=self.judged[samples],
-            shares=self.shares[samples],
-        )
+        steps, u, y, judged, shares = (one[samples] for one in self.sampled)
+        return self._replace(steps=steps, u=u, y=y, judged=judged, shares=shares)
 
 
 def recordings(

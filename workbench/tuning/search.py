@@ -80,8 +80,9 @@ def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> 
     what = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
     digest.update(json.dumps(what).encode())
     for recording in job.recordings:
-        digest.update(recording.name.encode())
-        for values in recording[2:]:
+        told = sorted(recording.conditions.items())
+        digest.update(f"{recording.name} {told}".encode())
+        for values in recording.sampled:
             digest.update(np.ascontiguousarray(values).tobytes())
     for values in (job.gains.values, *vars(space).values()):
         digest.update(values.tobytes())
