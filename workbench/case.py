@@ -32,15 +32,13 @@ class Case:
     title : one line for reports.
     conditions : what was set before, by name: quantities in SI, words, whole numbers, tuples.
     time : (n,) s, strictly increasing, not necessarily in even steps.
-    signals : (n,) each, by name; one that is only there to judge by may be missing, and an aid is
-        NaN where it was not measured.
-    inputs, outputs : names of the signals that drive a model, and that correct it.
+    signals : (n,) each, by name; what only judges or aids may be missing, an aid in samples (NaN).
+    inputs, outputs, aids : names of those that drive a model, correct it, and do so where measured.
     source : the CSV file.
     names : the model's own name of each variable that it names otherwise.
     date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
     doubts : what is unlikely in the recording, in words.
-    aids : names of the signals that correct a model where they are measured.
     """
 
     name: str
@@ -76,10 +74,9 @@ class Case:
 
     def _table(self, names: Sequence[str]) -> Matrix:
         """Some signals as columns, also none."""
-        table = np.full((self.time.size, len(names)), np.nan)
+        table = np.empty((self.time.size, len(names)))
         for j, name in enumerate(names):
-            if name not in self.aids or name in self:
-                table[:, j] = self.signals[name]
+            table[:, j] = np.nan if name in self.aids and name not in self else self[name]
         return read_only(table)
 
     def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
@@ -262,8 +259,7 @@ def _counts_from(measurement: Table, time: Vector) -> float:
         return -np.inf
     begin = measurement.number("counts_from", "s")
     if begin >= time[-1]:
-        last = f"a time before the last sample, {time[-1]:.9g} s"
-        raise measurement.wrong("counts_from", last)
+        raise measurement.wrong("counts_from", f"a time before the last sample, {time[-1]:.9g} s")
     return begin
 
 
@@ -382,11 +378,10 @@ def _read_signals(
     source: Path, columns: dict[str, str], system: System
 ) -> tuple[Vector, dict[str, Vector]]:
     """Time and signals in SI units; what only judges or aids may be missing under its own name."""
-    spare = (*system.judged, *system.aids)
-    optional = [one.name for one in spare if columns[one.name] == one.name]
+    spare = [one.name for one in (*system.judged, *system.aids)]
+    optional = [name for name in spare if columns[name] == name]
     required = [column for signal, column in columns.items() if signal not in optional]
-    with_gaps = [columns[one.name] for one in system.aids]
-    recorded = read_columns(source, required, optional, with_gaps)
+    recorded = read_columns(source, required, optional, [columns[one.name] for one in system.aids])
     units = {"time": "s", **{name: one.unit for name, one in system.signals.items()}}
     signals = {}
     for signal, column in columns.items():

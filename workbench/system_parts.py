@@ -317,8 +317,7 @@ class Condition:
     least : smallest quantity; `exclusive`: above it.
     choices : words or whole numbers that it may be.
     count : of entries, where it is a list; 0: no list.
-    parameters : of the model by choice, which it sets; `told`: for estimators, too, that are then
-        told of it and need not find out.
+    parameters : of the model by choice, which it sets; `told`: in estimators, too.
     lasts : mean time until another choice takes its place, under way; infinite: never [s].
     sign : whether it is the sign of the recording's signals.
     label : for people.

@@ -18,7 +18,7 @@ from workbench.published.train.stops import USUAL, Faults, Made, draw_train, mak
 
 # A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
 # one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off,
-# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off, wet discs.
+# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off, a film of water.
 _SINGLE = (
     ("pads", "WeakPads", AXLES, "1", 0.15, False),
     ("units", "IsolatedUnit", AXLES, "1", 1.0, False),

@@ -64,7 +64,7 @@ class Faults:
     mass : (2,) true mass of a vehicle over the reported one, less one.
     gradient : true less that of the track file, everywhere [1].
     glazing : share of the friction that is lost on a disc far above 110 degrees C.
-    water : film on all discs at the start of each stop, 1 where they are wet.
+    water : film on every disc at the start of each stop, 1 where it is wet.
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
 
