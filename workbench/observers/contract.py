@@ -213,13 +213,13 @@ class Estimator(ABC):
     def tell(self, conditions: Mapping[str, Value]) -> None:
         """Take the parameters of a recording's conditions from its next start on.
 
-        Those that estimators are told, and it does not find by itself; estimates of quantities
-        start there.
+        Those that estimators are told; estimates of quantities start there. One that finds a
+        condition by itself has a model for each choice, to which this is nothing.
         """
         self._known = {
             name: value
             for one in self.system.conditions
-            if one.told and one.name not in self.finds
+            if one.told
             for name, value in one.parameters.get(str(conditions[one.name]), {}).items()
         }
 
