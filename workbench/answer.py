@@ -16,6 +16,7 @@ SUMMARIES = (
     "sheet_error.json",
     "left_out.json",
     "plan.json",
+    "followed.json",
     "next.json",
     "distance.json",
     "bench.json",

@@ -18,15 +18,16 @@ from workbench.system_experiments import (
 from workbench.system_parts import Condition
 from workbench.system_tables import read_measured
 from workbench.tables import Table
-from workbench.units import quantity
+from workbench.units import check_unit, quantity
 
 _KINDS = (STEP, STAIRCASE, SINE)
 
 
 def read_experiments(table: Table, system: System) -> Experiments:
     """What may be run next."""
-    table.refuse_unknown("lasts ends conditions start inputs cost sensors")
+    table.refuse_unknown("lasts ends conditions settings start inputs cost sensors")
     inputs, start = table.table("inputs"), table.table("start")
+    besides, labels = _besides(table.table("settings"), system)
     inputs.refuse_unknown(one.name for one in system.inputs)
     varied: list[VariedInput] = []
     driven: dict[str, Expression] = {}
@@ -40,7 +41,8 @@ def read_experiments(table: Table, system: System) -> Experiments:
     return Experiments(
         lasts=table.number("lasts", "s"),
         ends=_ending(table.table("ends")) if "ends" in table else None,
-        settings=_settings(table.table("conditions"), system),
+        settings={**_settings(table.table("conditions"), system), **besides},
+        labels=labels,
         start={
             key: Expression(start.take(key, str), f"{start.where} {key}") for key in start.content
         },
@@ -92,6 +94,25 @@ def _settings(table: Table, system: System) -> dict[str, tuple[Setting, ...]]:
         condition = system.condition(name)
         found[name] = tuple(_setting(table, condition, value) for value in values)
     return found
+
+
+def _besides(table: Table, system: System) -> tuple[dict[str, tuple[Setting, ...]], dict[str, str]]:
+    """Values of what is set and is no condition of a recording, and what it is called."""
+    found: dict[str, tuple[Setting, ...]] = {}
+    labels: dict[str, str] = {}
+    taken = {*system.signals, *system.values, *(one.name for one in system.conditions)}
+    for name in table.content:
+        if name in taken:
+            raise table.wrong(name, "a name that no signal, parameter or condition has")
+        own = Table(table.take(name, dict), f"{table.where} {name}")
+        own.refuse_unknown("label unit values")
+        unit, texts = own.take("unit", str), own.texts("values")
+        if not texts:
+            raise own.wrong("values", "one value or more")
+        check_unit(unit, f"{own.where} unit")
+        found[name] = tuple(Setting(quantity(one, unit, own.where), one) for one in texts)
+        labels[name] = own.text("label", name)
+    return found, labels
 
 
 def _setting(table: Table, condition: Condition, value: Any) -> Setting:

@@ -112,16 +112,15 @@ def _of_experiments(system: System) -> Iterator[_Reference]:
     asked = system.experiments
     if asked is None:
         return
-    numbers = {one.name for one in system.conditions if one.name in asked.settings}
     state = "a continuous state of the model"
     for name, formula in asked.start.items():
         yield formula.where, name, system.states or (), state
         for key in sorted(formula.names):
-            expected = "a parameter of the model, or a condition that is set"
-            yield formula.where, key, {*system.values, *numbers}, expected
+            expected = "a parameter of the model, or what is set"
+            yield formula.where, key, {*system.values, *asked.settings}, expected
     for key in sorted(asked.cost.formula.names):
-        expected = "duration, or a condition that is set"
-        yield asked.cost.formula.where, key, {"duration", *numbers}, expected
+        expected = "duration, or what is set"
+        yield asked.cost.formula.where, key, {"duration", *asked.settings}, expected
 
 
 def _parameters(system: System) -> Iterator[_Reference]:
@@ -169,7 +168,7 @@ def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference
         for formula in (*asked.driven.values(), *ends):
             known = {*variables, *system.values, *asked.settings}
             for name in sorted(formula.names):
-                yield formula.where, name, known, f"{output}, or a condition that is set"
+                yield formula.where, name, known, f"{output}, or what is set"
         for sensor in asked.sensors:
             where = f"{system.source}, [next.sensors.{sensor.name}] reading"
             yield where, sensor.reading, variables, output

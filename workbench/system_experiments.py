@@ -33,7 +33,7 @@ class VariedInput:
 
 @dataclass(frozen=True)
 class Setting:
-    """A value of a condition that may be set, SI, and how it was written."""
+    """A value of something that may be set, SI, and how it was written."""
 
     value: float | int | str | tuple[str | int, ...]
     text: str
@@ -53,7 +53,7 @@ class Cost:
 
     Attributes
     ----------
-    formula : in `duration` [s] and in conditions that are numbers, SI.
+    formula : in `duration` [s] and in settings that are numbers, SI.
     """
 
     formula: Expression
@@ -68,8 +68,10 @@ class Experiments:
     ----------
     lasts : [s] of a recording, at most.
     ends : before that, or None.
-    settings : of conditions by name; others are as usual, or as the recording says.
-    start : formulas of states, in parameters and in conditions that are numbers.
+    settings : of conditions by name, others are as usual, or as the recording says; and of what is
+        set besides, which only the inputs tell.
+    labels : of what is set besides, by name.
+    start : formulas of states, in parameters and in settings that are numbers.
     varied : inputs that follow profiles.
     driven : formulas of inputs that follow from the model's variables, as by a controller.
     cost : of a recording.
@@ -79,6 +81,7 @@ class Experiments:
     lasts: float
     ends: EndsBelow | None
     settings: Mapping[str, tuple[Setting, ...]]
+    labels: Mapping[str, str]
     start: Mapping[str, Expression]
     varied: tuple[VariedInput, ...]
     driven: Mapping[str, Expression]

@@ -26,6 +26,7 @@ from workbench.power import (
     summarise,
 )
 from workbench.power.diagnosing import library_effects
+from workbench.power.following import follow_proposals, summarise_following
 from workbench.power.left_out import propose_left_out
 from workbench.power.planned import foresee
 from workbench.power.planting import Group, plan_sheet_errors, some
@@ -34,10 +35,12 @@ from workbench.power.sheet import summarise_sheet
 from workbench.provenance import run_of
 from workbench.report.power import format_power, write_power
 from workbench.report.power_checks import (
+    format_followed,
     format_left_out,
     format_plan,
     format_sheet,
     format_thresholds,
+    write_followed,
     write_left_out,
     write_plan,
     write_sheet,
@@ -71,6 +74,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "sheet_error": _sheet_error,
             "leave_out_effect": _left_out,
             "plan": _foreseen,
+            "next": _followed,
         }
         return checks[options.check](options, output, system, rig, effects)
 
@@ -197,6 +201,25 @@ def _foreseen(
     rows = foresee(system, rig, effects, wanted, sizes, options.seed)
     write_plan(rows, sizes, _provenance(options, system, rig, False), out)
     return _told(output, format_plan(rows, sizes), out / "plan.json", False)
+
+
+def _followed(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    rig: VirtualRig,
+    effects: tuple[Effect, ...],
+) -> Done:
+    out = options.out / "followed"
+    alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
+    rows, interrupted = follow_proposals(
+        *(_planned(alone, rig, effects), system, rig, effects),
+        workers=options.workers,
+        report=output.stage,
+    )
+    summary = summarise_following(rows)
+    write_followed(summary, rows, _provenance(options, system, rig, interrupted), out)
+    return _told(output, format_followed(summary, rows), out / "followed.json", interrupted)
 
 
 def _told(output: Output, text: str, path: Path, interrupted: bool) -> Done:

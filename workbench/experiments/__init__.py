@@ -5,7 +5,8 @@ rivals of a diagnosis, what may be varied -> recordings that the first rival pre
 """
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,22 +16,33 @@ from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
-from workbench.experiments.candidates import Experiment, candidates
-from workbench.experiments.outcome import NextStop, RankedExperiment, chosen
-from workbench.experiments.prediction import Prediction, predicted_cases, predictions
+from workbench.experiments.candidates import Experiment, every_setting, other_profiles
+from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
+from workbench.experiments.prediction import (
+    Prediction,
+    predicted_cases,
+    predictions,
+    refitted_predictions,
+)
 from workbench.expression import Expression
 from workbench.modelica import read_library
 from workbench.system import Channel, System
 from workbench.system_experiments import Experiments
 from workbench.system_parts import Signal
 
-__all__ = ["NextStop", "RankedExperiment", "next_stop"]
+__all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop"]
 
+_SETTINGS = 3  # of which all profiles are tried
+_TOGETHER = 6  # experiments of which models are fitted again at a time
+_CONFIRMED = 18  # at most
 _SENSED = 3  # experiments that are tried with further sensors
 
 
 def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) -> NextStop:
     """Rank the experiments that a system allows by what they would tell.
+
+    Settings are exchanged first and profiles then, once each, as coordinates of a design (R. K.
+    Meyer, C. J. Nachtsheim, 1995, Technometrics 37, 60-69): of a grid of both most tell nothing.
 
     Of several rivals, by how many pairs a diagnosis would tell apart, then by the least distance
     that is left between two; of a single one, by how sure its sizes would be.
@@ -46,37 +58,29 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     InputError
         If the system does not say what may be varied, or no recording of it would count.
     """
-    experiments = system.experiments
-    if experiments is None:
-        raise InputError(
-            where=str(system.source),
-            found="no table [next]",
-            expected="what may be varied in the next recording",
-            remedy="write it, see docs/next-stop.md",
-        )
-    library = read_library(system.library)
-    every = catalogue(system, library)
-    effects = {one.name: one for one in choose(rivals.effects, every)}
-    with tempfile.TemporaryDirectory() as scratch:
-        everything = Path(scratch) / "AllEffects.fmu"
-        report(f"compiling {len(effects)} effects")
-        build_everything(system, library, list(effects.values()), everything)
-        rig = _Rig(everything, experiments, rivals, effects, workers)
-        plan = candidates(experiments)
-        report(f"{len(plan)} experiments, as {' with '.join(rivals.models[0].effects)} predicts")
-        cases = rig.cases(system, plan)
-        report(f"what {len(rivals.models)} models leave of {len(cases)} recordings")
-        ranked = chosen(rig.predictions(system, cases))
+    with _open(system, rivals, workers, report) as rig:
+        experiments = rig.experiments
+        plan = every_setting(experiments)
+        report(f"{len(plan)} settings, as {' with '.join(rivals.models[0].effects)} predicts")
+        ranked = chosen(rig.linearised(system, plan))
+        best = [one.candidate for one in ranked[:_SETTINGS]]
+        more = [one for setting in best for one in other_profiles(experiments, setting)]
+        if more:
+            report(f"{len(more)} profiles with the best {len(best)}")
+            ranked = chosen([*ranked, *rig.linearised(system, more)])
+        if len(rivals.models) > 1:
+            report("the best, with the models fitted again in full")
+            ranked = _confirmed(rig, ranked)
         sensors = {}
-        best = ranked[0]
-        if len(best.groups) < len(rivals.models):
+        first = ranked[0]
+        if len(first.groups) < len(rivals.models):
             for sensor in experiments.sensors:
                 report(f"the same with a sensor of {sensor.label}")
                 sensed = _with_sensor(system, sensor)
-                tried = rig.cases(sensed, [one.candidate for one in ranked[:_SENSED]])
-                more = chosen(rig.predictions(sensed, tried))[0]
-                if len(more.groups) > len(best.groups):
-                    sensors[sensor.label] = _proposal(sensed, experiments, more)
+                tried = [one.candidate for one in ranked[:_SENSED]]
+                found = chosen(rig.refitted(sensed, rig.cases(sensed, tried)))[0]
+                if len(found.groups) > len(first.groups):
+                    sensors[sensor.label] = _proposal(sensed, experiments, found)
     return NextStop(
         system=system,
         rivals=rivals,
@@ -86,48 +90,110 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     )
 
 
+def foreseen(
+    system: System, rivals: Rivals, plan: Sequence[Experiment], workers: int
+) -> list[RankedExperiment]:
+    """What experiments of one's own choice would tell, best first; those that would count.
+
+    Raises
+    ------
+    InputError
+        As `next_stop`.
+    """
+    with _open(system, rivals, workers, lambda _: None) as rig:
+        ranked = chosen(rig.refitted(system, rig.cases(system, plan)))
+        return [_proposal(system, rig.experiments, one) for one in ranked]
+
+
+@contextmanager
+def _open(system: System, rivals: Rivals, workers: int, report: Reporter) -> "Iterator[_Rig]":
+    """The machine as its models predict it."""
+    experiments = system.experiments
+    if experiments is None:
+        raise InputError(
+            where=str(system.source),
+            found="no table [next]",
+            expected="what may be varied in the next recording",
+            remedy="write it, see docs/next-stop.md",
+        )
+    library = read_library(system.library)
+    effects = {one.name: one for one in choose(rivals.effects, catalogue(system, library))}
+    with tempfile.TemporaryDirectory() as scratch:
+        everything = Path(scratch) / "AllEffects.fmu"
+        report(f"compiling {len(effects)} effects")
+        build_everything(system, library, list(effects.values()), everything)
+        yield _Rig(system, everything, experiments, rivals, effects, workers)
+
+
+def _confirmed(rig: "_Rig", ranked: Sequence[Prediction]) -> list[Prediction]:
+    """The best first: rivals that bend far are known by full fits alone, which cost more.
+
+    They are made of the best as linearised, until what is proposed is better than all others
+    promise.
+    """
+    confirmed: list[Prediction] = []
+    left = list(ranked)
+    while left and len(confirmed) < _CONFIRMED:
+        some, left = left[:_TOGETHER], left[_TOGETHER:]
+        planned = [(one.candidate, one.case) for one in some]
+        confirmed = chosen([*confirmed, *rig.refitted(rig.system, planned)])
+        last = confirmed[min(PROPOSED, len(confirmed)) - 1]
+        if left and chosen([last, left[0]])[0] is last:
+            break
+    return [*confirmed, *left]
+
+
 class _Rig:
     """Experiments on a machine as its models predict them.
 
     Parameters
     ----------
     everything : FMU with all effects.
+
+    Attributes
+    ----------
+    system : as it is.
+    experiments : that it allows.
     """
 
     def __init__(
         self,
+        system: System,
         everything: Path,
         experiments: Experiments,
         rivals: Rivals,
         effects: Mapping[str, Effect],
         workers: int,
     ) -> None:
-        self._everything, self._experiments = everything, experiments
+        self.system, self._everything, self.experiments = system, everything, experiments
         self._rivals, self._effects, self._workers = rivals, effects, workers
 
     def cases(self, system: System, plan: Sequence[Experiment]) -> list[tuple[Experiment, Case]]:
-        """Recordings that would count."""
-        found = predicted_cases(
-            *(self._everything, system, self._experiments, self._rivals, self._effects),
-            *(plan, self._workers),
-        )
-        if not found:
+        """Recordings of experiments, those that would count."""
+        planned = predicted_cases(*self._known(system), plan, self._workers)
+        if not planned:
             raise InputError(
                 where=f"{system.source}, [next]",
                 found="no experiment with enough samples that count",
                 expected="one that a diagnosis can use",
                 remedy="let recordings last longer, or widen the ranges",
             )
-        return found
+        return planned
 
-    def predictions(
+    def linearised(self, system: System, plan: Sequence[Experiment]) -> list[Prediction]:
+        """What experiments would tell, of models linearised where they are."""
+        return predictions(*self._known(system), self.cases(system, plan), self._workers)
+
+    def refitted(
         self, system: System, planned: Sequence[tuple[Experiment, Case]]
     ) -> list[Prediction]:
-        """What they would tell."""
-        return predictions(
-            *(self._everything, system, self._experiments, self._rivals, self._effects),
-            *(planned, self._workers),
-        )
+        """What they would tell, of models fitted again in full."""
+        return refitted_predictions(*self._known(system), planned, self._workers)
+
+    def _known(
+        self, system: System
+    ) -> tuple[Path, System, Experiments, Rivals, Mapping[str, Effect]]:
+        return self._everything, system, self.experiments, self._rivals, self._effects
 
 
 def _with_sensor(system: System, sensor: Signal) -> System:

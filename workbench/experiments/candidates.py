@@ -1,7 +1,7 @@
 """What may be run next, one by one: conditions, and profiles of the inputs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -67,7 +67,7 @@ class Experiment:
 
     Attributes
     ----------
-    settings : of conditions, by name.
+    settings : of conditions and of what is set besides, by name.
     profiles : of the inputs that are varied.
     """
 
@@ -76,42 +76,57 @@ class Experiment:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Conditions that are numbers, SI."""
+        """Settings that are numbers, SI."""
         values = {name: one.value for name, one in self.settings.items()}
         return {name: v for name, v in values.items() if isinstance(v, int | float)}
 
     def text(self, system: System) -> str:
         """For people."""
+        assert system.experiments is not None
+        besides = system.experiments.labels
         said = [
-            f"{system.condition(name).label} {setting.text}"
+            f"{besides[name] if name in besides else system.condition(name).label} {setting.text}"
             for name, setting in self.settings.items()
         ]
         return "; ".join([*said, *(one.text(system) for one in self.profiles)])
 
 
-def candidates(experiments: Experiments) -> list[Experiment]:
-    """All that are tried: every setting of the conditions with every profile of each input."""
+def every_setting(experiments: Experiments) -> list[Experiment]:
+    """Every setting, each with the profiles that sweep most of their ranges."""
+    followed = tuple(_profiles(one)[0] for one in experiments.varied)
     names = list(experiments.settings)
-    chosen = list(product(*experiments.settings.values()))
-    profiles = list(product(*(_profiles(one) for one in experiments.varied)))
     return [
         Experiment(dict(zip(names, settings, strict=True)), followed)
-        for settings in chosen
-        for followed in profiles
+        for settings in product(*experiments.settings.values())
     ]
 
 
+def other_profiles(experiments: Experiments, one: Experiment) -> list[Experiment]:
+    """All other profiles, with the settings of an experiment."""
+    every = product(*(_profiles(varied) for varied in experiments.varied))
+    return [replace(one, profiles=followed) for followed in every if followed != one.profiles]
+
+
+def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
+    """An experiment drawn at random: each of all that may be run is as likely."""
+    settings = {
+        name: values[rng.integers(len(values))] for name, values in experiments.settings.items()
+    }
+    profiles = [_profiles(one) for one in experiments.varied]
+    return Experiment(settings, tuple(some[rng.integers(len(some))] for some in profiles))
+
+
 def _profiles(one: VariedInput) -> list[Profile]:
-    """Steps to the ends of the range and between them; stairs begun at either end; sines."""
+    """Stairs begun at either end; sines; steps to the ends of the range and between them."""
     low, high = one.low, one.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()
     stairs = (*rising, *rising[-2:0:-1])
     found = []
-    if STEP in one.profiles:
-        found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
     if STAIRCASE in one.profiles:
         falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
         found += [Profile(one, STAIRCASE, levels, one.every) for levels in (stairs, falling)]
     if SINE in one.profiles:
         found += [Profile(one, SINE, (low, high), times * one.every) for times in (1.0, 2.0)]
+    if STEP in one.profiles:
+        found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
     return found

@@ -15,7 +15,7 @@ from workbench.system import Channel, System
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PROPOSED = 3
+PROPOSED = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,11 @@ class RankedExperiment:
                 name: list(value) if isinstance(value, tuple) else value
                 for name, value in found.case.conditions.items()
             },
+            "settings": {
+                name: setting.value
+                for name, setting in found.candidate.settings.items()
+                if name not in found.case.conditions
+            },
         }
 
 
@@ -78,7 +83,7 @@ class NextStop:
     @property
     def proposals(self) -> tuple[RankedExperiment, ...]:
         """The best ones."""
-        return self.tried[:_PROPOSED]
+        return self.tried[:PROPOSED]
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """What every rival predicts of every experiment, and what that would tell them apart by."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from workbench.diagnosis.counting import count
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.linearised import Point
+from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.quadratic import (
     Joint,
     Key,
@@ -26,11 +26,12 @@ from workbench.diagnosis.quadratic import (
     minimum,
 )
 from workbench.diagnosis.rivals import Rival, Rivals
-from workbench.diagnosis.thresholds import SOUND, Thresholds
+from workbench.diagnosis.thresholds import SOUND
 from workbench.diagnosis.unknowns import ALL
 from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment
 from workbench.experiments.recorded import recorded, start_of
+from workbench.experiments.refit import Refit
 from workbench.experiments.separation import precision, refitted, told_apart
 from workbench.fmu import CoSimulation, Matrix, Vector
 from workbench.pool import Pool
@@ -173,6 +174,17 @@ def _choices(system: System, level: str, candidate: Experiment) -> set[str]:
     return set(map(str, said))
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What experiments are predicted with; see `predictions`."""
+
+    everything: Path
+    system: System
+    experiments: Experiments
+    rivals: Rivals
+    effects: Mapping[str, Effect]
+
+
 def predictions(
     everything: Path,
     system: System,
@@ -182,16 +194,46 @@ def predictions(
     planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
-    """What each experiment would tell, in their order."""
+    """What each experiment would tell, in their order, of rivals linearised where they are."""
     cases = [case for _, case in planned]
     with Simulations(everything, system, rivals.given, cases, workers) as simulations:
         fit = Fit(simulations, list(effects.values()), beside=cases[:1])
         begun = _begun(fit, [start_of(system, experiments, one) for one, _ in planned])
         rows = [_linearised(fit, rivals, one, effects, begun) for one in rivals.models]
         return [
-            _prediction(simulations, fit.decides, rivals, rows, k, candidate)
+            _prediction(simulations, fit, rivals, rows, k, candidate, _once)
             for k, (candidate, _) in enumerate(planned)
         ]
+
+
+def refitted_predictions(
+    everything: Path,
+    system: System,
+    experiments: Experiments,
+    rivals: Rivals,
+    effects: Mapping[str, Effect],
+    planned: Sequence[tuple[Experiment, Case]],
+    workers: int,
+) -> list[Prediction]:
+    """As `predictions`, of rivals that are fitted again in full: each experiment by itself."""
+    asked = _Asked(everything, system, experiments, rivals, effects)
+    with Pool(min(workers, len(planned)), nullcontext, asked) as pool:
+        under_way = [pool.submit(_refitted, candidate, case) for candidate, case in planned]
+        return [one.result() for one in under_way]
+
+
+def _refitted(asked: _Asked, candidate: Experiment, case: Case) -> Prediction:
+    rivals, active = asked.rivals, asked.effects
+    with Simulations(asked.everything, asked.system, rivals.given, [case], 1) as simulations:
+        fit = Fit(simulations, list(active.values()), beside=[case])
+        begun = _begun(fit, [start_of(asked.system, asked.experiments, candidate)])
+        rows = [_linearised(fit, rivals, one, active, begun) for one in rivals.models]
+
+        def again(true: _Row, other: _Row, _: int) -> tuple[float, Matrix]:
+            refit = Refit(fit, other.lin, true.joint.systems[0].r, other.information)
+            return refit.least(other.active)
+
+        return _prediction(simulations, fit, rivals, rows, 0, candidate, again)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,11 +242,15 @@ class _Row:
 
     Attributes
     ----------
+    active : its causes.
+    lin : errors and derivatives there.
     joint : over its common unknowns.
     information : of these in the recordings so far, (p, p).
     bare : its responses without its causes, beside the derivatives of `joint`.
     """
 
+    active: tuple[Effect, ...]
+    lin: Linearised
     joint: Joint
     information: Matrix
     bare: Joint
@@ -231,7 +277,8 @@ def _linearised(
     turning = {name for name, parameter in rival.sizes if parameter == "amplitude"}
     phases = {name: np.zeros(fit.unknowns.count) for name in turning}
     point = Point(rival.sizes, levels, begun, phases)
-    lin = fit.linearise(fit.at(point), [effects[name] for name in rival.effects])
+    active = tuple(effects[name] for name in rival.effects)
+    lin = fit.linearise(fit.at(point), active)
     # A further sensor has noise alone.
     inflation = np.ones(lin.inflation.size)
     inflation[: rivals.inflation.size] = rivals.inflation
@@ -243,7 +290,7 @@ def _linearised(
     ]
     joint = fit.quadratics(lin)
     unexplained = fit.quadratics(replace(lin, evidence=tuple(bare)))
-    return _Row(joint, _aligned(joint, rival), unexplained)
+    return _Row(active, lin, joint, _aligned(joint, rival), unexplained)
 
 
 def _aligned(joint: Joint, rival: Rival) -> Matrix:
@@ -269,35 +316,44 @@ def _aligned(joint: Joint, rival: Rival) -> Matrix:
     return found
 
 
+def _once(true: _Row, other: _Row, k: int) -> tuple[float, Matrix]:
+    """Chi-squared that a rival leaves, and errors by block and channel, linearised."""
+    away = _away(other.joint, true.joint, k)
+    left, z = refitted(away.eliminated(), other.information)
+    return left, away.errors(z)
+
+
 def _prediction(
     simulations: Simulations,
-    decides: Thresholds,
+    fit: Fit,
     rivals: Rivals,
     rows: Sequence[_Row],
     k: int,
     candidate: Experiment,
+    leaves: Callable[[_Row, _Row, int], tuple[float, Matrix]],
 ) -> Prediction:
     count_, first = len(rows), rows[0]
     apart, chance = np.zeros((count_, count_)), np.ones((count_, count_))
-    left = []
+    own = first.joint.systems[k]
+    left = [np.zeros_like(own.errors(np.zeros(len(first.joint.shared))))]
     for i, (true, model) in enumerate(zip(rows, rivals.models, strict=True)):
         explained = model.explained + _explained(true, k)
         for j, (other, rival) in enumerate(zip(rows, rivals.models, strict=True)):
-            away = _away(other.joint, true.joint, k)
-            total, z = refitted(away.eliminated(), other.information)
-            if i != j:
-                apart[i, j] = total + rival.behind - model.behind
-                chance[i, j] = told_apart(apart[i, j], explained, decides)
+            if i == j:
+                continue
+            total, errors = leaves(true, other, k)
+            apart[i, j] = total + rival.behind - model.behind
+            chance[i, j] = told_apart(apart[i, j], explained, fit.decides)
             if i == 0:
-                left.append(away.errors(z))
-    own = [first.joint.shared.index(key) for key in rivals.models[0].sizes]
+                left.append(errors)
+    at = [first.joint.shared.index(key) for key in rivals.models[0].sizes]
     samples, case = simulations.recordings[k], simulations.cases[k]
     return Prediction(
         candidate=candidate,
         case=case,
         apart=apart,
         chance=chance,
-        precision=precision(first.joint.systems[k].eliminated().N, first.information, own),
+        precision=precision(own.eliminated().N, first.information, at),
         block_time=samples.time[samples.blocks.mean(axis=1).astype(int)],
         left=np.array(left),
     )

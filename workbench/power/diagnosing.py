@@ -1,13 +1,18 @@
 """The diagnosis as its power is measured: all effects of the library in one FMU, set by set."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+
+import numpy as np
 
 from workbench import diagnosis
 from workbench.case import Case
 from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.rivals import Rivals, gathered
+from workbench.diagnosis.search import Fitted, beyond, examine, extended
 from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
 from workbench.system import System
@@ -39,5 +44,59 @@ def diagnose_set(
     system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
 ) -> Diagnosis:
     """Diagnose one set of recordings, in this process alone."""
+    with _fit(system, effects, everything, cases) as (_, fit):
+        return conclude(fit, effects, _silent)
+
+
+def rivals_of_set(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> tuple[Diagnosis, Rivals | None]:
+    """Diagnose one set, and keep what it leaves undecided; None where no cause is found."""
+    with _fit(system, effects, everything, cases) as (simulations, fit):
+        found = conclude(fit, effects, _silent)
+        left = gathered(simulations, fit, found.base, found.rivals) if found.rivals else None
+        return found, left
+
+
+def distances_in_set(
+    system: System,
+    effects: Sequence[Effect],
+    everything: Path,
+    cases: Sequence[Case],
+    true: str,
+    others: Sequence[str],
+) -> tuple[Diagnosis, dict[str, float]]:
+    """Diagnose one set, and tell how far effects stay from the true one, each fitted alone.
+
+    Returns
+    -------
+    distances : by name [standard deviations], negative if it is nearer than the true one; of those
+        that could be fitted.
+    """
+    with _fit(system, effects, everything, cases) as (_, fit):
+        found = conclude(fit, effects, _silent)
+        base, trial = examine(fit, found.base, effects, _silent)
+        fits: dict[str, Fitted | None] = {}
+        for score in trial.scores():
+            name = score.effect.name
+            if name in (true, *others) and name not in fits:
+                fits[name] = extended(fit, base, score)
+        right = fits.get(true)
+        away = {
+            name: beyond(one, right)
+            for name, one in fits.items()
+            if name != true and one is not None and right is not None
+        }
+        return found, {name: float(np.sign(c) * np.sqrt(abs(c))) for name, c in away.items()}
+
+
+@contextmanager
+def _fit(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> Iterator[tuple[Simulations, Fit]]:
     with Simulations(everything, system, system.given, cases, 1) as simulations:
-        return conclude(Fit(simulations, effects), effects, lambda _: None)
+        yield simulations, Fit(simulations, effects)
+
+
+def _silent(line: str) -> None:
+    """Progress of each set would hide that of all."""

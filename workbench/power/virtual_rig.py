@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self, runtime_checkable
 
 from workbench.companion import companion_part
 from workbench.errors import InputError
@@ -40,6 +40,20 @@ class VirtualRig(Protocol):
 
     def write(self, simulated: Any, gains: Mapping[str, float], folder: Path) -> None:
         """Write what sensors make of it, as case folders."""
+
+
+@runtime_checkable
+class FollowingRig(VirtualRig, Protocol):
+    """A virtual rig that also makes what `workbench next` proposes."""
+
+    def following(self, experiment: Mapping[str, Any], system: System) -> Self:
+        """The rig whose only recording is an experiment, as it stands in next.json.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError
+            If it asks for what the rig cannot do.
+        """
 
 
 def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -> VirtualRig:

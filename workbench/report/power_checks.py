@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from workbench.answer import Answer, Measure
 from workbench.files import write_json
 from workbench.lab import with_unit
+from workbench.power.following import SHARES
 from workbench.power.planned import SURE, Foreseen
 from workbench.power.sensitivity import FACTORS, Varied
 from workbench.report.answers import with_answer
@@ -123,6 +124,55 @@ def _rightly(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
     """Sets with the right slot, and those of which the verdict is not "nothing"."""
     known = [row for row in rows if row["left_out"] and row["verdict"] != "nothing"]
     return sum(bool(row["slot_right"]) for row in known), len(known)
+
+
+def write_followed(
+    summary: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write followed.json.
+
+    Parameters
+    ----------
+    summary : shares of all.
+    """
+    made, drawn = summary["proposed"], summary["drawn"]
+    sentence = (
+        f"The recording that is proposed parts {made['hits']} of {made['of']} groups, one that is "
+        f"drawn {drawn['hits']} of {drawn['of']}."
+    )
+    headline = {
+        SHARES[name]: Measure(
+            one["share"], "1", "higher" if name == "proposed" else "", *_ends(one)
+        )
+        for name, one in summary.items()
+    }
+    content = {"provenance": provenance, **summary, "sets": list(rows)}
+    write_json(out / "followed.json", with_answer(Answer(sentence, headline), content))
+
+
+def _ends(one: Mapping[str, Any]) -> tuple[float, float]:
+    return one["low"], one["high"]
+
+
+def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was left together and what was said then, and all shares."""
+    lines = []
+    for row in rows:
+        made = row["proposed"]
+        said = " or ".join(row["group"]) or row["error"] or row["verdict"]
+        if made is not None:
+            then = " or ".join(made["named"]) or made["verdict"]
+            drawn = ["parts" if one["parts"] else "does not" for one in row["drawn"]]
+            said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
+    told = [
+        f"{one['hits']} of {one['of']} {SHARES[name]} ({one['low']:.0%} to {one['high']:.0%})"
+        for name, one in summary.items()
+    ]
+    return "\n".join([*lines, "", *told])
 
 
 def write_plan(

@@ -287,13 +287,15 @@ def _experiments(formula: Schema, made: Schema, measured: Schema) -> Schema:
         "lags": listed(QUANTITY),
     }
     follows = closed(varied, optional="profiles begins lags")
+    besides = {"label": NAMED, "unit": NAMED, "values": listed(QUANTITY)}
     entries = {
         "lasts": QUANTITY,
         "ends": closed({"is": formula, "below": QUANTITY}),
         "conditions": by_name({"type": "array", "minItems": 1}),
+        "settings": by_name(closed(besides, optional="label")),
         "start": by_name(formula),
         "inputs": by_name({"anyOf": [follows, closed({"is": formula})]}),
         "cost": {**made, "required": []},
         "sensors": measured,
     }
-    return closed(entries, optional="ends conditions start inputs cost sensors")
+    return closed(entries, optional="ends conditions settings start inputs cost sensors")

@@ -1,5 +1,6 @@
 """JSON Schema of the summaries of `workbench power`: of its sets, and of each of its questions."""
 
+from workbench.power.following import SHARES
 from workbench.power.planned import Foreseen
 from workbench.power.sensitivity import Changed
 from workbench.schemas.words import (
@@ -27,6 +28,7 @@ def power_summaries() -> dict[str, Schema]:
         "sheet_error": _sheet_error(),
         "left_out": _left_out(),
         "plan": _plan(),
+        "followed": _followed(),
     }
 
 
@@ -76,6 +78,22 @@ def _left_out() -> Schema:
         **ends,
     }
     return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
+
+
+def _followed() -> Schema:
+    away = closed({"from": TEXT, "predicted": NUMBER, "shown": or_null(NUMBER)})
+    texts = {name: TEXT for name in ("experiment", "verdict")}
+    flags = {name: FLAG for name in ("foreseen", "parts")}
+    made = closed({**texts, **flags, "named": listed(TEXT), "separations": listed(away)})
+    one = {
+        **{name: TEXT for name in ("rig", "planted", "verdict", "sentence", "error")},
+        "multiple": NUMBER,
+        **{name: listed(TEXT) for name in ("group", "sensors")},
+        "proposed": or_null(made),
+        "drawn": listed(made),
+    }
+    shares = {name: SHARE for name in SHARES}
+    return summary("power --next", _SETS, {**shares, "sets": listed(closed(one))})
 
 
 def _plan() -> Schema:

@@ -259,6 +259,7 @@ def _next() -> Schema:
             "duration": NUMBER,
             "inputs": by_name(profile),
             "conditions": by_name(ANY),
+            "settings": by_name(ANY),
         }
     )
     entries = {

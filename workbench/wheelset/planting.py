@@ -10,6 +10,7 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.fmu import CoSimulation
 from workbench.power.planting import Plantable, SheetError
+from workbench.system import System
 from workbench.wheelset import rig
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
@@ -19,6 +20,7 @@ from workbench.wheelset.rig import (
     plant,
     select,
     simulate,
+    stop_of,
     write_recording,
 )
 
@@ -120,6 +122,10 @@ class PlantedStops:
             "reference": hashlib.sha256(self.reference.read_bytes()).hexdigest(),
             "rig": hashlib.sha256(b"".join(file.read_bytes() for file in code)).hexdigest(),
         }
+
+    def following(self, experiment: Mapping[str, Any], system: System) -> "PlantedStops":
+        """The rig that makes an experiment of `workbench next`."""
+        return dataclasses.replace(self, scenarios=(stop_of(experiment, system),))
 
     def simulate(self, seed: int, gains: Mapping[str, float]) -> list[StopTruth]:
         """What happens in the stops."""

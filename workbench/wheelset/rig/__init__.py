@@ -5,7 +5,7 @@ Nothing here reads an estimator, and no estimator reads the truth that is writte
 
 from workbench.wheelset.rig.effects import CONSTANT_PADS, ORDINARY_PADS, Effects, plant
 from workbench.wheelset.rig.files import check_files, write_recording
-from workbench.wheelset.rig.proposed import proposed_stop
+from workbench.wheelset.rig.proposed import proposed_stop, stop_of
 from workbench.wheelset.rig.run import TRUTH, Drawn, Phases, StopTruth, simulate
 from workbench.wheelset.rig.scenarios import SCENARIOS, STANDARD, Conditions, Scenario, select
 from workbench.wheelset.rig.sensors import MEASURED, received, sample
@@ -30,5 +30,6 @@ __all__ = [
     "sample",
     "select",
     "simulate",
+    "stop_of",
     "write_recording",
 ]

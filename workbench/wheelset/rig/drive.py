@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-TRAIN_INERTIA = 7840.0  # [kg.m2] 16 t at the roller's circumference
+TRAIN_INERTIA = 7840.0  # [kg.m2] 16 t at the roller's circumference, which it imitates usually
 
 _OBSERVER_LAG = 0.005  # [s]
 _TORQUE_LAG = 0.003  # [s] of the inverter
@@ -36,13 +36,17 @@ class Drive:
     Parameters
     ----------
     inertia : [kg.m2] of the roller, as the drive knows it.
+    imitated : [kg.m2] that it lets the roller have.
     losses : of the roller, as the drive knows them.
     omega : [rad/s] at the start.
     dt : [s] period of the control.
     """
 
-    def __init__(self, inertia: float, losses: Losses, omega: float, dt: float) -> None:
+    def __init__(
+        self, inertia: float, imitated: float, losses: Losses, omega: float, dt: float
+    ) -> None:
         self._inertia = inertia
+        self._imitated = imitated
         self._losses = losses
         self._dt = dt
         self._follow = 1.0 - math.exp(-dt / _TORQUE_LAG)
@@ -55,7 +59,7 @@ class Drive:
         """Torque [N.m] until the next call; once stopped, the drive holds the roller still."""
         load = (self._momentum - self._inertia * omega) / _OBSERVER_LAG
         losses = self._losses.torque(omega)
-        share = 1.0 - self._inertia / TRAIN_INERTIA
+        share = 1.0 - self._inertia / self._imitated
         wanted = -_HOLDING * omega if stopped else share * (load - losses) + losses
         self._torque += self._follow * (wanted - self._torque)
         self._angle += omega * self._dt

@@ -11,9 +11,11 @@ from workbench.errors import InputError
 from workbench.experiments.candidates import Profile
 from workbench.recording import read_text
 from workbench.system import System
-from workbench.wheelset.rig.scenarios import DRY_FRICTION, Conditions, Scenario
+from workbench.wheelset.rig.drive import TRAIN_INERTIA
+from workbench.wheelset.rig.scenarios import FRICTION, Conditions, Scenario, Surface
 
 _NAME = "30_next"
+_SURFACES: Mapping[str, Surface] = {"dry": "dry", "wet": "wet"}
 _DEMAND = np.arange(0.0, 90.0, 0.05)  # [s] from the first, when a controller asks anew
 
 
@@ -33,20 +35,26 @@ def proposed_stop(result: Path, system: System) -> Scenario:
     remedy = "give the folder that 'workbench next' wrote for this rig"
     text = read_text(file, remedy)
     try:
-        return _stop(json.loads(text)["tried"][0], system)
+        return stop_of(json.loads(text)["tried"][0], system)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError):
         raise InputError(
             where=str(file),
-            found="no experiment that says speed, direction and pressure of a dry stop",
+            found="no experiment that says speed, direction, surfaces and pressure of a stop",
             expected="what 'workbench next' writes",
             remedy=remedy,
         ) from None
 
 
-def _stop(experiment: Mapping[str, Any], system: System) -> Scenario:
-    """A stop whose pressure follows the profile of an experiment."""
+def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
+    """A stop whose pressure follows the profile of an experiment, as `workbench next` writes it.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        If it asks for what the rig cannot do.
+    """
     said, asked = experiment["conditions"], experiment["inputs"]["pB"]
-    if system.experiments is None or {said["wheel_rail"], *said["discs"]} != {"dry"}:
+    if system.experiments is None:
         raise ValueError
     (varied,) = (one for one in system.experiments.varied if one.name == "pB")
     levels = tuple(map(float, asked["levels"]))
@@ -55,7 +63,8 @@ def _stop(experiment: Mapping[str, Any], system: System) -> Scenario:
     changes = np.flatnonzero(np.diff(demand)) + 1
     steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
     direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
-    conditions = Conditions(
-        float(said["initial_speed"]), float(demand[0]), "dry", ("dry",) * 3, direction
-    )
-    return Scenario(_NAME, conditions, DRY_FRICTION, None, True, steps)
+    rail, *discs = (_SURFACES[one] for one in (said["wheel_rail"], *said["discs"]))
+    speed, pressure = float(said["initial_speed"]), float(demand[0])
+    conditions = Conditions(speed, pressure, rail, tuple(discs), direction)
+    imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
+    return Scenario(_NAME, conditions, FRICTION[rail], None, True, steps, imitated)

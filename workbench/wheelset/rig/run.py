@@ -200,7 +200,7 @@ def _parts(
     rW = parameters["rW"]
     dt = 1.0 / RATE
     losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
-    drive = Drive(nominal["JR"], losses, omegaR, dt)
+    drive = Drive(nominal["JR"], scenario.imitated, losses, omegaR, dt)
     brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
     pads = Pads(effects, drawn.muDC, scenario.conditions.discs, phases.disc_thickness, dt)
     wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])

@@ -1,14 +1,15 @@
 """The stops that the rig can make: fourteen standard cases, and some that are none."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from workbench.errors import InputError, closest
+from workbench.wheelset.rig.drive import TRAIN_INERTIA
 
 Surface: TypeAlias = Literal["dry", "wet"]
 
-DRY_FRICTION, _WET_FRICTION = 0.40, 0.30  # at zero slip velocity
+FRICTION: Mapping[Surface, float] = {"dry": 0.40, "wet": 0.30}  # at zero slip velocity
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Scenario:
     patch : spell of lower friction, or None.
     protected : whether the wheel-slide protection is switched on.
     steps : demands that follow the first, (time after that [s], pressure [Pa]) each.
+    imitated : inertia that the drive lets the roller have [kg.m2].
     """
 
     name: str
@@ -60,6 +62,7 @@ class Scenario:
     patch: Patch | None
     protected: bool
     steps: tuple[tuple[float, float], ...] = ()
+    imitated: float = TRAIN_INERTIA
 
     def demand(self, braking: float) -> float:
         """Brake pressure that is asked for [Pa], a time [s] after the first demand."""
@@ -106,8 +109,8 @@ def _stop(
     """One row of the table: speed in km/h, pressure in bar, numbers of the wet discs."""
     discs: tuple[Surface, ...] = tuple("wet" if i in wet_discs else "dry" for i in (1, 2, 3))
     conditions = Conditions(speed / 3.6, pressure * 1e5, wheel_rail, discs, direction)
-    usual = _WET_FRICTION if wheel_rail == "wet" else DRY_FRICTION
-    return Scenario(name, conditions, usual if muWR is None else muWR, patch, protected, steps)
+    friction = FRICTION[wheel_rail] if muWR is None else muWR
+    return Scenario(name, conditions, friction, patch, protected, steps)
 
 
 def _stairs(*pressures: float) -> tuple[tuple[float, float], ...]:
