@@ -85,12 +85,14 @@ def propose(
     system, cases = before.system, before.cases
     about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
     scan = Scan(system, library, cases, workers, report, about)
-    able = _likeliest(scan.prospects)
-    every = estimated(system, library, cases, workers, report, able, about) if able else []
-    fitted: dict[tuple[str, ...], FittedLaw] = {}
-    for one in every:
-        fitted.setdefault(_called(one.law), one)
-    estimates = list(fitted.values())
+    estimates = _turning(scan.prospects)
+    if not estimates:
+        able = _likeliest(scan.prospects)
+        every = estimated(system, library, cases, workers, report, able, about) if able else []
+        fitted: dict[tuple[str, ...], FittedLaw] = {}
+        for one in every:
+            fitted.setdefault(_called(one.law), one)
+        estimates = list(fitted.values())
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
     decides = of_system(system.comparison, len(scan.prospects))
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
@@ -115,6 +117,27 @@ def propose(
     return proposal
 
 
+def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
+    """Laws that begin anew with each period, if one is likelier than all others.
+
+    They are small beside what they change, so that about what is known they are fitted well enough.
+    """
+    if not prospects or not _turns(prospects[0]):
+        return []
+    likeliest = [one for one in prospects if _turns(one)][:_TRIED]
+    return [
+        FittedLaw(
+            one, one.smoothness.evidence, one.smoothness.coefficients, one.smoothness.posterior
+        )
+        for one in likeliest
+        if one.smoothness.evidence > 0.0
+    ]
+
+
+def _turns(one: LawProspect) -> bool:
+    return one.law.influence is not None and one.law.influence.turns
+
+
 def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     """The best law of each place and of what it depends on, however it is carried.
 
@@ -124,7 +147,7 @@ def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     best: dict[tuple[str, ...], LawProspect] = {}
     for one in prospects:
         influence = one.law.influence
-        if one.smoothness.evidence <= 0.0:
+        if one.smoothness.evidence <= 0.0 or _turns(one):
             continue
         factors = () if influence is None else tuple(part.name for part in influence.factors)
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
@@ -135,7 +158,7 @@ def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
     first = sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
     wanted = {_called(one.law) for one in first}
-    return [one for one in prospects if _called(one.law) in wanted]
+    return [one for one in prospects if not _turns(one) and _called(one.law) in wanted]
 
 
 def _called(law: Law) -> tuple[str, ...]:

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.proposing.places import Law
+from workbench.proposing.places import CLOCK, Law, LawInfluence
 from workbench.proposing.splines import Knots
 from workbench.proposing.writing import Written, clock, effect, number, unit_of
 
 MARK = "proposed, not known physics"
 _ROUNDED = 0.01  # of the range, over which a kink is rounded: no event, and below what is resolved
 _MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
+_TURNS = 1e-5  # of an output, of a harmonic: no tolerance turns with a shaft
 _REACH, _KEPT = 10.0, 0.9  # sizes beyond which no law is sought; what of an output one may take
 
 
@@ -73,6 +74,7 @@ FORMS = (
     ),
 )
 SIDES = Form("Sides", "by its sign alone, as hysteresis does", "tanh({q}/{w})")
+HARMONIC = Form("Harmonic", "as a harmonic", "cosine*cos({a}) + sine*sin({a})")
 CONSTANT = Form("Constant", "always alike", "1.0")
 
 
@@ -98,6 +100,9 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenF
     knots : range of what it depends on; None of a constant.
     scale : of the output, where the law is added to it.
     """
+    if law.influence is not None and law.influence.turns:
+        yield WrittenForm(law, HARMONIC, _harmonic(law, law.influence, scale))
+        return
     if knots is None or law.influence is None:
         yield WrittenForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
@@ -106,6 +111,39 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenF
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
             yield WrittenForm(law, form, _written(law, form, knots, scale))
+
+
+def _harmonic(law: Law, influence: LawInfluence, scale: float) -> Written:
+    """A harmonic of a period that errors have; its phase differs from recording to recording."""
+    declared, equations = clock(influence)
+    unit = 1.0 if law.carrier.expression != "1.0" else scale
+    known = ", ".join(
+        filter(
+            None,
+            (unit_of(law.carrier.unit), f"min={number(-_KEPT * unit)}, max={number(_KEPT * unit)}"),
+        )
+    )
+    period = f"parameter Real period({unit_of(influence.unit)}) = {number(influence.span)}"
+    lines = [
+        *(f'parameter Real {one}({known}) = 0.0 "Part of {one}";' for one in ("cosine", "sine")),
+        f'{period} "As errors have it";',
+    ]
+    angle = f"{number(2.0 * np.pi)}*{CLOCK}/period"
+    return Written(
+        name=_name(law, HARMONIC),
+        about=f"{MARK}: {law.text}: {HARMONIC.text}",
+        place=law.place,
+        declarations=(*lines, *declared),
+        equations=equations,
+        change=f"{law.carrier.expression}*({HARMONIC.expression.format(a=angle)})",
+        annotation=effect(("cosine", "sine"), _TURNS * unit, law.place.slot.name, {}),
+    )
+
+
+def _name(law: Law, form: Form) -> str:
+    name = law.place.name + ("" if law.influence is None else law.influence.name)
+    where = {"1.0": "Added", law.place.nominal: "Times"}.get(law.carrier.expression, "Share")
+    return f"{name}{where}{form.name}"
 
 
 def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
@@ -131,16 +169,14 @@ def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
         shapes = {form.shape: values}
         given = ", ".join(filter(None, (unit_of(own), f"min={number(low)}, max={number(high)}")))
         lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
-    name = law.place.name + ("" if law.influence is None else law.influence.name)
-    where = {"1.0": "Added", law.place.nominal: "Times"}.get(law.carrier.expression, "Share")
     return Written(
-        name=f"{name}{where}{form.name}",
+        name=_name(law, form),
         about=f"{MARK}: {law.text}: {form.text}",
         place=law.place,
         declarations=(*lines, *declared),
         equations=equations,
         change=f"{law.carrier.expression}*s*({expression})",
-        annotation=effect("s", _MATTERS * unit, law.place.slot.name, shapes),
+        annotation=effect(("s",), _MATTERS * unit, law.place.slot.name, shapes),
     )
 
 

@@ -63,13 +63,12 @@ class FittedLaw:
     Attributes
     ----------
     prospect : about what is known.
-    deviance : of the fit, see `Linearised`.
     evidence : log of the marginal likelihood over that of what is known.
-    coefficients, posterior : of the function, (K,) and their covariance, (K, K).
+    coefficients, posterior : of the function, (K,) and their covariance, (K, K); of what turns,
+        cosine and sine of each recording.
     """
 
     prospect: LawProspect
-    deviance: float
     evidence: float
     coefficients: Vector
     posterior: Matrix
@@ -84,7 +83,12 @@ class FittedLaw:
 
         The shape is the function less its mean, which calibrated levels may take.
         """
-        knots = self.prospect.knots
+        knots, influence = self.prospect.knots, self.law.influence
+        if influence is not None and influence.turns:
+            size = np.hypot(*self.coefficients.reshape(-1, 2).T)
+            wave = np.cos(np.linspace(0.0, 2.0 * np.pi, _POINTS))
+            sigma = np.full(_POINTS, np.sqrt(np.trace(self.posterior)) / size.size)
+            return np.linspace(0.0, influence.span, _POINTS), size.mean() * wave, sigma, sigma
         if knots is None:
             sigma = np.sqrt(np.diag(self.posterior))
             return np.zeros(1), self.coefficients, sigma, np.zeros(1)
@@ -214,8 +218,10 @@ def _estimate(
 def _fitted(
     simulations: Simulations, base: Fitted, effect: Free, prospect: LawProspect
 ) -> FittedLaw:
+    """The likelier of all rounds: smoothness about a point may promise what bends away from it."""
     smoothness, best = prospect.smoothness, base
     keys = [(effect.name, name) for name in effect.sizes]
+    found: list[FittedLaw] = []
     for _ in range(_ROUNDS):
         inverse: Matrix = np.asarray(np.linalg.inv(smoothness.covariance), np.float64)
         effect = replace(effect, inverse=inverse)
@@ -224,22 +230,17 @@ def _fitted(
         start = _started(fit, best, keys, smoothness.coefficients)
         best = fitted(fit, start, active, spread=start.spread)
         lin = fit.linearise(best.linearised, active)
-        joint = fit.quadratics(lin)
-        N, g = eliminated(joint, keys)
+        N, g = eliminated(fit.quadratics(lin), keys)
         # Of the data alone, about no function: the prior is put in anew.
         now = np.array([best.point.sizes[key] for key in keys])
         N = N - effect.precision
         g = g - effect.precision @ now - N @ now
-        smoothness = smoothest(N, g)
-    gained = base.linearised.deviance - best.linearised.deviance
-    spread = np.linalg.slogdet(np.eye(len(keys)) + N @ np.linalg.inv(effect.precision))[1]
-    return FittedLaw(
-        prospect,
-        best.linearised.deviance,
-        0.5 * (gained - float(spread)),
-        np.array([best.point.sizes[key] for key in keys]),
-        smoothness.posterior,
-    )
+        gained = base.linearised.deviance - best.linearised.deviance
+        spread = np.linalg.slogdet(np.eye(len(keys)) + N @ smoothness.covariance)[1]
+        posterior: Matrix = np.asarray(np.linalg.inv(N + effect.precision), np.float64)
+        found.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
+        smoothness = smoothest(N, g, most=prospect.most)
+    return max(found, key=lambda one: one.evidence)
 
 
 def _started(fit: Fit, best: Fitted, keys: Sequence[Key], coefficients: Vector) -> Linearised:

@@ -1,6 +1,6 @@
 """Where a law may act, and what it may depend on: outputs of slots, and what is present there."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,6 +16,7 @@ from workbench.units import check_unit, quotient
 CLOCK = "clock"  # of a generated class [s]
 LOST = "lost"  # of a generated class: time constant with which heat is lost [s]
 _LOSES = (10.0, 3.0, 1.0)  # such time constants, by the longest recording: a tenth goes, to most
+_THERE = 0.02  # share of its largest size from which on an input is there
 _VARIES = 1e-3  # share of its size by which a quantity has to vary, to be an influence
 
 
@@ -74,10 +75,12 @@ class LawInfluence:
 
     Attributes
     ----------
-    kind : "value", "size" or "rate" of an input, "time", or "work", the integral of the size of a
-        power.
+    kind : "value", "size" or "rate" of an input, "time", "since", the time for which an input has
+        been there, "work", the integral of the size of a power, or "turn", that of the size of an
+        input, or time, over and over again.
     factors : inputs, and an output that is a coefficient, whose product it is.
-    span : [s] over which a rate is taken; time constant with which work is lost, 0 if it is kept.
+    span : [s] over which a rate is taken; time constant with which work is lost, 0 if it is kept;
+        period of what turns; size [unit] above which an input is there.
     """
 
     kind: str
@@ -96,10 +99,17 @@ class LawInfluence:
         return self.kind == "work" and self.span > 0.0
 
     @property
+    def turns(self) -> bool:
+        """Whether it begins anew with each period, with a phase of its own in each recording."""
+        return self.kind == "turn"
+
+    @property
     def unit(self) -> str:
         """Its unit, empty where it is not known."""
-        if self.kind == "time":
+        if self.kind in ("time", "since") or (self.turns and not self.factors):
             return "s"
+        if self.turns:
+            return quotient(self.factors[0].unit, "Hz")
         if self.kind == "rate" and self.factors[0].unit:
             return quotient(self.factors[0].unit, "s")
         return "J" if self.kind == "work" else self.factors[0].unit
@@ -109,6 +119,12 @@ class LawInfluence:
         """What it is, for people."""
         if self.kind == "time":
             return "time since the beginning"
+        if self.turns:
+            clock = f"the way of {self.factors[0].name}" if self.factors else "time"
+            own = f" ({self.factors[0].text})" if self.factors else ""
+            return f"{clock}{own}, with a period of {self.span:.4g} {self.unit}"
+        if self.kind == "since":
+            return f"the time since {self.factors[0].name} ({self.factors[0].text}) began"
         what = " x ".join(f"{one.name} ({one.text})" for one in self.factors)
         before = {"size": "the size of ", "rate": "the rate of ", "work": "heat, the work of "}
         lost = f", lost with a time constant of {self.span:g} s" if self.cools else ""
@@ -119,10 +135,13 @@ class LawInfluence:
         """What it is, by names."""
         if self.kind == "time":
             return "time"
+        if self.turns:
+            return f"turns of {self.factors[0].name}" if self.factors else "turns in time"
         product = "*".join(one.name for one in self.factors)
         if self.kind == "size":
             return f"|{product}|"
-        return {"rate": "rate of ", "work": "heat of "}.get(self.kind, "") + product
+        before = {"rate": "rate of ", "work": "heat of ", "since": "time since "}
+        return before.get(self.kind, "") + product
 
     @property
     def expression(self) -> str:
@@ -139,8 +158,12 @@ class LawInfluence:
     @property
     def rate(self) -> str:
         """Of `CLOCK`, as an expression; empty where it is not needed."""
-        if self.kind == "time":
+        if self.kind == "time" or (self.turns and not self.factors):
             return "1.0"
+        if self.turns:
+            return f"noEvent(abs({self.factors[0].name}))"
+        if self.kind == "since":
+            return f"tanh(noEvent(abs({self.factors[0].name}))/{self.span!r})"
         if self.kind == "rate":
             return f"({self.factors[0].name} - {CLOCK})/{self.span!r}"
         if self.kind == "work":
@@ -150,7 +173,7 @@ class LawInfluence:
 
     def course(self, place: Place, watched: Mapping[str, Vector], time: Vector) -> Vector:
         """Its values along a recording, (n,)."""
-        if self.kind == "time":
+        if self.kind == "time" or not self.factors:
             since: Vector = time - time[0]
             return since
         product: Vector = np.prod([place.at(watched, one.name) for one in self.factors], axis=0)
@@ -161,7 +184,9 @@ class LawInfluence:
         if self.kind == "rate":
             slope: Vector = (product - _followed(product, time, self.span)) / self.span
             return slope
-        power = np.abs(product)
+        power = np.abs(product)  # or a speed
+        if self.kind == "since":
+            power = np.tanh(power / self.span)
         if self.cools:
             return self.span * _followed(power, time, self.span)
         done: Vector = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time)))
@@ -278,6 +303,26 @@ def laws(
         yield from (Law(place, carrier, influence) for influence in able)
 
 
+def turning_laws(
+    place: Place,
+    recordings: Sequence[tuple[Vector, Mapping[str, Vector]]],
+    period: Callable[[LawInfluence], float | None],
+) -> Iterator[Law]:
+    """Laws at a place that begin anew with each period, in time or with what an input turns.
+
+    Parameters
+    ----------
+    recordings : as of `laws`.
+    period : in the unit of an influence, None where there is none.
+    """
+    speeds = [one for one in place.inputs if one.unit and quotient(one.unit, "Hz") in ("m", "rad")]
+    for factors in ((), *((one,) for one in speeds)):
+        length = period(LawInfluence("turn", factors))
+        if length is not None:
+            for carrier in _carriers(place, [watched for _, watched in recordings]):
+                yield Law(place, carrier, LawInfluence("turn", factors, length))
+
+
 def _varies(recordings: Sequence[Vector]) -> bool:
     """Whether something varies within any recording: between them, tolerances do."""
     size = max(float(np.abs(one).max()) for one in recordings)
@@ -311,6 +356,9 @@ def _influences(
             yield LawInfluence("size", (one,))
         if _varies(own):
             yield LawInfluence("rate", (one,), span)
+        there = _THERE * float(np.abs(values).max())
+        if max(abs(float(course[0])) for course in own) < there:
+            yield LawInfluence("since", (one,), float(f"{there:.2g}"))
     yield LawInfluence("time")
     known = [one for one in place.inputs if one.unit not in ("", "1")]
     for count in (2, 3):

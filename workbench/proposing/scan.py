@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +20,9 @@ from workbench.diagnosis.selection import anew
 from workbench.diagnosis.slots import read_slots
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
-from workbench.proposing.places import Law, Place, laws, places
-from workbench.proposing.splines import COEFFICIENTS, Knots, Smoothness, smoothest
+from workbench.proposing.periods import Period, strongest_period
+from workbench.proposing.places import Law, LawInfluence, Place, laws, places, turning_laws
+from workbench.proposing.splines import APART, COEFFICIENTS, Knots, Smoothness, smoothest
 from workbench.proposing.writing import PACKAGE, Written, extended_library, unit_of
 from workbench.system import OBSERVER, System
 
@@ -29,6 +30,7 @@ _AT_ONCE = 300  # columns of derivatives: some hundred megabytes
 _ROUNDING = 1e-8  # share of what an unknown explains alone
 _SPAN = 0.25  # of what lasts, over which a rate is taken: it settles within that
 _SEEN = 0.01  # share of the samples that are beyond the ends of a function
+_BEGINS = 10.0  # of what lasts, that a beginning takes at most
 _SIZE = "d"  # of a probe
 
 
@@ -38,7 +40,7 @@ class LawProspect:
 
     Attributes
     ----------
-    knots : where its function lives; None for a constant.
+    knots : where its function lives; None for a constant, and for what turns.
     largest : of the output of its place, without it.
     """
 
@@ -46,6 +48,17 @@ class LawProspect:
     knots: Knots | None
     smoothness: Smoothness
     largest: float
+
+    @property
+    def most(self) -> float:
+        """What a law may change beforehand, see `_most`."""
+        return _most(self.law, self.largest)
+
+
+def _most(law: Law, largest: float) -> float:
+    """What a law may change beforehand: an output by its own size, one that is zero by anything."""
+    relative = law.carrier.expression != "1.0"
+    return 1.0 if relative else largest or np.inf
 
 
 def effect_at(name: str, library: Library, place: Place, size: str) -> Effect:
@@ -87,6 +100,7 @@ class Scan:
         report: Reporter,
         about: Fitted,
     ) -> None:
+        self._lasting = system.comparison.lasting
         base = system.models[OBSERVER].name
         where = tuple(places(library, base, read_slots(library, base)))
         names = list(
@@ -114,6 +128,7 @@ class Scan:
                 every = [law for place in where for law in laws(place, self._recordings, span)]
                 report(f"{len(every)} laws in {len(where)} places")
                 found = self._judged(simulations, values, every)
+                found += self._turning(simulations, values, where)
         self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)
 
     def _judged(
@@ -143,9 +158,83 @@ class Scan:
                 keys = [(law.place.name, f"c{k}") for k in range(count)]
                 more = [one[:, at : at + count] for one in derivatives]
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
-                smoothness = smoothest(*eliminated(joint, keys))
-                found.append(LawProspect(law, knots, smoothness, self._largest(law.place)))
+                largest = self._largest(law.place)
+                smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
+                found.append(LawProspect(law, knots, smoothness, largest))
                 at += count
+        return found
+
+    def _turning(
+        self,
+        simulations: Simulations,
+        values: Sequence[Mapping[str, float]],
+        where: Sequence[Place],
+    ) -> list[LawProspect]:
+        """Laws that begin anew with the period that errors have most of, each phase its own.
+
+        Of all periods that are told apart each is as likely beforehand.
+        """
+        periods: dict[LawInfluence, Period | None] = {}
+        every = []
+        for place in where:
+
+            def period(influence: LawInfluence, place: Place = place) -> float | None:
+                if influence not in periods:
+                    periods[influence] = self._period(simulations, place, influence)
+                found = periods[influence]
+                return None if found is None else found.length
+
+            every += list(turning_laws(place, self._recordings, period))
+        waves = [self._waves(law) for law in every]
+        columns = [
+            Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+            for law in every
+            for _ in range(2)
+        ]
+        if not columns:
+            return []
+        courses = [np.hstack([wave[k] for wave in waves]) for k in range(len(self._recordings))]
+        derivatives = simulations.responses(values, columns, courses)
+        found = []
+        for n, law in enumerate(every):
+            assert law.influence is not None
+            own = [one[:, 2 * n : 2 * n + 2] for one in derivatives]
+            keys = [(law.place.name, f"c{k}") for k in range(2 * len(own))]
+            more = [np.zeros((len(one), len(keys))) for one in own]
+            for k, one in enumerate(own):
+                more[k][:, 2 * k : 2 * k + 2] = one
+            joint = self._fit.quadratics(self.base.linearised.extended(keys, more), keys)
+            largest = self._largest(law.place)
+            likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
+            period_ = periods[replace(law.influence, span=0.0)]
+            assert period_ is not None
+            evidence = likeliest.evidence - float(np.log(period_.tried))
+            likeliest = replace(likeliest, evidence=evidence)
+            found.append(LawProspect(law, None, likeliest, largest))
+        return found
+
+    def _period(
+        self, simulations: Simulations, place: Place, influence: LawInfluence
+    ) -> Period | None:
+        """The period that errors have most of, along an influence."""
+        middles = [one.blocks.mean(axis=1).astype(int) for one in simulations.recordings]
+        clocks = [
+            influence.course(place, watched, time)[at]
+            for (time, watched), at in zip(self._recordings, middles, strict=True)
+        ]
+        lin = self.base.linearised
+        return strongest_period([one.errors for one in lin.evidence], clocks, lin.lasting)
+
+    def _waves(self, law: Law) -> list[Matrix]:
+        """Carrier times cosine and sine in each recording, (n, 2)."""
+        assert law.influence is not None
+        found = []
+        for time, watched in self._recordings:
+            angle = (
+                law.influence.course(law.place, watched, time) * 2.0 * np.pi / law.influence.span
+            )
+            carrier = law.carrier.course(law.place, watched)
+            found.append(carrier[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
         return found
 
     def _largest(self, place: Place) -> float:
@@ -166,6 +255,8 @@ class Scan:
             low, high = 0.5 * _SEEN, 1.0 - 0.5 * _SEEN
         ends = np.quantile(np.concatenate(courses), (low, high))
         knots = Knots(float(ends[0]), float(ends[1]))
+        if law.influence.kind == "since":  # what is slower is a function of time
+            knots = Knots(0.0, min(knots.high, _BEGINS * self._lasting))
         return knots, [
             one[:, None] * knots.basis(course)
             for one, course in zip(carriers, courses, strict=True)

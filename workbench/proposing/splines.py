@@ -16,6 +16,8 @@ from workbench.fmu import Matrix, Vector
 COEFFICIENTS = 10
 """Of one function: seven intervals, of which a bend takes one."""
 _LENGTHS = (0.7, 1.5, 3.0, 6.0)  # distances of knots: from a bend at each to nearly straight
+APART = (1e-3,)
+"""Of coefficients none of which is like the next."""
 _VARIANCES = np.logspace(-3.0, 7.0, 41)  # over that which the data just show
 _JITTER = 1e-6  # of the covariance, so that it has an inverse
 
@@ -71,12 +73,16 @@ def kernel(length: float, count: int = COEFFICIENTS) -> Matrix:
     return found
 
 
-def smoothest(N: Matrix, g: Vector) -> Smoothness:
+def smoothest(
+    N: Matrix, g: Vector, lengths: tuple[float, ...] = _LENGTHS, most: float = np.inf
+) -> Smoothness:
     """Size and length under which the data are likeliest.
 
     Parameters
     ----------
     N, g : chi-squared is c'N c + 2 g'c + constant; other unknowns are eliminated.
+    lengths : that are tried; `APART` of coefficients that do not follow each other.
+    most : standard deviation beforehand, at most.
 
     Notes
     -----
@@ -85,13 +91,13 @@ def smoothest(N: Matrix, g: Vector) -> Smoothness:
     """
     best: tuple[float, Matrix] | None = None
     count = g.size
-    for length in _LENGTHS if count > 1 else (1.0,):
+    for length in lengths if count > 1 else APART:
         K = kernel(length, count)
         root = np.linalg.cholesky(K)
         values, vectors = np.linalg.eigh(root.T @ N @ root)
         values = np.maximum(values, 0.0)
         squares = (vectors.T @ (root.T @ g)) ** 2
-        for variance in _VARIANCES / max(values.max(), 1e-300):
+        for variance in np.minimum(_VARIANCES / max(values.max(), 1e-300), most**2):
             spread = 1.0 + variance * values
             found = 0.5 * float((variance * squares / spread - np.log(spread)).sum())
             if best is None or found > best[0]:

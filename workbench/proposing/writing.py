@@ -111,9 +111,13 @@ def unit_of(unit: str) -> str:
     return f'unit="{unit}"' if unit else ""
 
 
-def effect(size: str, matters: float, slot: str, shapes: Mapping[str, tuple[float, ...]]) -> str:
+def effect(
+    sizes: tuple[str, ...], matters: float, slot: str, shapes: Mapping[str, tuple[float, ...]]
+) -> str:
     """Annotation of an effect."""
-    parts = [f'size="{size}"', f"matters={number(matters)}", f'slots={{"{slot}"}}']
+    names = ", ".join(f'"{one}"' for one in sizes)
+    size = names if len(sizes) == 1 else f"{{{names}}}"
+    parts = [f"size={size}", f"matters={number(matters)}", f'slots={{"{slot}"}}']
     if shapes:
         tried = ", ".join(
             f"{name}={{{', '.join(map(number, values))}}}" for name, values in shapes.items()
