@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.stats import chi2
 
 import workbench as wb
 from workbench.__main__ import main
@@ -20,7 +21,7 @@ from workbench.diagnosis.rivals import read_rivals
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.experiments import NextStop, RankedExperiment, next_stop
-from workbench.experiments.candidates import Profile
+from workbench.experiments.candidates import Profile, drawn, every_setting, other_profiles
 from workbench.experiments.separation import precision, refitted, told_apart
 from workbench.system import System
 from workbench.system_experiments import SINE, STAIRCASE, STEP, VariedInput
@@ -158,6 +159,7 @@ Tc = "34.3"
 range = ["25 W", "35 W"]
 every = "60 s"
 """
+SETTING = "[next.settings.{}]\nvalues = [{}]\nunit = '{}'\n[next.start]"
 G = 0.3  # planted [W/K]
 WARM = 30.0 / (G + 0.4)  # [K] at 30 W, the casing at four fifths of it
 
@@ -247,6 +249,18 @@ def test_the_separation_is_what_recordings_then_show(
         expected = np.sqrt(one.prediction.apart[0, 1])
         shown = parted(block, [*mild, *named_anew(made(block, one))], "Draught", "Radiation")
         assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
+
+
+def test_each_experiment_is_drawn_as_often(block: System) -> None:
+    """Seven profiles in 7000 draws: chi-squared of six degrees of freedom, one in a thousand."""
+    assert block.experiments is not None
+    rng = np.random.default_rng(8)
+    (first,) = every_setting(block.experiments)
+    every = [first, *other_profiles(block.experiments, first)]
+    found = [every.index(drawn(block.experiments, rng)) for _ in range(7000)]
+    counts = np.bincount(found, minlength=len(every))
+    assert len(every) == 7
+    assert np.sum((counts - 1000.0) ** 2 / 1000.0) < chi2.isf(1e-3, 6)
 
 
 def test_the_cost_is_what_the_file_says(proposed: NextStop) -> None:
@@ -340,6 +354,9 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(
         ("[next.inputs.P]", "[next.inputs.Q]", "unknown key 'Q'"),
         ('T = "42.9"', 'T = "42.9 + begin"', "'begin'"),
         ('T = "42.9"', 'Tx = "42.9"', "a continuous state of the model"),
+        ("[next.start]", SETTING.format("K", "'2 m'", "m"), "no signal, parameter or condition"),
+        ("[next.start]", SETTING.format("share", "", "1"), "one value or more"),
+        ("[next.start]", SETTING.format("share", "'2 m'", "s"), "a unit of another dimension"),
     ],
 )
 def test_a_mistake_in_what_may_be_varied_is_refused(

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,18 @@ import pytest
 import workbench as wb
 from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
-from workbench.experiments import NextStop, RankedExperiment
+from workbench.diagnosis.rivals import Rivals
+from workbench.experiments import NextStop, RankedExperiment, foreseen, next_stop
+from workbench.experiments.candidates import Experiment, every_setting
 from workbench.system import System
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, proposed_stop
+from workbench.wheelset.rig import (
+    CONSTANT_PADS,
+    SCENARIOS,
+    Effects,
+    plant,
+    proposed_stop,
+    stop_of,
+)
 
 from .distances import parted
 from .recordings import record
@@ -110,3 +120,69 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
         "No experiment here likely parts FxGain and DriveTorqueGain"
     )
     assert list(proposed.sensors) == ["force in the guidance arms"]
+
+
+def other_surface(system: System, rail: str, imitated: float) -> Experiment:
+    """A stop from 160 km/h with a staircase, on a rail, with an inertia that the drive imitates."""
+    assert system.experiments is not None
+    fixed: dict[str, object] = {"initial_speed": 160.0 / 3.6, "direction": 1}
+    fixed |= {"wheel_rail": rail, "imitated": imitated}
+    (one,) = (
+        experiment
+        for experiment in every_setting(system.experiments)
+        if all(experiment.settings[name].value == value for name, value in fixed.items())
+    )
+    return one
+
+
+def of_two(
+    system: System, planted: str, names: list[str], folder: Path
+) -> tuple[list[Case], Rivals, Effects]:
+    """Two stops alike with something planted, what they leave undecided, and what was planted."""
+    effects = plant(CONSTANT_PADS, [planted])
+    cases = two_stops(system, effects, folder / "stops")
+    found = wb.diagnose(system, cases, effects=names, out=folder, workers=1, report=lambda _: None)
+    assert found.rivals is not None
+    assert [one.effects for one in found.rivals.models] in (
+        [(a,), (b,)] for a, b in permutations(names)
+    )
+    return cases, found.rivals, effects
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("planted", "names", "rail", "imitated"),
+    [
+        ("creep_stiffness=0.16", ["CreepStiffness", "WheelLoad"], "wet", 7840.0),
+        ("fx_gain=0.016", ["FxGain", "DriveTorqueGain"], "dry", 1500.0),
+    ],
+)
+def test_rivals_that_bend_far_are_fitted_again_in_full(
+    planted: str, names: list[str], rail: str, imitated: float, system: System, tmp_path: Path
+) -> None:
+    """Where friction is calibrated anew, both fit; what derivatives promise is not shown then.
+
+    The decision is that of the diagnosis, which tells apart beyond 40 of chi-squared.
+    """
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    cases, rivals, effects = of_two(system, planted, names, tmp_path)
+    (one,) = foreseen(system, rivals, [other_surface(system, rail, imitated)], 1)
+    true, other = ([model.effects for model in rivals.models].index((name,)) for name in names)
+    expected = np.sqrt(max(0.0, one.prediction.apart[true, other]))
+    stop = stop_of(one.to_dict(), system)
+    record(stop, 30, effects, tmp_path / stop.name)
+    shown = parted(system, [*cases, read_case(tmp_path / stop.name, system)], *names)
+    assert (shown**2 > 40.0) == (expected**2 > 40.0) == (imitated < 7840.0)
+    assert shown == pytest.approx(expected, rel=0.4, abs=4.0)
+
+
+@pytest.mark.long
+def test_what_derivatives_alone_promise_is_not_proposed(system: System, tmp_path: Path) -> None:
+    """On wet rails, derivatives part stiffness from load by ten deviations; full fits do not."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    names = ["CreepStiffness", "WheelLoad"]
+    _, rivals, _ = of_two(system, "creep_stiffness=0.16", names, tmp_path)
+    proposed = next_stop(system, rivals, 1, lambda _: None)
+    assert not proposed.parts
+    assert proposed.tried[0].prediction.separation < 4.0
+    assert max(one.prediction.separation for one in proposed.tried) < 6.4

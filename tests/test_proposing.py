@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from scipy.stats import multivariate_normal
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import chi2, multivariate_normal
 
 from workbench.__main__ import main
 from workbench.case import read_cases
@@ -19,7 +20,10 @@ from workbench.diagnosis.extension import variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.slots import read_slots
+from workbench.fmu import Matrix
 from workbench.modelica import read_library
+from workbench.power.left_out import SHARES, summarise_left_out
+from workbench.proposing.periods import strongest_period
 from workbench.proposing.places import LawInfluence, places
 from workbench.proposing.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.recording import Vector
@@ -35,6 +39,7 @@ pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
+PERIOD = 1.885  # [m] of way
 
 
 def test_evidence_is_the_density_of_what_was_measured() -> None:
@@ -197,15 +202,114 @@ def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path: Path) -> 
 
 
 def test_slots_that_are_proposed_rightly_are_counted() -> None:
-    shown = {"rig": "--seed 1", "verdict": "unexplained", "error": "", "named": [], "before": None}
-    shown |= {"left_out": ["A"], "laws": ["a law"], "slots": ["a"], "after": None}
+    shown = {"rig": "--seed 1", "verdict": "unexplained", "error": "", "named": [], "late": []}
+    shown |= {"left_out": ["A"], "laws": ["a law"], "slots": ["a"], "asked": True}
+    shown |= {"before": 11.0, "after": 3.0, "after_with_it": 1.0, "slot_right": True}
     rows = [
-        shown | {"slot_right": True},
+        shown,
+        shown | {"after": 3.1},  # 79 % of what the true form gains
         shown | {"slot_right": False, "slots": [], "laws": []},
-        shown | {"slot_right": False, "verdict": "nothing"},  # which recordings do not show
-        shown | {"slot_right": None, "left_out": []},  # in no catalogue
+        shown | {"slot_right": False, "verdict": "found", "asked": False, "laws": []},  # a twin
+        shown | {"left_out": [], "after_with_it": None},  # in no catalogue
+        shown | {"left_out": [], "slot_right": None, "asked": False, "laws": []},  # no cause
     ]
-    assert format_left_out(rows).endswith("right slot in 1 of 2 sets that show the cause")
+    found = summarise_left_out(rows)
+    counted = {name: (one["hits"], one["of"]) for name, one in found.items()}
+    assert counted == {"right_slot": (3, 4), "gain": (1, 2), "outside": (1, 1), "clean": (0, 1)}
+    assert f"3 of 4 {SHARES['right_slot']} (19% to 99%)" in format_left_out(found, rows)
+
+
+# --- laws that turn, and that begin ---
+
+
+def swinging(rng: np.random.Generator, size: float) -> tuple[list[Matrix], list[Vector]]:
+    """White errors of two channels, one of which swings with the way of what slows down."""
+    errors, clocks = [], []
+    for speed, count in ((30.0, 500), (44.0, 800)):
+        time = 0.05 * np.arange(count)
+        way = speed * time - 0.5 * speed / time[-1] * time**2
+        noise = rng.standard_normal((count, 2))
+        noise[:, 1] += size * np.cos(2.0 * np.pi * way / PERIOD + rng.uniform(0.0, 6.0))
+        errors.append(noise)
+        clocks.append(way)
+    return errors, clocks
+
+
+def test_a_period_is_found_whatever_its_phase_in_each_recording() -> None:
+    """Within what two frequencies have to differ by to lose a period over the longest way."""
+    errors, clocks = swinging(np.random.default_rng(5), 1.0)
+    found = strongest_period(errors, clocks, 20)
+    assert found is not None
+    assert abs(1.0 / found.length - 1.0 / PERIOD) < 0.5 / max(map(np.ptp, clocks))
+
+
+def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance() -> None:
+    """The largest of M sums of 8 squares: by Boole, one in a hundred is beyond this quantile."""
+    rng, beyond = np.random.default_rng(6), 0
+    for _ in range(40):
+        errors, clocks = swinging(rng, 0.0)
+        found = strongest_period(errors, clocks, 20)
+        assert found is not None
+        fast = [one - uniform_filter1d(one, 20, axis=0, mode="nearest") for one in errors]
+        power = 0.0
+        for own, clock in zip(fast, clocks, strict=True):
+            wave = np.exp(2j * np.pi * clock / found.length)
+            wave *= np.gradient(clock) / found.length <= 0.4
+            power += 2.0 * np.sum(np.abs(wave @ own) ** 2) / np.count_nonzero(wave)
+        # Between frequencies that are told apart there are others: four for each.
+        beyond += power > chi2.isf(0.01 / (4.0 * found.tried), 8)
+    assert beyond <= 2
+
+
+def test_too_few_periods_are_a_function_of_time() -> None:
+    rng = np.random.default_rng(7)
+    assert strongest_period([rng.standard_normal((12, 1))], [np.arange(12.0)], 5) is None
+    assert strongest_period([rng.standard_normal((200, 1))], [np.zeros(200)], 5) is None
+
+
+def test_a_law_changes_an_output_by_its_own_size_beforehand() -> None:
+    """Reference: the normal distribution of one coefficient with a prior of that deviation."""
+    N, g = np.array([[4.0]]), np.array([-40.0])
+    free, held = smoothest(N, g), smoothest(N, g, most=1.0)
+    assert free.coefficients[0] == pytest.approx(10.0, rel=0.01)
+    assert held.coefficients[0] == pytest.approx(40.0 / 5.0, rel=1e-5)
+    assert held.evidence == pytest.approx(0.5 * (40.0**2 / 5.0 - np.log(5.0)), rel=1e-5)
+    assert held.evidence < free.evidence
+
+
+def test_the_time_since_an_input_began_does_not_count_before(folder: Path) -> None:
+    system = load_system(folder)
+    library = read_library(system.library)
+    base = system.models[OBSERVER].name
+    (outlet,) = places(library, base, read_slots(library, base))
+    (level,) = (one for one in outlet.inputs if one.name == "h")
+    time = np.linspace(0.0, 10.0, 1001)
+    watched = {f"{outlet.slot.name}.h": np.where(time < 4.0, 0.0, -3.0)}
+    course = LawInfluence("since", (level,), 0.06).course(outlet, watched, time)
+    # Where it jumps, the mean of both ends of a step counts: half a sample.
+    assert_allclose(course, np.maximum(0.0, time - 4.0), atol=0.006)
+
+
+@pytest.mark.long
+def test_an_outlet_that_pulses_is_proposed_with_its_period(tmp_path: Path) -> None:
+    folder = recorded(
+        tmp_path / "tank",
+        lambda time, level: outlet(level) * (1.0 + 0.1 * math.sin(2.0 * math.pi * time / 41.0)),
+    )
+    options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
+    told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
+    (law,) = told["laws"]
+    assert law["class"].endswith("Harmonic")
+    assert (law["slot"], "time, with a period of" in law["text"]) == ("outlet", True)
+    # Within half a period over a recording of 600 s.
+    period = float(law["text"].partition("with a period of ")[2].split()[0])
+    assert abs(600.0 / period - 600.0 / 41.0) < 0.5
+    # A share of what leaves, whatever its phase.
+    size = law["parameters"]["amplitude"]
+    assert size["unit"] == "1"
+    assert size["low"] < 0.1 < size["high"]
+    assert (tmp_path / "out" / "proposed" / "functions.png").is_file()
 
 
 def test_nothing_is_proposed_where_nothing_is_missing(

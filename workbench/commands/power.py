@@ -27,7 +27,7 @@ from workbench.power import (
 )
 from workbench.power.diagnosing import library_effects
 from workbench.power.following import follow_proposals, summarise_following
-from workbench.power.left_out import propose_left_out
+from workbench.power.left_out import propose_left_out, summarise_left_out
 from workbench.power.planned import foresee
 from workbench.power.planting import Group, plan_sheet_errors, some
 from workbench.power.sensitivity import values, vary_sets
@@ -167,8 +167,9 @@ def _left_out(
         workers=options.workers,
         report=output.stage,
     )
-    write_left_out(rows, _provenance(options, system, rig, interrupted), out)
-    return _told(output, format_left_out(rows), out / "left_out.json", interrupted)
+    summary = summarise_left_out(rows)
+    write_left_out(summary, rows, _provenance(options, system, rig, interrupted), out)
+    return _told(output, format_left_out(summary, rows), out / "left_out.json", interrupted)
 
 
 def _thresholds(

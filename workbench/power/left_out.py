@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,37 @@ from workbench.case import read_cases
 from workbench.diagnosis import Effect, diagnose
 from workbench.modelica import Library
 from workbench.power.planting import Group, Planting
+from workbench.power.statistics import share
 from workbench.power.virtual_rig import VirtualRig
 from workbench.proposing import Proposal, needs_law, propose
 from workbench.system import System
+
+_WORTH = 0.8  # of what the true form gains
+
+SHARES = {
+    "right_slot": "sets with the right slot, of those whose cause nothing else explains",
+    "gain": "laws that gain four fifths of what the true form gains",
+    "outside": "of them, sets whose cause is in no catalogue",
+    "clean": "sets without a cause for which something is proposed",
+}
+"""Shares of `summarise_left_out`, by what they count."""
+
+
+def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Shares, see `SHARES`; what other effects or clocks explain as well asks for no law."""
+    asked = [row for row in rows if row["asked"] and row["slot_right"] is not None]
+    known = [row for row in asked if row["laws"] and row["after_with_it"] is not None]
+    clean = [row for row in rows if row["slot_right"] is None and not row["left_out"]]
+    return {
+        "right_slot": share(row["slot_right"] for row in asked),
+        "outside": share(row["slot_right"] for row in asked if not row["left_out"]),
+        "gain": share(map(_gains, known)),
+        "clean": share(bool(row["laws"]) for row in clean),
+    }
+
+
+def _gains(row: Mapping[str, Any]) -> bool:
+    return bool(row["before"] - row["after"] >= _WORTH * (row["before"] - row["after_with_it"]))
 
 
 def propose_left_out(
@@ -62,16 +90,21 @@ def _row(
 ) -> dict[str, Any]:
     planted = [one for one in effects if one.name in planting.effects]
     others = [one for one in effects if one not in planted]
+    acting = {slot for one in planted for slot in one.slots}
+    acting |= {one.slot for one in rig.plantables if one.name in planting.gains and one.slot}
     row: dict[str, Any] = {
         "rig": planting.options,
         "left_out": [one.name for one in planted],
         "verdict": "failed",
         "named": [],
+        "late": [],
+        "asked": False,
         "laws": [],
         "slots": [],
         "slot_right": None,
         "before": None,
         "after": None,
+        "after_with_it": None,
         "error": "",
     }
     try:
@@ -83,12 +116,18 @@ def _row(
             before = diagnose(system, cases, library, others, out, workers, _silent)
             row["verdict"] = before.diagnosis.verdict
             row["named"] = [cause.effect.name for cause in before.diagnosis.causes]
-            if needs_law(before):
+            late = before.diagnosis.late
+            row["late"] = [] if late is None else list(late.signals)
+            row["asked"] = needs_law(before)
+            if row["asked"]:
                 row |= _told(propose(before, library, others, out, workers, _silent))
+                known = diagnose(system, cases, library, effects, out, workers, _silent)
+                gain = known.diagnosis.gain
+                row["after_with_it"] = None if gain is None or not planted else gain.after
     except Exception as error:  # one set must not end a run of hours; it is counted
         row["error"] = repr(error)
-    if planted:
-        row["slot_right"] = bool({slot for one in planted for slot in one.slots} & {*row["slots"]})
+    if acting:
+        row["slot_right"] = bool(acting & {*row["slots"]})
     return row
 
 

@@ -45,6 +45,7 @@ class Plantable:
     sensed : whether it changes readings only, so that one simulation serves all sizes.
     shapes : what the rig's law has for other parameters of the library's, SI.
     unit_size : unit of sizes [unit]; nan: what matters to the library, which has the effect.
+    slot : of the base model where it acts, if the library lacks it.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Plantable:
     sensed: bool = False
     shapes: Mapping[str, float] = field(default_factory=dict)
     unit_size: float = math.nan
+    slot: str = ""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from workbench.answer import Answer, Measure
 from workbench.files import write_json
 from workbench.lab import with_unit
-from workbench.power.following import SHARES
+from workbench.power import following, left_out
 from workbench.power.planned import SURE, Foreseen
 from workbench.power.sensitivity import FACTORS, Varied
 from workbench.report.answers import with_answer
@@ -93,37 +93,61 @@ def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def write_left_out(
-    rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
+    summary: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    provenance: Mapping[str, Any],
+    out: Path,
 ) -> None:
-    """Write left_out.json."""
-    right, seen = _rightly(rows)
-    sentence = f"The slot of the cause that was left out is proposed in {right} of {seen} sets."
-    headline = {"sets with the right slot": Measure(float(right), "1", "higher")}
-    content = {"provenance": provenance, "sets": list(rows)}
+    """Write left_out.json.
+
+    Parameters
+    ----------
+    summary : shares of all.
+    """
+    right = summary["right_slot"]
+    sentence = (
+        f"The slot of the cause that was left out is proposed in {right['hits']} of {right['of']} "
+        "sets that nothing else explains."
+    )
+    headline = _measures(summary, left_out.SHARES, lower=("clean",))
+    content = {"provenance": provenance, **summary, "sets": list(rows)}
     write_json(out / "left_out.json", with_answer(Answer(sentence, headline), content))
 
 
-def format_left_out(rows: Sequence[Mapping[str, Any]]) -> str:
+def format_left_out(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
     """Table of what was proposed, and how often it acts where the cause did."""
     lines = []
     for row in rows:
         what = ", ".join(row["left_out"]) or row["rig"]
-        mark = {True: "right slot", False: "NOT THE SLOT", None: "in no catalogue"}
+        mark = {True: "right slot", False: "NOT THE SLOT", None: "no cause"}[row["slot_right"]]
         said = "; ".join(row["laws"]) or row["error"] or _nothing(row)
-        lines.append(f"{what:<30} {mark[row['slot_right']]:<16} {said}")
-    right, seen = _rightly(rows)
-    return "\n".join([*lines, "", f"right slot in {right} of {seen} sets that show the cause"])
+        lines.append(f"{what:<30} {mark if row['asked'] else '':<16} {said}")
+    return "\n".join([*lines, "", *_shares(summary, left_out.SHARES)])
 
 
 def _nothing(row: Mapping[str, Any]) -> str:
     named = f", {' and '.join(row['named'])}" * bool(row["named"])
-    return f"nothing proposed ({row['verdict']}{named})"
+    late = f", {' and '.join(row['late'])} late" * bool(row["late"])
+    return f"nothing proposed ({row['verdict']}{named}{late})"
 
 
-def _rightly(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
-    """Sets with the right slot, and those of which the verdict is not "nothing"."""
-    known = [row for row in rows if row["left_out"] and row["verdict"] != "nothing"]
-    return sum(bool(row["slot_right"]) for row in known), len(known)
+def _measures(
+    summary: Mapping[str, Any], texts: Mapping[str, str], lower: Sequence[str]
+) -> dict[str, Measure]:
+    """Shares as numbers of an answer."""
+    return {
+        texts[name]: Measure(
+            one["share"], "1", "lower" if name in lower else "higher", one["low"], one["high"]
+        )
+        for name, one in summary.items()
+    }
+
+
+def _shares(summary: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
+    return [
+        f"{one['hits']} of {one['of']} {texts[name]} ({one['low']:.0%} to {one['high']:.0%})"
+        for name, one in summary.items()
+    ]
 
 
 def write_followed(
@@ -143,18 +167,9 @@ def write_followed(
         f"The recording that is proposed parts {made['hits']} of {made['of']} groups, one that is "
         f"drawn {drawn['hits']} of {drawn['of']}."
     )
-    headline = {
-        SHARES[name]: Measure(
-            one["share"], "1", "higher" if name == "proposed" else "", *_ends(one)
-        )
-        for name, one in summary.items()
-    }
+    headline = _measures(summary, following.SHARES, lower=("drawn", "never"))
     content = {"provenance": provenance, **summary, "sets": list(rows)}
     write_json(out / "followed.json", with_answer(Answer(sentence, headline), content))
-
-
-def _ends(one: Mapping[str, Any]) -> tuple[float, float]:
-    return one["low"], one["high"]
 
 
 def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
@@ -168,11 +183,7 @@ def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
             drawn = ["parts" if one["parts"] else "does not" for one in row["drawn"]]
             said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
         lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
-    told = [
-        f"{one['hits']} of {one['of']} {SHARES[name]} ({one['low']:.0%} to {one['high']:.0%})"
-        for name, one in summary.items()
-    ]
-    return "\n".join([*lines, "", *told])
+    return "\n".join([*lines, "", *_shares(summary, following.SHARES)])
 
 
 def write_plan(

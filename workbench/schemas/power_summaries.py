@@ -1,6 +1,6 @@
 """JSON Schema of the summaries of `workbench power`: of its sets, and of each of its questions."""
 
-from workbench.power.following import SHARES
+from workbench.power import following, left_out
 from workbench.power.planned import Foreseen
 from workbench.power.sensitivity import Changed
 from workbench.schemas.words import (
@@ -67,17 +67,19 @@ def _sheet_error() -> Schema:
 
 
 def _left_out() -> Schema:
-    texts = {name: listed(TEXT) for name in ("left_out", "named", "laws", "slots")}
-    ends = {name: or_null(NUMBER) for name in ("before", "after")}
+    texts = {name: listed(TEXT) for name in ("left_out", "named", "late", "laws", "slots")}
+    ends = {name: or_null(NUMBER) for name in ("before", "after", "after_with_it")}
     one = {
         "rig": TEXT,
         "verdict": TEXT,
         "error": TEXT,
         **texts,
+        "asked": FLAG,
         "slot_right": or_null(FLAG),
         **ends,
     }
-    return summary("power --leave-out-effect", _SETS, {"sets": listed(closed(one))})
+    shares = {name: SHARE for name in left_out.SHARES}
+    return summary("power --leave-out-effect", _SETS, {**shares, "sets": listed(closed(one))})
 
 
 def _followed() -> Schema:
@@ -92,7 +94,7 @@ def _followed() -> Schema:
         "proposed": or_null(made),
         "drawn": listed(made),
     }
-    shares = {name: SHARE for name in SHARES}
+    shares = {name: SHARE for name in following.SHARES}
     return summary("power --next", _SETS, {**shares, "sets": listed(closed(one))})
 
 

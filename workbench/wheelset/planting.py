@@ -69,10 +69,11 @@ PLANTABLE = (
     _one("pole_ring", "PoleRingEccentricity", signed=False, sensed=True),
     _one("time_skew", "LoggerTimeSkew[speeds]", sensed=True),
     # Sizes that disturb the balances about as much as those above.
-    _one("friction_step", unit_size=0.01),
-    _one("friction_ripple", unit_size=0.01),
-    _one("drive_beat", sensed=True, unit_size=0.005),
-    _one("force_drift", sensed=True, unit_size=2.0),
+    _one("friction_step", unit_size=0.01, slot="padFriction"),
+    _one("friction_ripple", unit_size=0.01, slot="padFriction"),
+    _one("friction_deceleration", unit_size=0.01, slot="padFriction"),
+    _one("drive_beat", sensed=True, unit_size=0.005, slot="driveTorque"),
+    _one("force_drift", sensed=True, unit_size=2.0, slot="forceSensor"),
 )
 
 # More than a careful sheet has wrong: a mode is measured to 10 %, an inertia computed to 1 %.

@@ -68,6 +68,9 @@ class Effects:
     friction_ripple: float = _gain(
         "1", "not in the catalogue: pad friction times 1 + gain*sin(2 pi 0.3 Hz t)"
     )
+    friction_deceleration: float = _gain(
+        "s2/m", "not in the catalogue: pad friction times 1 + gain*deceleration, 0.2 s late"
+    )
     drive_beat: float = _gain(
         "1", "not in the catalogue: measured torque times 1 + gain*sin(2 pi 0.2 Hz t)"
     )

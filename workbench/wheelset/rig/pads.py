@@ -14,6 +14,7 @@ _BEDDING_TIME = 2.0  # [s]
 _WET_FRICTION = 0.12
 _DRYING_ENERGY = 0.45e6  # [J] of friction on one disc leaves 1/e of its film
 _STEP_AT, _STEP_WIDTH = 90.0, 5.0  # [degC], [K] of friction_step
+_SLOWING_LAG = 0.2  # [s] of friction_deceleration, longer than wheels swing
 _RIPPLE = 2.0 * math.pi * 0.3  # [rad/s] of friction_ripple
 
 _INITIAL, _AMBIENT = 60.0, 20.0  # [degC]
@@ -55,6 +56,8 @@ class Pads:
         self._phase = phase
         self._dt = dt
         self._contact = 0.0  # [s] since first contact
+        self._speed = math.nan  # [m/s] before
+        self._slowing = 0.0  # [m/s2] deceleration
 
     def friction(self, speed: float, force: float, turn: float) -> list[float]:
         """Friction coefficient of each disc.
@@ -71,6 +74,7 @@ class Pads:
         common *= 1.0 - e.bedding_in * math.exp(-self._contact / _BEDDING_TIME)
         varied = 1.0 + e.disc_thickness * math.cos(turn + self._phase)
         varied *= 1.0 + e.friction_ripple * math.sin(_RIPPLE * self._contact)
+        varied *= 1.0 + e.friction_deceleration * self._slowing
         return [
             self._level
             * (common * (1.0 - e.fade * (T - _TEMPERATURE)) * (1.0 - film) + _WET_FRICTION * film)
@@ -94,6 +98,9 @@ class Pads:
             self.film[i] *= math.exp(-self._dt * power / _DRYING_ENERGY)
         if force > 0.0 or self._contact > 0.0:
             self._contact += self._dt
+        fall = self._speed - abs(speed) if not math.isnan(self._speed) else 0.0
+        self._slowing += (fall - self._dt * self._slowing) / _SLOWING_LAG
+        self._speed = abs(speed)
 
 
 def _step(temperature: float) -> float:

@@ -1,0 +1,68 @@
+"""Proposals that are followed: what the rig then makes parts what stops before left together."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from workbench.__main__ import main
+from workbench.power.following import SHARES, summarise_following
+from workbench.report.power_checks import format_followed
+
+from .schemas import check
+
+
+def made(parts: bool, foreseen: bool, predicted: float, shown: float | None) -> dict[str, Any]:
+    """A recording that was made."""
+    away = [{"from": "B", "predicted": predicted, "shown": shown}]
+    named = ["A"] if parts else ["A", "B"]
+    return {
+        **{"experiment": "a stop", "verdict": "found", "named": named, "separations": away},
+        **{"foreseen": foreseen, "parts": parts},
+    }
+
+
+def test_what_was_followed_is_counted() -> None:
+    row = {"planted": "A", "multiple": 8.0, "verdict": "found", "group": ["A", "B"], "error": ""}
+    rows = [
+        row | {"proposed": made(True, True, 10.0, 12.1), "drawn": [made(False, True, 3.0, 1.5)]},
+        row | {"proposed": made(False, True, 10.0, 11.9), "drawn": [made(True, True, 9.0, None)]},
+        row | {"proposed": made(True, False, 2.0, -0.1), "drawn": []},
+        row | {"group": ["A"], "proposed": None, "drawn": []},  # named alone by the stops before
+    ]
+    found = summarise_following(rows)
+    counted = {name: (one["hits"], one["of"]) for name, one in found.items()}
+    assert counted == {
+        **{"proposed": (2, 3), "drawn": (1, 2), "foreseen": (1, 2), "never": (1, 1)},
+        "separations": (2, 5),  # 1.9 of 10 off is within a fifth, 1.5 of 3 within noise
+    }
+    told = format_followed(found, rows)
+    assert "A or B -> A (one that is drawn: does not): a stop" in told
+    assert f"2 of 3 {SHARES['proposed']} (9% to 99%)" in told
+
+
+def test_a_rig_that_makes_no_experiments_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    assert main(["power", "--next", "--system", "train", "--out", str(tmp_path)]) == 2
+    assert "one with the method 'following'" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) -> None:
+    """With an inertia imitated, both are collinear in any stop, whatever the pressure."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    options = ["--next", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
+    alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
+    assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0
+    said = json.loads((tmp_path / "followed" / "followed.json").read_text())
+    check("followed", said)
+    (row,) = said["sets"]
+    assert set(row["group"]) >= {"FxGain", "DriveTorqueGain"}
+    assert "imitates 1500 kg.m2" in row["proposed"]["experiment"]
+    assert (row["proposed"]["foreseen"], row["proposed"]["named"]) == (True, ["FxGain"])
+    assert len(row["drawn"]) == 2
+    # What imitates the whole train tells nothing, whatever else is drawn.
+    assert not any(one["parts"] for one in row["drawn"] if "7840" in one["experiment"])
