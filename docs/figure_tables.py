@@ -30,17 +30,6 @@ PLANTED = {
     "BrakeFade": "fade 4.0 % per 100 K",
     "PressureDependentPadFriction": "exponent 4.0 %",
 }
-# What the rig plants in two stops that are alike, to ask for the next one.
-NEXT = (
-    "pressure_exponent=0.04",
-    "bedding_in=0.05",
-    "fx_gain=0.02",
-    "torque_gain=0.01",
-    "fx_offset=150",
-    "wheel_radius=0.0008",
-)
-# Causes that the catalogue lacks, left out of it or never in it, to ask for a law.
-LEFT_OUT = ("BrakeFade", "WheelsetLosses", "friction_step", "force_drift", "CreepStiffness")
 # What an independent simulator planted in six dry stops each, by the name of the set.
 LABELLED = {
     "clean": "nothing",
@@ -190,35 +179,51 @@ def shares(summary: Summary) -> Table:
     return rows
 
 
-def next_stops(*summaries: Summary) -> Table:
-    """What two stops say, the third one that is proposed, and what all three say."""
-    header = ["planted", "said of two stops", "experiments that part", "the best"]
-    rows: Table = [[*header, "separation", "said of three stops"]]
-    for planted, two, then, three in zip(
-        NEXT, summaries[::3], summaries[1::3], summaries[2::3], strict=True
-    ):
-        tried = then["tried"]
-        parting = sum(len(one["groups"]) > 1 for one in tried)
-        sensors = "".join(f"; a sensor of {name} would" for name in then["sensors"])
-        best = [tried[0]["experiment"], f"{tried[0]['separation']:.1f}"] if parting else ["", ""]
-        number = f"{parting or 'none'} of {len(tried)}{sensors}"
-        rows.append([f"`{planted}`", verdict(two), number, *best, verdict(three)])
-    return rows
+def followed(summary: Summary) -> Table:
+    """What two stops leave together, the third one that is proposed, and what all three say."""
+    header = ["planted, by the least size that matters", "said of two stops", "the best one"]
+    rows: Table = [[*header, "said of three", "drawn ones that part them"]]
+    for one in summary["sets"]:
+        made = one["proposed"]
+        if made is not None:
+            best = made["experiment"] if made["foreseen"] else "none parts them"
+            drawn = f"{sum(k['parts'] for k in one['drawn'])} of {len(one['drawn'])}"
+            planted = f"{one['planted']} x {one['multiple']:g}"
+            said = " or ".join(made["named"]) or made["verdict"]
+            rows.append([planted, " or ".join(one["group"]), best, said, drawn])
+    parts, drawn = (_of(summary[name]) for name in ("proposed", "drawn"))
+    seen = _of(summary["foreseen"])
+    return [*rows, ["all", "", f"foreseen to part, and parts: {seen}", f"parts: {parts}", drawn]]
 
 
-def laws(*summaries: Summary) -> Table:
-    """What is said of a cause that the catalogue lacks, and which law is proposed for it."""
+def _of(one: Summary) -> str:
+    return f"{one['hits']} of {one['of']}"
+
+
+def laws(summary: Summary) -> Table:
+    """What is said of a cause that nothing else explains, and which law is proposed for it."""
     rows: Table = [["planted", "without a law", "proposed", "where the cause acts"]]
-    rows[0] = [*rows[0], "error on held-out stops, times the noise"]
-    for name, summary in zip(LEFT_OUT, summaries, strict=True):
-        (one,) = summary["sets"]
-        known = "" if one["left_out"] else ", in no catalogue"
+    rows[0] = [*rows[0], "error on held-out stops, times the noise", "with the true form"]
+    rows[0] = [*rows[0], "off what the cause does"]
+    for one in summary["sets"]:
+        if not one["asked"]:
+            continue
+        planted = one["left_out"] or [f"{_gain(one['rig'])}, in no catalogue"]
         right = {True: "yes", False: "no", None: ""}[one["slot_right"]] if one["laws"] else ""
         said = "; ".join(one["named"]) or one["verdict"]
         error = change("{:.3g}", one["before"], one["after"]) if one["laws"] else ""
+        true = one["after_with_it"]
         proposed = "; ".join(one["laws"]) or "nothing"
-        rows.append([f"`{name}`{known}", said, proposed, right, error])
-    return rows
+        off = "" if one["function_error"] is None else f"{100.0 * one['function_error']:.1f} %"
+        known = "" if true is None else f"{true:.3g}"
+        rows.append([*planted, said, proposed, right, error, known, off])
+    gain, near = f"{_of(summary['gain'])} gain 80 %", f"{_of(summary['function'])} within 15 %"
+    return [*rows, ["all", "", "", _of(summary["right_slot"]), gain, "", near]]
+
+
+def _gain(options: str) -> str:
+    """The rig's name of what its options plant."""
+    return options.partition("--effect ")[2].partition("=")[0]
 
 
 def by_case(summary: Summary, name: str) -> dict[str, float]:

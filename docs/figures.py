@@ -20,7 +20,7 @@ from pathlib import Path
 import figure_tables as tables
 from figure import Figure, Summary
 from figure_machines import MACHINES, machines
-from figure_tables import LABELLED, LEFT_OUT, NEXT, TUNED
+from figure_tables import LABELLED, TUNED
 from figure_train import TRAIN
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -64,19 +64,6 @@ def _banded(name: str, seeds: Iterable[int]) -> Figure:
         ),
         (Path(name, "accuracy.json"),),
         getattr(tables, name),
-    )
-
-
-def _next(planted: str) -> tuple[str, ...]:
-    """Two stops that are alike, the next one that they ask for, and what all three say."""
-    out = f"{{out}}/next/{planted.partition('=')[0]}"
-    rig = f"rig --pads constant --effect {planted}"
-    return (
-        f"{rig} --case 24_alike_80_2.7 --case 25_alike_80_2.7 --out {out}/alike",
-        f"diagnose {out}/alike --out {out}/two",
-        f"next {out}/two --out {out}/next",
-        f"{rig} --next {out}/next --out {out}/made",
-        f"diagnose {out}/alike {out}/made --out {out}/three",
     )
 
 
@@ -153,22 +140,17 @@ FIGURES = {
         long=True,
     ),
     "next": Figure(
-        tuple(command for planted in NEXT for command in _next(planted)),
-        tuple(
-            Path("next", planted.partition("=")[0], file)
-            for planted in NEXT
-            for file in ("two/summary.json", "next/next.json", "three/summary.json")
+        (
+            "power --next --case 24_alike_80_2.7 --case 25_alike_80_2.7 --sizes 2 4 8 --repeats 1 "
+            "--out {out}/power",
         ),
-        tables.next_stops,
+        (Path("power/followed/followed.json"),),
+        tables.followed,
         long=True,
     ),
     "laws": Figure(
-        tuple(
-            f"power --leave-out-effect --effects {name} --sizes 8 --repeats 1 --clean 0 "
-            f"--out {{out}}/left_out/{name}"
-            for name in LEFT_OUT
-        ),
-        tuple(Path("left_out", name, "left_out/left_out.json") for name in LEFT_OUT),
+        ("power --leave-out-effect --sizes 8 --repeats 1 --clean 0 --out {out}/power",),
+        (Path("power/left_out/left_out.json"),),
         tables.laws,
         long=True,
         page="propose.md",

@@ -9,6 +9,9 @@ import figures
 import pytest
 from figure_machines import MACHINES, machines
 
+from workbench.power.following import summarise_following
+from workbench.power.left_out import summarise_left_out
+
 ROOT = Path(__file__).parents[1]
 WORST = {
     "worst": {
@@ -85,15 +88,21 @@ def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out() -> None
 
 
 def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None:
-    cause = {"effect": "FxGain", "confusable_with": ["DriveTorqueGain"]}
-    two, three = {"causes": [cause]}, {"causes": [{**cause, "confusable_with": []}]}
-    part = {"experiment": "a step", "separation": 7.84, "groups": [[0], [1]]}
-    alike = {"experiment": "a sine", "separation": 0.1, "groups": [[0, 1]]}
-    parted = (two, {"tried": [part, alike], "sensors": {}}, three)
-    stays = (two, {"tried": [alike], "sensors": {"the force": part}}, two)
-    _, first, second, *_ = tables.next_stops(*parted, *stays * (len(tables.NEXT) - 1))
-    assert first[1:] == ["FxGain or DriveTorqueGain", "1 of 2", "a step", "7.8", "FxGain"]
-    assert second[2:5] == ["none of 1; a sensor of the force would", "", ""]
+    made = {"experiment": "a step", "foreseen": True, "parts": True, "named": ["FxGain"]}
+    made |= {"separations": []}
+    other = made | {"foreseen": False, "parts": False, "named": ["FxGain", "DriveTorqueGain"]}
+    row = {"planted": "FxGain", "multiple": 8.0, "group": other["named"], "proposed": made}
+    rows = [
+        row | {"drawn": [made, other]},
+        row | {"proposed": other, "drawn": [other, other]},
+        row | {"group": ["FxGain"], "proposed": None, "drawn": []},
+    ]
+    header, first, second, last = tables.followed({"sets": rows, **summarise_following(rows)})
+    both = "FxGain or DriveTorqueGain"
+    assert len(header) == len(last)
+    assert first == ["FxGain x 8", both, "a step", "FxGain", "1 of 2"]
+    assert second == ["FxGain x 8", both, "none parts them", both, "0 of 2"]
+    assert last[2:] == ["foreseen to part, and parts: 1 of 1", "parts: 1 of 2", "1 of 4"]
 
 
 def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
@@ -228,13 +237,18 @@ def test_faults_of_all_places_count_together() -> None:
 
 
 def test_a_law_is_right_where_the_cause_acts() -> None:
-    none = {"left_out": ["A"], "verdict": "unexplained", "named": [], "laws": []}
-    none |= {"slot_right": False, "before": None, "after": None}
+    none = {"left_out": ["A"], "verdict": "unexplained", "named": [], "laws": [], "asked": True}
+    none |= {"rig": "--seed 7 --effect a=0.1", "slot_right": False, "before": None, "after": None}
+    none |= {"after_with_it": None, "function_error": None}
     found = none | {"laws": ["a law"], "slot_right": True, "before": 52.91, "after": 1.32}
-    unknown = found | {"left_out": [], "named": ["B"], "slot_right": None}
-    rest = [none] * (len(tables.LEFT_OUT) - 2)
-    _, first, second, third, *_ = tables.laws(*({"sets": [one]} for one in (found, unknown, *rest)))
-    assert first == ["`BrakeFade`", "unexplained", "a law", "yes", "52.9 → 1.32"]
-    assert second[0].endswith(", in no catalogue")
-    assert (second[1], second[3]) == ("B", "")
-    assert third[2:] == ["nothing", "", ""]
+    found |= {"after_with_it": 1.0, "function_error": 0.042}
+    unknown = found | {"left_out": [], "named": ["B"], "after_with_it": None}
+    unknown |= {"function_error": None}
+    twin = none | {"verdict": "found", "named": ["B"], "asked": False}
+    rows = [found, unknown, none, twin]
+    header, first, second, third, last = tables.laws({"sets": rows, **summarise_left_out(rows)})
+    assert len(header) == len(last)
+    assert first == ["A", "unexplained", "a law", "yes", "52.9 → 1.32", "1", "4.2 %"]
+    assert second == ["a, in no catalogue", "B", "a law", "yes", "52.9 → 1.32", "", ""]
+    assert third[2:] == ["nothing", "", "", "", ""]
+    assert last[3:] == ["2 of 3", "1 of 1 gain 80 %", "", "1 of 1 within 15 %"]

@@ -205,9 +205,10 @@ def test_slots_that_are_proposed_rightly_are_counted() -> None:
     shown = {"rig": "--seed 1", "verdict": "unexplained", "error": "", "named": [], "late": []}
     shown |= {"left_out": ["A"], "laws": ["a law"], "slots": ["a"], "asked": True}
     shown |= {"before": 11.0, "after": 3.0, "after_with_it": 1.0, "slot_right": True}
+    shown |= {"function_error": 0.15}
     rows = [
         shown,
-        shown | {"after": 3.1},  # 79 % of what the true form gains
+        shown | {"after": 3.1, "function_error": None},  # 79 % of what the true form gains
         shown | {"slot_right": False, "slots": [], "laws": []},
         shown | {"slot_right": False, "verdict": "found", "asked": False, "laws": []},  # a twin
         shown | {"left_out": [], "after_with_it": None},  # in no catalogue
@@ -215,7 +216,10 @@ def test_slots_that_are_proposed_rightly_are_counted() -> None:
     ]
     found = summarise_left_out(rows)
     counted = {name: (one["hits"], one["of"]) for name, one in found.items()}
-    assert counted == {"right_slot": (3, 4), "gain": (1, 2), "outside": (1, 1), "clean": (0, 1)}
+    assert counted == {
+        **{"right_slot": (3, 4), "gain": (1, 2), "function": (1, 1)},
+        **{"outside": (1, 1), "clean": (0, 1)},
+    }
     assert f"3 of 4 {SHARES['right_slot']} (19% to 99%)" in format_left_out(found, rows)
 
 

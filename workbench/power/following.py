@@ -51,7 +51,7 @@ def follow_proposals(
 
     Parameters
     ----------
-    groups : as planned; sets of two causes are left out.
+    groups : as planned; of them, sets with one cause of the catalogue.
     effects : of the library, which may be found.
     report : takes a line on each set.
 
@@ -73,7 +73,7 @@ def follow_proposals(
             expected="one with the method 'following'",
             remedy="write it, see docs/own-machine.md",
         )
-    sets = [one for group in groups for one in group if len(one.effects) == 1]
+    sets = [one for group in groups for one in group if one.kind == "single"]
     rows: dict[int, dict[str, Any]] = {}
     begin = time.perf_counter()
     with TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:

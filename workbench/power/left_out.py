@@ -9,6 +9,7 @@ from typing import Any
 from workbench.case import read_cases
 from workbench.diagnosis import Effect, diagnose
 from workbench.modelica import Library
+from workbench.power.function_error import function_error
 from workbench.power.planting import Group, Planting
 from workbench.power.statistics import share
 from workbench.power.virtual_rig import VirtualRig
@@ -16,10 +17,12 @@ from workbench.proposing import Proposal, needs_law, propose
 from workbench.system import System
 
 _WORTH = 0.8  # of what the true form gains
+_NEAR = 0.15  # of the range of what a cause does
 
 SHARES = {
     "right_slot": "sets with the right slot, of those whose cause nothing else explains",
     "gain": "laws that gain four fifths of what the true form gains",
+    "function": "laws within 15 % of the range of what the cause does, on recordings anew",
     "outside": "of them, sets whose cause is in no catalogue",
     "clean": "sets without a cause for which something is proposed",
 }
@@ -35,6 +38,9 @@ def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "right_slot": share(row["slot_right"] for row in asked),
         "outside": share(row["slot_right"] for row in asked if not row["left_out"]),
         "gain": share(map(_gains, known)),
+        "function": share(
+            row["function_error"] <= _NEAR for row in known if row["function_error"] is not None
+        ),
         "clean": share(bool(row["laws"]) for row in clean),
     }
 
@@ -105,11 +111,12 @@ def _row(
         "before": None,
         "after": None,
         "after_with_it": None,
+        "function_error": None,
         "error": "",
     }
     try:
         with tempfile.TemporaryDirectory() as scratch:
-            recordings, out = Path(scratch) / "recordings", Path(scratch) / "out"
+            recordings, out, new = (Path(scratch) / name for name in ("recordings", "out", "new"))
             simulated = rig.simulate(planting.seed, planting.gains)
             rig.write(simulated, planting.gains, recordings)
             cases = read_cases([recordings], system)
@@ -120,10 +127,17 @@ def _row(
             row["late"] = [] if late is None else list(late.signals)
             row["asked"] = needs_law(before)
             if row["asked"]:
-                row |= _told(propose(before, library, others, out, workers, _silent))
-                known = diagnose(system, cases, library, effects, out, workers, _silent)
-                gain = known.diagnosis.gain
-                row["after_with_it"] = None if gain is None or not planted else gain.after
+                found = propose(before, library, others, out, workers, _silent)
+                row |= _told(found)
+                if planted and found.laws:
+                    known = diagnose(system, cases, library, effects, out, workers, _silent)
+                    gain = known.diagnosis.gain
+                    row["after_with_it"] = None if gain is None else gain.after
+                    rig.write(rig.simulate(planting.seed + 1, planting.gains), planting.gains, new)
+                    fresh = read_cases([new], system)
+                    row["function_error"] = function_error(
+                        system, library, fresh, known, found, planted[0]
+                    )
     except Exception as error:  # one set must not end a run of hours; it is counted
         row["error"] = repr(error)
     if acting:

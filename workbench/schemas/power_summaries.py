@@ -68,7 +68,9 @@ def _sheet_error() -> Schema:
 
 def _left_out() -> Schema:
     texts = {name: listed(TEXT) for name in ("left_out", "named", "late", "laws", "slots")}
-    ends = {name: or_null(NUMBER) for name in ("before", "after", "after_with_it")}
+    ends = {
+        name: or_null(NUMBER) for name in ("before", "after", "after_with_it", "function_error")
+    }
     one = {
         "rig": TEXT,
         "verdict": TEXT,
@@ -76,7 +78,7 @@ def _left_out() -> Schema:
         **texts,
         "asked": FLAG,
         "slot_right": or_null(FLAG),
-        **ends,
+        **dict.fromkeys(ends, or_null(NUMBER)),
     }
     shares = {name: SHARE for name in left_out.SHARES}
     return summary("power --leave-out-effect", _SETS, {**shares, "sets": listed(closed(one))})
