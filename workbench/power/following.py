@@ -26,7 +26,8 @@ from workbench.power.virtual_rig import FollowingRig, VirtualRig
 from workbench.system import System
 
 _DRAWN = 2  # experiments that are drawn for each set, to compare with
-_NEAR, _NOISE = 0.2, 2.0  # share of a separation, and deviations by which noise moves it, in 95 %
+_NEAR = 0.2  # share of a separation
+_NOISE = 2.0  # deviations by which noise moves it, in 95 %
 
 SHARES = {
     "proposed": "groups that the recording which is proposed first parts",
@@ -71,7 +72,7 @@ def follow_proposals(
             where=f"{system.source}, the companion's module 'planting'",
             found="a virtual rig that makes no experiments",
             expected="one with the method 'following'",
-            remedy="write it, see docs/own-machine.md",
+            remedy="write it as workbench.power.virtual_rig.FollowingRig says",
         )
     sets = [one for group in groups for one in group if one.kind == "single"]
     rows: dict[int, dict[str, Any]] = {}
@@ -111,10 +112,13 @@ def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _as_predicted(one: dict[str, Any]) -> bool:
-    if one["shown"] is None:
+    """Whether a separation is within a fifth, or what noise moves its square by: twice itself."""
+    predicted, shown = one["predicted"], one["shown"]
+    if shown is None:
         return False
-    off = abs(one["shown"] - one["predicted"])
-    return bool(off <= max(_NOISE, _NEAR * one["predicted"]))
+    near = ((1.0 + _NEAR) ** 2 - 1.0) * predicted**2
+    noise = _NOISE * 2.0 * max(predicted, 1.0)
+    return bool(abs(shown * abs(shown) - predicted**2) <= max(near, noise))
 
 
 def _begun(planting: Planting) -> dict[str, Any]:
