@@ -29,6 +29,7 @@ from workbench.wheelset.rig import (
     select,
     simulate,
 )
+from workbench.wheelset.rig.drive import Drive, Losses
 
 from .processes import ending
 
@@ -203,6 +204,7 @@ PROPOSED = {
         "wheel_rail": "dry",
         "discs": ["dry"] * 3,
     },
+    "settings": {"imitated": 1500.0},
     "inputs": {"pB": {"profile": "staircase", "levels": [3e5, 1.2e5], "every": 5.0}},
 }
 
@@ -211,6 +213,7 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
     (tmp_path / "next.json").write_text(json.dumps({"tried": [PROPOSED]}))
     stop = proposed_stop(tmp_path, SYSTEM)
     assert (stop.conditions.initial_speed, stop.conditions.direction) == (40.0, -1)
+    assert stop.imitated == 1500.0
     assert [stop.demand(time) for time in (0.0, 4.9, 5.1, 9.9, 10.1)] == [
         3e5,
         3e5,
@@ -218,6 +221,20 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
         1.2e5,
         3e5,
     ]
+
+
+def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses() -> None:
+    """As heavy as it is: nothing of what brakes it is carried, and it stops five times as fast."""
+    losses = Losses(20.0, 1.5, 0.02)
+    drive = Drive(1500.0, 1500.0, losses, 60.0, 0.001)
+    torques = [drive.step(60.0 - 0.01 * k, stopped=False) for k in range(2000)]
+    # It follows by 3 ms, in which losses fall by 0.03 rad/s of theirs, and ripples by 0.5 %.
+    assert torques[-1] == pytest.approx(losses.torque(60.0 - 0.01 * 1999), rel=0.006)
+    usual = Drive(1500.0, TRAIN_INERTIA, losses, 60.0, 0.001)
+    carried = [usual.step(60.0 - 0.01 * k, stopped=False) for k in range(2000)][-1]
+    # 10 rad/s2 of 1500 kg.m2, what brakes it beside its own torque: the drive carries 81 % of all.
+    share = 1.0 - 1500.0 / TRAIN_INERTIA
+    assert carried == pytest.approx(share / (1.0 - share) * 15e3, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +251,7 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
 )
 def test_what_the_rig_cannot_make_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "next.json").write_text(text)
-    with pytest.raises(InputError, match="no experiment that says speed, direction and pressure"):
+    with pytest.raises(InputError, match="no experiment that says speed, direction, surfaces"):
         proposed_stop(tmp_path, SYSTEM)
 
 

@@ -58,8 +58,8 @@ def follow_proposals(
 
     Returns
     -------
-    rows : one for each set, as they are written to next.json; sets whose cause is named alone have
-        no proposal.
+    rows : one for each set, as they are written to followed.json; sets whose cause is named alone
+        have no proposal.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
 
     Raises

@@ -64,6 +64,8 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
     direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
     rail, *discs = (_SURFACES[one] for one in (said["wheel_rail"], *said["discs"]))
+    if len(discs) != system.condition("discs").count:
+        raise ValueError
     speed, pressure = float(said["initial_speed"]), float(demand[0])
     conditions = Conditions(speed, pressure, rail, tuple(discs), direction)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
