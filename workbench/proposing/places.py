@@ -1,6 +1,6 @@
 """Where a law may act, and what it may depend on: outputs of slots, and what is present there."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -303,24 +303,20 @@ def laws(
         yield from (Law(place, carrier, influence) for influence in able)
 
 
-def turning_laws(
-    place: Place,
-    recordings: Sequence[tuple[Vector, Mapping[str, Vector]]],
-    period: Callable[[LawInfluence], float | None],
-) -> Iterator[Law]:
-    """Laws at a place that begin anew with each period, in time or with what an input turns.
+def turning(place: Place) -> Iterator[LawInfluence]:
+    """What may begin anew with each period, which is not known yet: time, what inputs turn."""
+    yield LawInfluence("turn")
+    for one in place.inputs:
+        if one.unit and quotient(one.unit, "Hz") in ("m", "rad"):
+            yield LawInfluence("turn", (one,))
 
-    Parameters
-    ----------
-    recordings : as of `laws`.
-    period : in the unit of an influence, None where there is none.
-    """
-    speeds = [one for one in place.inputs if one.unit and quotient(one.unit, "Hz") in ("m", "rad")]
-    for factors in ((), *((one,) for one in speeds)):
-        length = period(LawInfluence("turn", factors))
-        if length is not None:
-            for carrier in _carriers(place, [watched for _, watched in recordings]):
-                yield Law(place, carrier, LawInfluence("turn", factors, length))
+
+def turning_laws(
+    place: Place, recordings: Sequence[tuple[Vector, Mapping[str, Vector]]], influence: LawInfluence
+) -> Iterator[Law]:
+    """Laws that begin anew with each period of an influence; `recordings` as of `laws`."""
+    for carrier in _carriers(place, [watched for _, watched in recordings]):
+        yield Law(place, carrier, influence)
 
 
 def _varies(recordings: Sequence[Vector]) -> bool:

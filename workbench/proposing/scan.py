@@ -21,7 +21,15 @@ from workbench.diagnosis.slots import read_slots
 from workbench.fmu import Matrix, Vector
 from workbench.modelica import Library
 from workbench.proposing.periods import Period, strongest_period
-from workbench.proposing.places import Law, LawInfluence, Place, laws, places, turning_laws
+from workbench.proposing.places import (
+    Law,
+    LawInfluence,
+    Place,
+    laws,
+    places,
+    turning,
+    turning_laws,
+)
 from workbench.proposing.splines import APART, COEFFICIENTS, Knots, Smoothness, smoothest
 from workbench.proposing.writing import PACKAGE, Written, extended_library, unit_of
 from workbench.system import OBSERVER, System
@@ -174,41 +182,38 @@ class Scan:
 
         Of all periods that are told apart each is as likely beforehand.
         """
-        periods: dict[LawInfluence, Period | None] = {}
-        every = []
+        periods: dict[tuple[str, LawInfluence], Period | None] = {}
+        every: list[tuple[Law, Period]] = []
         for place in where:
-
-            def period(influence: LawInfluence, place: Place = place) -> float | None:
-                if influence not in periods:
-                    periods[influence] = self._period(simulations, place, influence)
-                found = periods[influence]
-                return None if found is None else found.length
-
-            every += list(turning_laws(place, self._recordings, period))
-        waves = [self._waves(law) for law in every]
+            for influence in turning(place):
+                # Time is the same everywhere.
+                at = (place.slot.name if influence.factors else "", influence)
+                if at not in periods:
+                    periods[at] = self._period(simulations, place, influence)
+                if (period := periods[at]) is not None:
+                    own = replace(influence, span=period.length)
+                    laws_ = turning_laws(place, self._recordings, own)
+                    every += [(law, period) for law in laws_]
+        if not every:
+            return []
+        waves = [self._waves(law, period) for law, period in every]
         columns = [
             Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
-            for law in every
+            for law, _ in every
             for _ in range(2)
         ]
-        if not columns:
-            return []
         courses = [np.hstack([wave[k] for wave in waves]) for k in range(len(self._recordings))]
         derivatives = simulations.responses(values, columns, courses)
         found = []
-        for n, law in enumerate(every):
-            assert law.influence is not None
-            own = [one[:, 2 * n : 2 * n + 2] for one in derivatives]
-            keys = [(law.place.name, f"c{k}") for k in range(2 * len(own))]
-            more = [np.zeros((len(one), len(keys))) for one in own]
-            for k, one in enumerate(own):
-                more[k][:, 2 * k : 2 * k + 2] = one
+        for n, (law, period) in enumerate(every):
+            keys = [(law.place.name, f"c{k}") for k in range(2 * len(derivatives))]
+            more = [np.zeros((len(one), len(keys))) for one in derivatives]
+            for k, one in enumerate(derivatives):
+                more[k][:, 2 * k : 2 * k + 2] = one[:, 2 * n : 2 * n + 2]
             joint = self._fit.quadratics(self.base.linearised.extended(keys, more), keys)
             largest = self._largest(law.place)
             likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
-            period_ = periods[replace(law.influence, span=0.0)]
-            assert period_ is not None
-            evidence = likeliest.evidence - float(np.log(period_.tried))
+            evidence = likeliest.evidence - float(np.log(period.tried))
             likeliest = replace(likeliest, evidence=evidence)
             found.append(LawProspect(law, None, likeliest, largest))
         return found
@@ -225,14 +230,12 @@ class Scan:
         lin = self.base.linearised
         return strongest_period([one.errors for one in lin.evidence], clocks, lin.lasting)
 
-    def _waves(self, law: Law) -> list[Matrix]:
+    def _waves(self, law: Law, period: Period) -> list[Matrix]:
         """Carrier times cosine and sine in each recording, (n, 2)."""
         assert law.influence is not None
         found = []
         for time, watched in self._recordings:
-            angle = (
-                law.influence.course(law.place, watched, time) * 2.0 * np.pi / law.influence.span
-            )
+            angle = 2.0 * np.pi / period.length * law.influence.course(law.place, watched, time)
             carrier = law.carrier.course(law.place, watched)
             found.append(carrier[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
         return found
