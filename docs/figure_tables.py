@@ -183,17 +183,22 @@ def followed(summary: Summary) -> Table:
     """What two stops leave together, the third one that is proposed, and what all three say."""
     header = ["planted, by the least size that matters", "said of two stops", "the best one"]
     rows: Table = [[*header, "said of three", "drawn ones that part them"]]
+    alike: dict[str, list[str]] = {}
     for one in summary["sets"]:
         made = one["proposed"]
-        if made is not None:
-            best = made["experiment"] if made["foreseen"] else "none parts them"
-            drawn = f"{sum(k['parts'] for k in one['drawn'])} of {len(one['drawn'])}"
-            planted = f"{one['planted']} x {one['multiple']:g}"
-            said = " or ".join(made["named"]) or made["verdict"]
-            rows.append([planted, " or ".join(one["group"]), best, said, drawn])
-    parts, drawn = (_of(summary[name]) for name in ("proposed", "drawn"))
-    seen = _of(summary["foreseen"])
-    return [*rows, ["all", "", f"foreseen to part, and parts: {seen}", f"parts: {parts}", drawn]]
+        if made is None:
+            continue
+        planted = f"{one['planted']} x {one['multiple']:g}"
+        if not made["foreseen"]:
+            alike.setdefault(" or ".join(sorted(one["group"])), []).append(planted)
+            continue
+        said = " or ".join(made["named"]) or made["verdict"]
+        drawn = f"{sum(k['parts'] for k in one['drawn'])} of {len(one['drawn'])}"
+        rows.append([planted, " or ".join(one["group"]), made["experiment"], said, drawn])
+    rows += [[", ".join(sets), group, "none parts it", "", ""] for group, sets in alike.items()]
+    seen, never, drawn = (_of(summary[name]) for name in ("foreseen", "never", "drawn"))
+    ends = f"parts: {seen}; where none was foreseen to, {never}"
+    return [*rows, ["all", "", "", ends, drawn]]
 
 
 def _of(one: Summary) -> str:

@@ -101,8 +101,8 @@ def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None
     both = "FxGain or DriveTorqueGain"
     assert len(header) == len(last)
     assert first == ["FxGain x 8", both, "a step", "FxGain", "1 of 2"]
-    assert second == ["FxGain x 8", both, "none parts them", both, "0 of 2"]
-    assert last[2:] == ["foreseen to part, and parts: 1 of 1", "parts: 1 of 2", "1 of 4"]
+    assert second == ["FxGain x 8", "DriveTorqueGain or FxGain", "none parts it", "", ""]
+    assert last[3:] == ["parts: 1 of 1; where none was foreseen to, 0 of 1", "1 of 4"]
 
 
 def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
