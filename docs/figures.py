@@ -186,7 +186,10 @@ def written(name: str, *summaries: Summary) -> str:
     """A table with the command that made it, as it stands on the page."""
     header, *rows = FIGURES[name].table(*summaries)
     lines = [header, ["---"] * len(header), *rows]
-    text = "\n".join("| " + " | ".join(line).strip() + " |" for line in lines)
+    text = "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in line).strip() + " |"
+        for line in lines
+    )
     return f"{text}\n\n{origin(FIGURES[name].commands)}"
 
 

@@ -252,3 +252,11 @@ def test_a_law_is_right_where_the_cause_acts() -> None:
     assert second == ["a, in no catalogue", "B", "a law", "yes", "52.9 → 1.32", "", ""]
     assert third[2:] == ["nothing", "", "", "", ""]
     assert last[3:] == ["2 of 3", "1 of 1 gain 80 %", "", "1 of 1 within 15 %"]
+
+
+def test_a_size_in_bars_stays_in_its_cell() -> None:
+    row = {"planted": "A", "multiple": 8.0, "group": ["A", "B"], "drawn": []}
+    made = {"experiment": "|v| rises", "foreseen": True, "parts": True, "named": ["A"]}
+    rows = [row | {"proposed": made | {"separations": []}}]
+    page = figures.written("next", {"sets": rows, **summarise_following(rows)})
+    assert r"| A or B | \|v\| rises | A |" in page
