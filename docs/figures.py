@@ -141,7 +141,7 @@ FIGURES = {
     ),
     "next": Figure(
         (
-            "power --next --case 24_alike_80_2.7 --case 25_alike_80_2.7 --sizes 2 4 8 16 32 "
+            "power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7 --sizes 2 4 8 16 32 "
             "--repeats 1 --out {out}/power",
         ),
         (Path("power/followed/followed.json"),),

@@ -46,7 +46,7 @@ def test_a_rig_that_makes_no_experiments_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("rumoca", reason="no Modelica compiler")
-    assert main(["power", "--next", "--system", "train", "--out", str(tmp_path)]) == 2
+    assert main(["power", "--follow", "--system", "train", "--out", str(tmp_path)]) == 2
     assert "one with the method 'following'" in capsys.readouterr().err
 
 
@@ -54,7 +54,7 @@ def test_a_rig_that_makes_no_experiments_is_refused(
 def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) -> None:
     """With an inertia imitated, both are collinear in any stop, whatever the pressure."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
-    options = ["--next", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
+    options = ["--follow", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
     alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
     assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0
     said = json.loads((tmp_path / "followed" / "followed.json").read_text())

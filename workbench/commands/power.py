@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "sheet_error": _sheet_error,
             "leave_out_effect": _left_out,
             "plan": _foreseen,
-            "next": _followed,
+            "follow": _followed,
         }
         return checks[options.check](options, output, system, rig, effects)
 

@@ -97,7 +97,7 @@ def _followed() -> Schema:
         "drawn": listed(made),
     }
     shares = {name: SHARE for name in following.SHARES}
-    return summary("power --next", _SETS, {**shares, "sets": listed(closed(one))})
+    return summary("power --follow", _SETS, {**shares, "sets": listed(closed(one))})
 
 
 def _plan() -> Schema:

@@ -35,7 +35,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --clean 200 --resume\n"
         "  python -m workbench power --thresholds --sets 8\n"
         "  python -m workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
-        "  python -m workbench power --next --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
+        "  python -m workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
         "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  python -m workbench power --sheet-error --repeats 2\n"
         "  python -m workbench power --system train --recorded labelled healthy",
@@ -115,7 +115,7 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
             "effect at --sizes, from one set without any (into OUT/plan)",
         ),
         (
-            "--next",
+            "--follow",
             "where a set leaves the planted effect with others, make the recording that is "
             "proposed next and some that are drawn, and tell which part them (into OUT/followed)",
         ),
