@@ -5,13 +5,13 @@ rivals of a diagnosis, what may be varied -> recordings that the first rival pre
 """
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from workbench.case import Case
-from workbench.diagnosis import Effect, build_everything, catalogue, choose
+from workbench.diagnosis import build_everything, catalogue, choose
 from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
@@ -19,6 +19,7 @@ from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment, every_setting, other_profiles
 from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import (
+    Asked,
     Prediction,
     predicted_cases,
     predictions,
@@ -58,29 +59,30 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     InputError
         If the system does not say what may be varied, or no recording of it would count.
     """
-    with _open(system, rivals, workers, report) as rig:
-        experiments = rig.experiments
+    with _open(system, rivals, report) as asked:
+        experiments = asked.experiments
         plan = every_setting(experiments)
         report(f"{len(plan)} settings, as {' with '.join(rivals.models[0].effects)} predicts")
-        ranked = chosen(rig.linearised(system, plan))
+        ranked = chosen(predictions(asked, _cases(asked, plan, workers), workers))
         best = [one.candidate for one in ranked[:_SETTINGS]]
         more = [one for setting in best for one in other_profiles(experiments, setting)]
         if more:
             report(f"{len(more)} profiles with the best {len(best)}")
-            ranked = chosen([*ranked, *rig.linearised(system, more)])
+            ranked = chosen([*ranked, *predictions(asked, _cases(asked, more, workers), workers)])
         if len(rivals.models) > 1:
             report("the best, with the models fitted again in full")
-            ranked = _confirmed(rig, ranked)
+            ranked = _confirmed(asked, ranked, workers)
         sensors = {}
         first = ranked[0]
         if len(first.groups) < len(rivals.models):
             for sensor in experiments.sensors:
                 report(f"the same with a sensor of {sensor.label}")
-                sensed = _with_sensor(system, sensor)
+                sensed = replace(asked, system=_with_sensor(system, sensor))
                 tried = [one.candidate for one in ranked[:_SENSED]]
-                found = chosen(rig.refitted(sensed, rig.cases(sensed, tried)))[0]
+                cases = _cases(sensed, tried, workers)
+                found = chosen(refitted_predictions(sensed, cases, workers))[0]
                 if len(found.groups) > len(first.groups):
-                    sensors[sensor.label] = _proposal(sensed, experiments, found)
+                    sensors[sensor.label] = _proposal(sensed.system, experiments, found)
     return NextStop(
         system=system,
         rivals=rivals,
@@ -100,13 +102,13 @@ def foreseen(
     InputError
         As `next_stop`.
     """
-    with _open(system, rivals, workers, lambda _: None) as rig:
-        ranked = chosen(rig.refitted(system, rig.cases(system, plan)))
-        return [_proposal(system, rig.experiments, one) for one in ranked]
+    with _open(system, rivals, lambda _: None) as asked:
+        ranked = chosen(refitted_predictions(asked, _cases(asked, plan, workers), workers))
+        return [_proposal(system, asked.experiments, one) for one in ranked]
 
 
 @contextmanager
-def _open(system: System, rivals: Rivals, workers: int, report: Reporter) -> "Iterator[_Rig]":
+def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Asked]:
     """The machine as its models predict it."""
     experiments = system.experiments
     if experiments is None:
@@ -122,10 +124,10 @@ def _open(system: System, rivals: Rivals, workers: int, report: Reporter) -> "It
         everything = Path(scratch) / "AllEffects.fmu"
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
-        yield _Rig(system, everything, experiments, rivals, effects, workers)
+        yield Asked(everything, system, experiments, rivals, effects)
 
 
-def _confirmed(rig: "_Rig", ranked: Sequence[Prediction]) -> list[Prediction]:
+def _confirmed(asked: Asked, ranked: Sequence[Prediction], workers: int) -> list[Prediction]:
     """The best first: rivals that bend far are known by full fits alone, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
@@ -136,64 +138,24 @@ def _confirmed(rig: "_Rig", ranked: Sequence[Prediction]) -> list[Prediction]:
     while left and len(confirmed) < _CONFIRMED:
         some, left = left[:_TOGETHER], left[_TOGETHER:]
         planned = [(one.candidate, one.case) for one in some]
-        confirmed = chosen([*confirmed, *rig.refitted(rig.system, planned)])
+        confirmed = chosen([*confirmed, *refitted_predictions(asked, planned, workers)])
         last = confirmed[min(PROPOSED, len(confirmed)) - 1]
         if left and chosen([last, left[0]])[0] is last:
             break
     return [*confirmed, *left]
 
 
-class _Rig:
-    """Experiments on a machine as its models predict them.
-
-    Parameters
-    ----------
-    everything : FMU with all effects.
-
-    Attributes
-    ----------
-    system : as it is.
-    experiments : that it allows.
-    """
-
-    def __init__(
-        self,
-        system: System,
-        everything: Path,
-        experiments: Experiments,
-        rivals: Rivals,
-        effects: Mapping[str, Effect],
-        workers: int,
-    ) -> None:
-        self.system, self._everything, self.experiments = system, everything, experiments
-        self._rivals, self._effects, self._workers = rivals, effects, workers
-
-    def cases(self, system: System, plan: Sequence[Experiment]) -> list[tuple[Experiment, Case]]:
-        """Recordings of experiments, those that would count."""
-        planned = predicted_cases(*self._known(system), plan, self._workers)
-        if not planned:
-            raise InputError(
-                where=f"{system.source}, [next]",
-                found="no experiment with enough samples that count",
-                expected="one that a diagnosis can use",
-                remedy="let recordings last longer, or widen the ranges",
-            )
-        return planned
-
-    def linearised(self, system: System, plan: Sequence[Experiment]) -> list[Prediction]:
-        """What experiments would tell, of models linearised where they are."""
-        return predictions(*self._known(system), self.cases(system, plan), self._workers)
-
-    def refitted(
-        self, system: System, planned: Sequence[tuple[Experiment, Case]]
-    ) -> list[Prediction]:
-        """What they would tell, of models fitted again in full."""
-        return refitted_predictions(*self._known(system), planned, self._workers)
-
-    def _known(
-        self, system: System
-    ) -> tuple[Path, System, Experiments, Rivals, Mapping[str, Effect]]:
-        return self._everything, system, self.experiments, self._rivals, self._effects
+def _cases(asked: Asked, plan: Sequence[Experiment], workers: int) -> list[tuple[Experiment, Case]]:
+    """Recordings of experiments, those that would count."""
+    planned = predicted_cases(asked, plan, workers)
+    if not planned:
+        raise InputError(
+            where=f"{asked.system.source}, [next]",
+            found="no experiment with enough samples that count",
+            expected="one that a diagnosis can use",
+            remedy="let recordings last longer, or widen the ranges",
+        )
+    return planned
 
 
 def _with_sensor(system: System, sensor: Signal) -> System:

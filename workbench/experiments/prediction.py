@@ -100,6 +100,25 @@ class Prediction:
         return float(np.maximum(0.0, 1.0 - missed).mean())
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What experiments are predicted with.
+
+    Attributes
+    ----------
+    everything : FMU with all effects.
+    experiments : that the system allows.
+    rivals : that they are to tell apart.
+    effects : of the FMU, by name.
+    """
+
+    everything: Path
+    system: System
+    experiments: Experiments
+    rivals: Rivals
+    effects: Mapping[str, Effect]
+
+
 @contextmanager
 def _modelled(path: Path) -> Iterator[CoSimulation]:
     with CoSimulation(path) as model:
@@ -107,22 +126,19 @@ def _modelled(path: Path) -> Iterator[CoSimulation]:
 
 
 def predicted_cases(
-    everything: Path,
-    system: System,
-    experiments: Experiments,
-    rivals: Rivals,
-    effects: Mapping[str, Effect],
+    asked: Asked,
     plan: Sequence[Experiment],
     workers: int,
 ) -> list[tuple[Experiment, Case]]:
     """Recordings of all experiments as the first rival predicts them; of those that count."""
+    system, experiments = asked.system, asked.experiments
     added = {one.name for one in experiments.sensors}
-    judged = tuple(one.name for one in system.judged if one.name in {*rivals.signals, *added})
-    with Pool(min(workers, len(plan)), _modelled, everything) as pool:
+    judged = tuple(one.name for one in system.judged if one.name in {*asked.rivals.signals, *added})
+    with Pool(min(workers, len(plan)), _modelled, asked.everything) as pool:
         under_way = [
             pool.submit(
                 recorded,
-                *(system, experiments, one, _values(system, rivals, effects, one)),
+                *(system, experiments, one, _values(asked, one)),
                 *(f"{number:03}", judged, number),
             )
             for number, one in enumerate(plan, 1)
@@ -140,10 +156,9 @@ def _counts(case: Case, system: System) -> bool:
     return True
 
 
-def _values(
-    system: System, rivals: Rivals, effects: Mapping[str, Effect], candidate: Experiment
-) -> dict[str, float]:
+def _values(asked: Asked, candidate: Experiment) -> dict[str, float]:
     """Parameters of the first rival in an experiment."""
+    system, rivals, effects = asked.system, asked.rivals, asked.effects
     first, values = rivals.models[0], dict(rivals.given)
     for condition in system.conditions:
         setting = candidate.settings.get(condition.name)
@@ -174,66 +189,38 @@ def _choices(system: System, level: str, candidate: Experiment) -> set[str]:
     return set(map(str, said))
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What experiments are predicted with; see `predictions`."""
-
-    everything: Path
-    system: System
-    experiments: Experiments
-    rivals: Rivals
-    effects: Mapping[str, Effect]
-
-
 def predictions(
-    everything: Path,
-    system: System,
-    experiments: Experiments,
-    rivals: Rivals,
-    effects: Mapping[str, Effect],
+    asked: Asked,
     planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
     """What each experiment would tell, in their order, of rivals linearised where they are."""
-    cases = [case for _, case in planned]
-    with Simulations(everything, system, rivals.given, cases, workers) as simulations:
-        fit = Fit(simulations, list(effects.values()), beside=cases[:1])
-        begun = _begun(fit, [start_of(system, experiments, one) for one, _ in planned])
-        rows = [_linearised(fit, rivals, one, effects, begun) for one in rivals.models]
+    with _fitted(asked, planned, workers) as (simulations, fit, rows):
         return [
-            _prediction(simulations, fit, rivals, rows, k, candidate, _once)
+            _prediction(simulations, fit, asked.rivals, rows, k, candidate, _once)
             for k, (candidate, _) in enumerate(planned)
         ]
 
 
 def refitted_predictions(
-    everything: Path,
-    system: System,
-    experiments: Experiments,
-    rivals: Rivals,
-    effects: Mapping[str, Effect],
+    asked: Asked,
     planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
     """As `predictions`, of rivals that are fitted again in full: each experiment by itself."""
-    asked = _Asked(everything, system, experiments, rivals, effects)
     with Pool(min(workers, len(planned)), nullcontext, asked) as pool:
         under_way = [pool.submit(_refitted, candidate, case) for candidate, case in planned]
         return [one.result() for one in under_way]
 
 
-def _refitted(asked: _Asked, candidate: Experiment, case: Case) -> Prediction:
-    rivals, active = asked.rivals, asked.effects
-    with Simulations(asked.everything, asked.system, rivals.given, [case], 1) as simulations:
-        fit = Fit(simulations, list(active.values()), beside=[case])
-        begun = _begun(fit, [start_of(asked.system, asked.experiments, candidate)])
-        rows = [_linearised(fit, rivals, one, active, begun) for one in rivals.models]
+def _refitted(asked: Asked, candidate: Experiment, case: Case) -> Prediction:
+    with _fitted(asked, [(candidate, case)], 1) as (simulations, fit, rows):
 
         def again(true: _Row, other: _Row, _: int) -> tuple[float, Matrix]:
             refit = Refit(fit, other.lin, true.joint.systems[0].r, other.information)
             return refit.least(other.active)
 
-        return _prediction(simulations, fit, rivals, rows, 0, candidate, again)
+        return _prediction(simulations, fit, asked.rivals, rows, 0, candidate, again)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,6 +243,21 @@ class _Row:
     bare: Joint
 
 
+@contextmanager
+def _fitted(
+    asked: Asked, planned: Sequence[tuple[Experiment, Case]], workers: int
+) -> Iterator[tuple[Simulations, Fit, list[_Row]]]:
+    """All rivals about their points, along experiments."""
+    cases = [case for _, case in planned]
+    with Simulations(
+        asked.everything, asked.system, asked.rivals.given, cases, workers
+    ) as simulations:
+        fit = Fit(simulations, list(asked.effects.values()), beside=cases[:1])
+        starts = [start_of(asked.system, asked.experiments, one) for one, _ in planned]
+        begun = _begun(fit, starts)
+        yield simulations, fit, [_linearised(fit, asked, one, begun) for one in asked.rivals.models]
+
+
 def _begun(fit: Fit, starts: Sequence[Mapping[str, float]]) -> Matrix:
     """Deviations of experiments whose states start as they are set, in standard deviations."""
     point = fit.unknowns.start()
@@ -269,9 +271,8 @@ def _begun(fit: Fit, starts: Sequence[Mapping[str, float]]) -> Matrix:
     return deviations
 
 
-def _linearised(
-    fit: Fit, rivals: Rivals, rival: Rival, effects: Mapping[str, Effect], begun: Matrix
-) -> _Row:
+def _linearised(fit: Fit, asked: Asked, rival: Rival, begun: Matrix) -> _Row:
+    rivals, effects = asked.rivals, asked.effects
     start = fit.unknowns.start()
     levels = {key: rival.levels.get(key, usual) for key, usual in start.levels.items()}
     turning = {name for name, parameter in rival.sizes if parameter == "amplitude"}

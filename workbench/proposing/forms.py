@@ -116,13 +116,8 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenF
 def _harmonic(law: Law, influence: LawInfluence, scale: float) -> Written:
     """A harmonic of a period that errors have; its phase differs from recording to recording."""
     declared, equations = clock(influence)
-    unit = 1.0 if law.carrier.expression != "1.0" else scale
-    known = ", ".join(
-        filter(
-            None,
-            (unit_of(law.carrier.unit), f"min={number(-_KEPT * unit)}, max={number(_KEPT * unit)}"),
-        )
-    )
+    unit = _unit(law, scale)
+    known = _bounded(law.carrier.unit, -_KEPT * unit, _KEPT * unit)
     period = f"parameter Real period({unit_of(influence.unit)}) = {number(influence.span)}"
     lines = [
         *(f'parameter Real {one}({known}) = 0.0 "Part of {one}";' for one in ("cosine", "sine")),
@@ -140,6 +135,16 @@ def _harmonic(law: Law, influence: LawInfluence, scale: float) -> Written:
     )
 
 
+def _unit(law: Law, scale: float) -> float:
+    """What a size is counted in: 1 of what is relative, else what the output is."""
+    return scale if law.carrier.expression == "1.0" else 1.0
+
+
+def _bounded(unit: str, low: float, high: float) -> str:
+    """Modifiers of a parameter."""
+    return ", ".join(filter(None, (unit_of(unit), f"min={number(low)}, max={number(high)}")))
+
+
 def _name(law: Law, form: Form) -> str:
     name = law.place.name + ("" if law.influence is None else law.influence.name)
     where = {"1.0": "Added", law.place.nominal: "Times"}.get(law.carrier.expression, "Share")
@@ -153,12 +158,10 @@ def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
     expression = form.expression.format(
         q=quantity, Q=number(largest), w=number(_ROUNDED * (knots.high - knots.low))
     )
-    relative = law.carrier.expression != "1.0"
-    unit = 1.0 if relative else scale
+    unit = _unit(law, scale)
     # An inertia or a friction that is multiplied keeps its sign.
     least = -_KEPT if law.carrier.expression == law.place.nominal else -_REACH * unit
-    bounds = f"min={number(least)}, max={number(_REACH * unit)}"
-    known = ", ".join(filter(None, (unit_of(law.carrier.unit), bounds)))
+    known = _bounded(law.carrier.unit, least, _REACH * unit)
     lines = [f'parameter Real s({known}) = 0.0 "Size, at the largest that was seen";']
     shapes = {}
     if form.shape:
@@ -167,7 +170,7 @@ def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
         values = form.values if powers else _rounded(knots, form.values)
         low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * knots.high)
         shapes = {form.shape: values}
-        given = ", ".join(filter(None, (unit_of(own), f"min={number(low)}, max={number(high)}")))
+        given = _bounded(own, low, high)
         lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
     return Written(
         name=_name(law, form),

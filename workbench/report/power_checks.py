@@ -109,9 +109,9 @@ def write_left_out(
         f"The slot of the cause that was left out is proposed in {right['hits']} of {right['of']} "
         "sets that nothing else explains."
     )
-    headline = _measures(summary, left_out.SHARES, lower=("clean",))
+    answer = Answer(sentence, _measures(summary, left_out.SHARES, lower=("clean",)))
     content = {"provenance": provenance, **summary, "sets": list(rows)}
-    write_json(out / "left_out.json", with_answer(Answer(sentence, headline), content))
+    write_json(out / "left_out.json", with_answer(answer, content))
 
 
 def format_left_out(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
