@@ -274,7 +274,8 @@ class System:
         parameters: Mapping[str, float] | None = None,
     ) -> Vector:
         """A formula along a recording, (n,); parameters are the model's unless others are given."""
-        known = self.values if parameters is None else parameters
+        # What a law in a slot has within itself is as the model has it.
+        known = {**self.values, **(parameters or {})}
         values: dict[str, Any] = {}
         for name in formula.names:
             if name in measured or any(one.name == name for one in self.derived):

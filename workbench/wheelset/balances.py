@@ -34,12 +34,13 @@ def balances(
         return result
 
     rW, rR = values["rW"], values["rR"]
-    force = values["actuation.kappa"] * np.maximum(0.0, smooth(pB) - values["actuation.p0"])
+    kappa, p0 = (values[name] for name in _within(values, "actuation", "kappa", "p0"))
+    force = kappa * np.maximum(0.0, smooth(pB) - p0)
     direction = np.sign(smooth(omegaR))
     brake = 3.0 * values["muDC"] * force * values["rB"] * direction
 
     def loss(omega: Vector, slot: str) -> Vector:
-        c0, c1, c2 = (values[name] for name in _losses(values, slot))
+        c0, c1, c2 = (values[name] for name in _within(values, slot, "c0", "c1", "c2"))
         return (c0 + c1 * np.abs(omega) + c2 * omega**2) * direction
 
     counts = np.zeros(case.time.size, bool)
@@ -65,11 +66,11 @@ def balances(
     ]
 
 
-def _losses(values: Mapping[str, float], slot: str) -> list[str]:
-    """Names of c0, c1, c2 of a loss, wherever the slot's component keeps them."""
+def _within(values: Mapping[str, float], slot: str, *parameters: str) -> list[str]:
+    """Names of parameters of a slot, wherever its component keeps them: a law has it within."""
     return [
-        next(name for name in values if name.startswith(slot) and name.endswith(f".{c}"))
-        for c in ("c0", "c1", "c2")
+        next(name for name in values if name.startswith(f"{slot}.") and name.endswith(f".{one}"))
+        for one in parameters
     ]
 
 
