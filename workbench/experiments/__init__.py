@@ -19,7 +19,7 @@ from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment, every_setting, other_profiles
 from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import (
-    Asked,
+    Outlook,
     Prediction,
     predicted_cases,
     predictions,
@@ -108,7 +108,7 @@ def foreseen(
 
 
 @contextmanager
-def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Asked]:
+def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Outlook]:
     """The machine as its models predict it."""
     experiments = system.experiments
     if experiments is None:
@@ -124,10 +124,10 @@ def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Asked]:
         everything = Path(scratch) / "AllEffects.fmu"
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
-        yield Asked(everything, system, experiments, rivals, effects)
+        yield Outlook(everything, system, experiments, rivals, effects)
 
 
-def _confirmed(asked: Asked, ranked: Sequence[Prediction], workers: int) -> list[Prediction]:
+def _confirmed(asked: Outlook, ranked: Sequence[Prediction], workers: int) -> list[Prediction]:
     """The best first: rivals that bend far are known by full fits alone, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
@@ -145,7 +145,9 @@ def _confirmed(asked: Asked, ranked: Sequence[Prediction], workers: int) -> list
     return [*confirmed, *left]
 
 
-def _cases(asked: Asked, plan: Sequence[Experiment], workers: int) -> list[tuple[Experiment, Case]]:
+def _cases(
+    asked: Outlook, plan: Sequence[Experiment], workers: int
+) -> list[tuple[Experiment, Case]]:
     """Recordings of experiments, those that would count."""
     planned = predicted_cases(asked, plan, workers)
     if not planned:

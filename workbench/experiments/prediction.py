@@ -101,7 +101,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Asked:
+class Outlook:
     """What experiments are predicted with.
 
     Attributes
@@ -126,7 +126,7 @@ def _modelled(path: Path) -> Iterator[CoSimulation]:
 
 
 def predicted_cases(
-    asked: Asked,
+    asked: Outlook,
     plan: Sequence[Experiment],
     workers: int,
 ) -> list[tuple[Experiment, Case]]:
@@ -156,7 +156,7 @@ def _counts(case: Case, system: System) -> bool:
     return True
 
 
-def _values(asked: Asked, candidate: Experiment) -> dict[str, float]:
+def _values(asked: Outlook, candidate: Experiment) -> dict[str, float]:
     """Parameters of the first rival in an experiment."""
     system, rivals, effects = asked.system, asked.rivals, asked.effects
     first, values = rivals.models[0], dict(rivals.given)
@@ -190,7 +190,7 @@ def _choices(system: System, level: str, candidate: Experiment) -> set[str]:
 
 
 def predictions(
-    asked: Asked,
+    asked: Outlook,
     planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
@@ -203,7 +203,7 @@ def predictions(
 
 
 def refitted_predictions(
-    asked: Asked,
+    asked: Outlook,
     planned: Sequence[tuple[Experiment, Case]],
     workers: int,
 ) -> list[Prediction]:
@@ -213,7 +213,7 @@ def refitted_predictions(
         return [one.result() for one in under_way]
 
 
-def _refitted(asked: Asked, candidate: Experiment, case: Case) -> Prediction:
+def _refitted(asked: Outlook, candidate: Experiment, case: Case) -> Prediction:
     with _fitted(asked, [(candidate, case)], 1) as (simulations, fit, rows):
 
         def again(true: _Row, other: _Row, _: int) -> tuple[float, Matrix]:
@@ -245,7 +245,7 @@ class _Row:
 
 @contextmanager
 def _fitted(
-    asked: Asked, planned: Sequence[tuple[Experiment, Case]], workers: int
+    asked: Outlook, planned: Sequence[tuple[Experiment, Case]], workers: int
 ) -> Iterator[tuple[Simulations, Fit, list[_Row]]]:
     """All rivals about their points, along experiments."""
     cases = [case for _, case in planned]
@@ -271,7 +271,7 @@ def _begun(fit: Fit, starts: Sequence[Mapping[str, float]]) -> Matrix:
     return deviations
 
 
-def _linearised(fit: Fit, asked: Asked, rival: Rival, begun: Matrix) -> _Row:
+def _linearised(fit: Fit, asked: Outlook, rival: Rival, begun: Matrix) -> _Row:
     rivals, effects = asked.rivals, asked.effects
     start = fit.unknowns.start()
     levels = {key: rival.levels.get(key, usual) for key, usual in start.levels.items()}
