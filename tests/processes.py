@@ -10,9 +10,9 @@ from pathlib import Path
 def comes_true(condition: Callable[[], bool]) -> bool:
     """Wait a minute at most, which a machine that has other work to do may need."""
     end = time.monotonic() + 60.0
-    while not condition() and time.monotonic() < end:
+    while not (true := condition()) and time.monotonic() < end:
         time.sleep(0.02)
-    return condition()
+    return true
 
 
 @contextmanager
