@@ -5,6 +5,7 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.expression import Expression
 from workbench.system import System
+from workbench.system_conditions import Condition
 from workbench.system_experiments import (
     SINE,
     STAIRCASE,
@@ -15,7 +16,6 @@ from workbench.system_experiments import (
     Setting,
     VariedInput,
 )
-from workbench.system_parts import Condition
 from workbench.system_tables import read_measured
 from workbench.tables import Table
 from workbench.units import check_unit, quantity

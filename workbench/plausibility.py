@@ -14,7 +14,8 @@ import numpy as np
 from workbench.errors import InputError
 from workbench.recording import Vector
 from workbench.system import System
-from workbench.system_parts import FIRST, Condition, Redundancy, Signal, Tolerance
+from workbench.system_conditions import FIRST, Condition
+from workbench.system_parts import Redundancy, Signal, Tolerance
 from workbench.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read

@@ -23,10 +23,10 @@ from workbench.system_comparison import (
     Level,
     Rest,
 )
+from workbench.system_conditions import Condition
 from workbench.system_distance import Stopping
 from workbench.system_experiments import Experiments
 from workbench.system_parts import (
-    Condition,
     Cutting,
     Derived,
     Estimated,
@@ -242,7 +242,7 @@ class System:
         """Parameters that the conditions of a recording set, SI."""
         found: dict[str, float] = {}
         for one in self.conditions:
-            found |= one.parameters.get(str(conditions[one.name]), {})
+            found |= one.means(conditions[one.name])
         return found
 
     def model(self, role: str) -> Model:
@@ -255,17 +255,23 @@ class System:
         """
         return self.models.get(role, self.models[OBSERVER])
 
-    def signal(self, name: str, measured: Mapping[str, Vector]) -> Vector:
+    def signal(
+        self,
+        name: str,
+        measured: Mapping[str, Vector],
+        parameters: Mapping[str, float] | None = None,
+    ) -> Vector:
         """A measured or derived signal of a recording, (n,) SI.
 
         Parameters
         ----------
         measured : signals by name, (n,) each.
+        parameters : of the model, where they are others than this machine's.
         """
         if name in measured:
             return measured[name]
         derived = next(one for one in self.derived if one.name == name)
-        return self.evaluate(derived.formula, measured)
+        return self.evaluate(derived.formula, measured, parameters)
 
     def evaluate(
         self,
@@ -279,7 +285,7 @@ class System:
         values: dict[str, Any] = {}
         for name in formula.names:
             if name in measured or any(one.name == name for one in self.derived):
-                values[name] = self.signal(name, measured)
+                values[name] = self.signal(name, measured, parameters)
             else:
                 values[name] = known[name]
         size = next(iter(measured.values())).size

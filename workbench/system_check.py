@@ -134,6 +134,7 @@ def _parameters(system: System) -> Iterator[_Reference]:
             for one in system.conditions
             for parameters in one.parameters.values()
         ),
+        *((f"conditions.{one.name}.sets", [one.sets]) for one in system.conditions if one.sets),
     ]
     for table, entries in tables:
         for name in entries:

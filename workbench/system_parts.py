@@ -1,4 +1,4 @@
-"""What a system is made of: models, signals, quantities, conditions, and what counts."""
+"""What a system is made of: models, signals, quantities, and what counts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from workbench.expression import Expression
-
-FIRST, LARGEST = "first", "largest"  # of the values along a recording
 
 
 @dataclass(frozen=True)
@@ -239,21 +237,6 @@ class Redundancy:
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """What a recording says of a condition.
-
-    Attributes
-    ----------
-    formula : of measured signals, in the unit of the condition.
-    place : FIRST or LARGEST, which of its values tells the condition.
-    """
-
-    formula: Expression
-    place: str
-    tolerance: Tolerance
-
-
-@dataclass(frozen=True)
 class Sampling:
     """Times between samples [s]; infinite where nothing is known of them.
 
@@ -305,37 +288,6 @@ class OperatingPoint:
     inputs: Mapping[str, float]
     held: Mapping[str, Expression]
     quantities: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Condition:
-    """What was set before a recording, and what it means.
-
-    Attributes
-    ----------
-    unit : SI of a quantity; empty for a word or a whole number.
-    least : smallest quantity; `exclusive`: above it.
-    choices : words or whole numbers that it may be.
-    count : of entries, where it is a list; 0: no list.
-    parameters : of the model by choice, which it sets; `told`: in estimators, too.
-    lasts : mean time until another choice takes its place, under way; infinite: never [s].
-    sign : whether it is the sign of the recording's signals.
-    label : for people.
-    agrees : what the recording says of it, or None.
-    """
-
-    name: str
-    label: str
-    unit: str
-    least: float
-    exclusive: bool
-    choices: tuple[str | int, ...]
-    count: int
-    parameters: Mapping[str, Mapping[str, float]]
-    told: bool
-    lasts: float
-    sign: bool
-    agrees: Agreement | None
 
 
 @dataclass(frozen=True)

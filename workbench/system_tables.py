@@ -8,11 +8,8 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.expression import Expression
 from workbench.system import System
+from workbench.system_conditions import FIRST, LARGEST, Agreement, Condition
 from workbench.system_parts import (
-    FIRST,
-    LARGEST,
-    Agreement,
-    Condition,
     Derived,
     Estimated,
     Export,
@@ -216,7 +213,9 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
-        own.refuse_unknown("label unit least above choices count parameters told lasts sign agrees")
+        own.refuse_unknown(
+            "label unit least above choices count sets parameters told lasts sign agrees"
+        )
         choices: list[Any] = own.take("choices", list) if "choices" in own else []
         if bool(choices) == ("unit" in own):
             raise InputError(
@@ -225,6 +224,8 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                 expected="either the unit of a quantity, or the choices",
                 remedy='write unit = "m/s", or choices = ["new", "worn"]',
             )
+        if choices and "sets" in own:
+            raise own.wrong("sets", "[conditions.NAME.parameters], where there are choices")
         parameters = own.table("parameters")
         for choice in parameters.content:
             if choice not in map(str, choices):
@@ -238,6 +239,7 @@ def read_condition_kinds(table: Table) -> tuple[Condition, ...]:
                 exclusive="above" in own,
                 choices=tuple(choices),
                 count=own.take("count", int) if "count" in own else 0,
+                sets=own.text("sets", ""),
                 parameters={
                     choice: {
                         key: parameters.table(choice).number(key, "1")

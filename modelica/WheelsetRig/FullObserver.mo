@@ -60,8 +60,8 @@ model FullObserver "Full observer model: frame bounce, brake unit pitch, wheelse
     constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
   replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
     constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(u=Fx)
-    constrainedby Sensors.PartialForceSensor(u=Fx) "Force sensor of the rig";
+  replaceable Sensors.IdealForceSensor forceSensor(u=Fx, Q=Q)
+    constrainedby Sensors.PartialForceSensor(u=Fx, Q=Q) "Force sensor of the rig";
 
 protected
   Units.Velocity vSlide "Velocity of the disc relative to the pads, upwards";

@@ -23,6 +23,8 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.AngularVelocity omegaR(start=0.0, fixed=true, nominal=50.0) "Angular velocity of the roller";
   output Units.Force Fx "Longitudinal creep force of both wheels";
   output Units.Velocity slip "Slip velocity";
+  output Units.Velocity v = rollerRadius.y*omegaR "Speed of the roller's surface";
+  output Units.Force Q = wheelLoad.y "Wheel load that acts";
   output Units.AngularVelocity omegaWReading = speedSensorW.y "Reading of speedSensorW";
   output Units.AngularVelocity omegaRReading = speedSensorR.y "Reading of speedSensorR";
   output Units.Force FxReading = forceSensor.y "Reading of forceSensor";
@@ -37,9 +39,9 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Brakes.PartialPadFriction(
     level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW) "Pad friction";
   replaceable Contact.ConstantAdhesion adhesion(
-    level=muWR + dmuWR, w=slip, v=rollerRadius.y*omegaR, Fx=Fx/2.0)
+    level=muWR + dmuWR, w=slip, v=v, Fx=Fx/2.0)
     constrainedby Contact.PartialAdhesion(
-    level=muWR + dmuWR, w=slip, v=rollerRadius.y*omegaR, Fx=Fx/2.0) "Contact friction";
+    level=muWR + dmuWR, w=slip, v=v, Fx=Fx/2.0) "Contact friction";
   replaceable Losses.WheelsetLoss wheelsetLoss(omega=omegaW)
     constrainedby Losses.PartialLoss(omega=omegaW) "Bearings and discs of the wheelset";
   replaceable Losses.RollerLoss rollerLoss(omega=omegaR)
@@ -51,9 +53,9 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   replaceable Quantities.Unchanged wheelLoad(u=Fz, omega=omegaW)
     constrainedby Quantities.PartialWheelLoad(u=Fz, omega=omegaW) "Wheel load";
   replaceable Quantities.Unchanged creepStiffness(
-    u=Contact.kalkerStiffness(wheelLoad.y), omega=omegaW)
+    u=Contact.kalkerStiffness(Q), omega=omegaW)
     constrainedby Quantities.PartialCreepStiffness(
-    u=Contact.kalkerStiffness(wheelLoad.y), omega=omegaW)
+    u=Contact.kalkerStiffness(Q), omega=omegaW)
     "Creep force per creepage at zero slip";
   replaceable Quantities.Unchanged wheelInertia(u=JW, omega=omegaW)
     constrainedby Quantities.PartialWheelInertia(u=JW, omega=omegaW) "Inertia of the wheelset";
@@ -65,15 +67,14 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
     constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
   replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
     constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(u=Fx)
-    constrainedby Sensors.PartialForceSensor(u=Fx) "Force sensor of the rig";
+  replaceable Sensors.IdealForceSensor forceSensor(u=Fx, Q=Q)
+    constrainedby Sensors.PartialForceSensor(u=Fx, Q=Q) "Force sensor of the rig";
 
 protected
   Units.Torque tauB "Torque of the pads on the wheelset";
 equation
-  slip = rollerRadius.y*omegaR - wheelRadius.y*omegaW;
-  Fx = 2.0*Contact.creepForce(
-    slip, rollerRadius.y*omegaR, wheelLoad.y, creepStiffness.y, adhesion.mu0, polach);
+  slip = v - wheelRadius.y*omegaW;
+  Fx = 2.0*Contact.creepForce(slip, v, Q, creepStiffness.y, adhesion.mu0, polach);
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
   wheelInertia.y*der(omegaW) =
     wheelRadius.y*Fx - tauB - wheelsetLoss.tau + wheelInertia.y*correctionW;

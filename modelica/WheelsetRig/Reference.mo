@@ -72,8 +72,10 @@ model Reference "Multibody model of the rig: eight bodies, 21 degrees of freedom
     constrainedby Sensors.PartialSpeedSensor(u=omegaW) "Speed sensor of the wheelset";
   replaceable Sensors.IdealSpeedSensor speedSensorR(u=omegaR)
     constrainedby Sensors.PartialSpeedSensor(u=omegaR) "Speed sensor of the roller";
-  replaceable Sensors.IdealForceSensor forceSensor(u=FcellL + FcellR)
-    constrainedby Sensors.PartialForceSensor(u=FcellL + FcellR) "Sum of the load cells";
+  replaceable Sensors.IdealForceSensor forceSensor(
+    u=FcellL + FcellR, Q=0.5*(FzL + FzR))
+    constrainedby Sensors.PartialForceSensor(
+    u=FcellL + FcellR, Q=0.5*(FzL + FzR)) "Sum of the load cells";
 
   inner Parts.World world
     annotation (Placement(transformation(extent={{-100,80},{-80,100}})));

@@ -17,10 +17,12 @@ from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment, every_setting, other_profiles
+from workbench.experiments.claims import counts
 from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import (
     Outlook,
     Prediction,
+    claimed_alike,
     predicted_cases,
     predictions,
     refitted_predictions,
@@ -131,25 +133,31 @@ def _confirmed(asked: Outlook, ranked: Sequence[Prediction], workers: int) -> li
     """The best first: rivals that bend far are known by full fits alone, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
-    promise.
+    promise. What not all rivals claim comes last.
     """
     confirmed: list[Prediction] = []
+    doubtful: list[Prediction] = []
     left = list(ranked)
     while left and len(confirmed) < _CONFIRMED:
         some, left = left[:_TOGETHER], left[_TOGETHER:]
-        planned = [(one.candidate, one.case) for one in some]
+        alike = claimed_alike(asked, [(one.candidate, one.case) for one in some], workers)
+        doubtful += [one for one, well in zip(some, alike, strict=True) if not well]
+        planned = [(o.candidate, o.case) for o, well in zip(some, alike, strict=True) if well]
+        if not planned:
+            continue
         confirmed = chosen([*confirmed, *refitted_predictions(asked, planned, workers)])
         last = confirmed[min(PROPOSED, len(confirmed)) - 1]
         if left and chosen([last, left[0]])[0] is last:
             break
-    return [*confirmed, *left]
+    return [*confirmed, *left, *doubtful]
 
 
 def _cases(
     asked: Outlook, plan: Sequence[Experiment], workers: int
 ) -> list[tuple[Experiment, Case]]:
     """Recordings of experiments, those that would count."""
-    planned = predicted_cases(asked, plan, workers)
+    cases = predicted_cases(asked, plan, asked.rivals.models[0], workers)
+    planned = [pair for pair in zip(plan, cases, strict=True) if counts(pair[1], asked.system)]
     if not planned:
         raise InputError(
             where=f"{asked.system.source}, [next]",

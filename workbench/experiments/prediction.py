@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from workbench.case import Case
+from workbench.conditions import USUAL
 from workbench.diagnosis.catalogue import Effect
-from workbench.diagnosis.counting import count
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import variables
 from workbench.diagnosis.fit import Fit
@@ -26,10 +26,9 @@ from workbench.diagnosis.quadratic import (
     minimum,
 )
 from workbench.diagnosis.rivals import Rival, Rivals
-from workbench.diagnosis.thresholds import SOUND
 from workbench.diagnosis.unknowns import ALL
-from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment
+from workbench.experiments.claims import left_claims
 from workbench.experiments.recorded import recorded, start_of
 from workbench.experiments.refit import Refit
 from workbench.experiments.separation import precision, refitted, told_apart
@@ -126,11 +125,9 @@ def _modelled(path: Path) -> Iterator[CoSimulation]:
 
 
 def predicted_cases(
-    asked: Outlook,
-    plan: Sequence[Experiment],
-    workers: int,
-) -> list[tuple[Experiment, Case]]:
-    """Recordings of all experiments as the first rival predicts them; of those that count."""
+    asked: Outlook, plan: Sequence[Experiment], rival: Rival, workers: int
+) -> list[Case]:
+    """Recordings of experiments as a rival predicts them."""
     system, experiments = asked.system, asked.experiments
     added = {one.name for one in experiments.sensors}
     judged = tuple(one.name for one in system.judged if one.name in {*asked.rivals.signals, *added})
@@ -138,36 +135,43 @@ def predicted_cases(
         under_way = [
             pool.submit(
                 recorded,
-                *(system, experiments, one, _values(asked, one)),
+                *(system, experiments, one, _values(asked, one, rival)),
                 *(f"{number:03}", judged, number),
             )
             for number, one in enumerate(plan, 1)
         ]
-        cases = [one.result() for one in under_way]
-    return [pair for pair in zip(plan, cases, strict=True) if _counts(pair[1], system)]
+        return [one.result() for one in under_way]
 
 
-def _counts(case: Case, system: System) -> bool:
-    """Whether a recording has enough that counts."""
-    try:
-        count(case, system, tuple(case.signals), SOUND, restarting=True)
-    except InputError:
-        return False
-    return True
+def claimed_alike(
+    asked: Outlook, planned: Sequence[tuple[Experiment, Case]], workers: int
+) -> list[bool]:
+    """Whether all rivals stay within what the system claims, or leave it for the same reasons.
+
+    Where a wheel slides by one of them alone, what it then does is foreseen by none.
+    """
+    plan = [candidate for candidate, _ in planned]
+    first = [left_claims(case, asked.system) for _, case in planned]
+    alike = [reasons is not None for reasons in first]
+    for rival in asked.rivals.models[1:]:
+        others = predicted_cases(asked, plan, rival, workers)
+        for k, case in enumerate(others):
+            alike[k] = alike[k] and left_claims(case, asked.system) == first[k]
+    return alike
 
 
-def _values(asked: Outlook, candidate: Experiment) -> dict[str, float]:
-    """Parameters of the first rival in an experiment."""
+def _values(asked: Outlook, candidate: Experiment, rival: Rival) -> dict[str, float]:
+    """Parameters of a rival in an experiment."""
     system, rivals, effects = asked.system, asked.rivals, asked.effects
-    first, values = rivals.models[0], dict(rivals.given)
+    values = dict(rivals.given)
     for condition in system.conditions:
         setting = candidate.settings.get(condition.name)
-        usual = condition.choices[0] if condition.choices else ""
-        values |= condition.parameters.get(str(setting.value if setting else usual), {})
-    for (name, choice), level in first.levels.items():
+        usual = condition.choices[0] if condition.choices else USUAL
+        values |= condition.means(setting.value if setting else usual)
+    for (name, choice), level in rival.levels.items():
         if name in system.comparison.levels and choice in _choices(system, name, candidate):
             values[name] = level
-    for (name, parameter), size in first.sizes.items():
+    for (name, parameter), size in rival.sizes.items():
         part = "cosine" if parameter == "amplitude" else parameter
         if effects[name].late:
             continue  # a matter of its recording, not of the model

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from workbench.case import Case, read_only
-from workbench.conditions import Value
+from workbench.conditions import USUAL, Value
 from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment
 from workbench.fmu import CoSimulation, Matrix, Vector
 from workbench.system import Condition, System
+from workbench.system_conditions import LARGEST
 from workbench.system_experiments import Experiments
-from workbench.system_parts import LARGEST
 
 
 def recorded(
@@ -130,6 +130,8 @@ def _conditions(
     for one in system.conditions:
         if one.name in candidate.settings:
             found[one.name] = candidate.settings[one.name].value
+        elif one.sets:
+            found[one.name] = USUAL
         elif one.choices:
             found[one.name] = (one.choices[0],) * one.count if one.count else one.choices[0]
         else:

@@ -161,7 +161,7 @@ def _piece(
     unknown = {
         kind.name: UNKNOWN
         for kind in system.conditions
-        if kind.name not in given and kind.name not in shown and not kind.sign
+        if kind.name not in given and kind.name not in shown and not (kind.sign or kind.sets)
     }
     conditions = {**unknown, **shown, **given}
     table = Table(conditions, f"{where}, conditions")
@@ -169,10 +169,11 @@ def _piece(
     sources = {
         key: "given" if key in given else "shown by the record" if key in shown else UNKNOWN
         for key in read
+        if key in conditions
     }
     origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
     found = doubts(time, signals, read, system, origin)
-    ordered = {key: conditions[key] for key in read}
+    ordered = {key: conditions[key] for key in sources}
     return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
 
 

@@ -44,7 +44,7 @@ def watched(system: System) -> tuple[Estimated, ...]:
         for condition in system.conditions
         for parameters in condition.parameters.values()
         for name in parameters
-    }
+    } | {condition.sets for condition in system.conditions}
     return tuple(one for one in system.estimated if one.watched and one.name not in set_by)
 
 
@@ -140,7 +140,7 @@ def _parameters(case: Case, system: System) -> dict[str, float]:
     """Parameters of the model that the conditions of a recording set, but for those estimated."""
     found: dict[str, float] = {}
     for one in system.conditions:
-        if one.count or not one.parameters:
+        if one.count or not (one.parameters or one.sets):
             continue
         said = case.conditions[one.name]
         if said == UNKNOWN:
@@ -150,7 +150,7 @@ def _parameters(case: Case, system: System) -> dict[str, float]:
                 expected="what it was, because the model is another one by that",
                 remedy=f"write {one.name} into case.toml, if anybody knows",
             )
-        found |= one.parameters.get(str(said), {})
+        found |= one.means(said)
     estimated = {one.name for one in system.estimated}
     return {name: value for name, value in found.items() if name not in estimated}
 

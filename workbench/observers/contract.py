@@ -213,14 +213,15 @@ class Estimator(ABC):
     def tell(self, conditions: Mapping[str, Value]) -> None:
         """Take the parameters of a recording's conditions from its next start on.
 
-        Those that estimators are told; estimates of quantities start there. One that finds a
-        condition by itself has a model for each choice, to which this is nothing.
+        Those that estimators are told, and their model has; estimates of quantities start there.
+        One that finds a condition by itself has a model for each choice, to which this is nothing.
         """
         self._known = {
             name: value
             for one in self.system.conditions
             if one.told
-            for name, value in one.parameters.get(str(conditions[one.name]), {}).items()
+            for name, value in one.means(conditions[one.name]).items()
+            if name in self.fmu.parameters
         }
 
     def start(self, u: Vector, y: Vector) -> None:

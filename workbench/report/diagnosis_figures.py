@@ -256,8 +256,9 @@ def _measured(
 ) -> Panel:
     """A signal as measured, at the blocks."""
     unit = shown_unit(system, signal)
-    values = system.signal(signal, case.signals) / per_shown(system, signal, unit)
-    curve = Curve("measured", parted(np.interp(one.block_time, case.time, values)))
+    factor = per_shown(system, signal, unit)
+    values = system.signal(signal, case.signals, system.set_by(case.conditions))
+    curve = Curve("measured", parted(np.interp(one.block_time, case.time, values / factor)))
     low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
     room = 0.08 * (high - low) or 1.0
     title = f"{capital(named(system, signal))}, as measured [{unit}]"

@@ -15,8 +15,8 @@ from workbench.schemas.words import (
     listed,
 )
 from workbench.system import System
+from workbench.system_conditions import FIRST, LARGEST, Condition
 from workbench.system_distance import COMMAND, END, SPEED
-from workbench.system_parts import FIRST, LARGEST, Condition
 
 
 def _file(title: str, schema: Schema) -> Schema:
@@ -39,6 +39,7 @@ def gains_schema(system: System) -> Schema:
 def case_schema(system: System) -> Schema:
     """Of the `case.toml` of a system."""
     conditions = {one.name: _condition(one) for one in system.conditions}
+    unsaid = " ".join(one.name for one in system.conditions if one.sets)
     columns = closed(dict.fromkeys(("time", *system.signals), _COLUMN), optional="*")
     measurement = {
         "file": {**NAMED, "description": "recording in this folder"},
@@ -49,7 +50,7 @@ def case_schema(system: System) -> Schema:
         "title": NAMED,
         "date": {**TEXT, "description": "when it was recorded, ISO 8601"},
         "measurement": closed(measurement, optional="columns counts_from"),
-        "conditions": closed(conditions),
+        "conditions": closed(conditions, optional=unsaid),
         "model": closed({"names": by_name(NAMED)}, optional="names"),
     }
     title = f"case.toml of {system.name}: {system.title}"
@@ -201,7 +202,7 @@ def _estimated() -> Schema:
 def _condition_kind(formula: Schema) -> Schema:
     agrees = {"is": formula, "at": {"enum": [FIRST, LARGEST]}, "within": PAIR, "slack": QUANTITY}
     entries = {
-        **dict.fromkeys(("label", "unit"), NAMED),
+        **dict.fromkeys(("label", "unit", "sets"), NAMED),
         **dict.fromkeys(("least", "above", "lasts"), QUANTITY),
         "choices": {"type": "array", "minItems": 1},
         "count": {"type": "integer", "minimum": 1},

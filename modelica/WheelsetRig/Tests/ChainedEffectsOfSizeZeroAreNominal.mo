@@ -50,9 +50,9 @@ model ChainedEffectsOfSizeZeroAreNominal "All effects at once, of size zero, are
 
   model ForceSensor "Chain of all errors of the load cells"
     extends Sensors.PartialForceSensor;
-    Effects.ApexOffset apex(u=u);
-    Sensors.FxGain gain(u=apex.y);
-    Sensors.FxOffset zero(u=gain.y);
+    Effects.ApexOffset apex(u=u, Q=Q);
+    Sensors.FxGain gain(u=apex.y, Q=Q);
+    Sensors.FxOffset zero(u=gain.y, Q=Q);
   equation
     y = zero.y;
   end ForceSensor;

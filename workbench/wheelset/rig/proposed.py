@@ -7,12 +7,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from workbench.conditions import USUAL
 from workbench.errors import InputError
 from workbench.experiments.candidates import Profile
 from workbench.recording import read_text
 from workbench.system import System
 from workbench.wheelset.rig.drive import TRAIN_INERTIA
-from workbench.wheelset.rig.scenarios import FRICTION, Conditions, Scenario, Surface
+from workbench.wheelset.rig.scenarios import FRICTION, WHEEL_LOAD, Conditions, Scenario, Surface
 
 _NAME = "30_next"
 _SURFACES: Mapping[str, Surface] = {"dry": "dry", "wet": "wet"}
@@ -67,6 +68,8 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     if len(discs) != system.condition("discs").count:
         raise ValueError
     speed, pressure = float(said["initial_speed"]), float(demand[0])
-    conditions = Conditions(speed, pressure, rail, tuple(discs), direction)
+    asked_load = said.get("wheel_load", USUAL)
+    load = WHEEL_LOAD if asked_load == USUAL else float(asked_load)
+    conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
     return Scenario(_NAME, conditions, FRICTION[rail], None, True, steps, imitated)

@@ -166,7 +166,7 @@ def _parameters(
         "rR": nominal["rR"] + effects.roller_radius,
         "JW": nominal["JW"] * drawn.JW * (1.0 + effects.wheel_inertia),
         "JR": nominal["JR"] * drawn.JR * (1.0 + effects.roller_inertia),
-        "Fz": nominal["Fz"] * drawn.Fz * (1.0 + effects.wheel_load),
+        "Fz": scenario.conditions.wheel_load * drawn.Fz * (1.0 + effects.wheel_load),
         "muWR": scenario.muWR * drawn.muWR,
         "muDC": FRICTION,
         "actuation.p0": nominal["actuation.p0"] + effects.return_spring,

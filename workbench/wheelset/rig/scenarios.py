@@ -10,6 +10,7 @@ from workbench.wheelset.rig.drive import TRAIN_INERTIA
 Surface: TypeAlias = Literal["dry", "wet"]
 
 FRICTION: Mapping[Surface, float] = {"dry": 0.40, "wet": 0.30}  # at zero slip velocity
+WHEEL_LOAD = 80e3  # [N] usually
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Conditions:
     wheel_rail : surface of the rails.
     discs : surface of each disc.
     direction : of travel, 1 or -1.
+    wheel_load : [N] that the vertical cylinders are set to.
     """
 
     initial_speed: float
@@ -30,6 +32,7 @@ class Conditions:
     wheel_rail: Surface
     discs: tuple[Surface, ...]
     direction: Literal[1, -1]
+    wheel_load: float = WHEEL_LOAD
 
 
 @dataclass(frozen=True)
@@ -87,9 +90,10 @@ class Scenario:
         wet = [str(i) for i, disc in enumerate(c.discs, start=1) if disc == "wet"]
         some = "wet:" + "+".join(wet)
         discs = {0: "dry", len(c.discs): "wet"}.get(len(wet), some)
+        load = f", wheel load {c.wheel_load / 1e3:g} kN" if c.wheel_load != WHEEL_LOAD else ""
         return (
             f"{c.initial_speed * 3.6:g} km/h, {c.brake_pressure / 1e5:g} bar, "
-            f"rail {c.wheel_rail}, discs {discs}, direction {c.direction:+d}"
+            f"rail {c.wheel_rail}, discs {discs}, direction {c.direction:+d}{load}"
         )
 
 

@@ -36,7 +36,7 @@ MEASURED = {
 }
 
 
-_CREST = 160e3 / 1.16  # [N/m] both wheel loads over rW + rR: slope of the contact off the crest
+_CREST = 2.0 / 1.16  # [1/m] of both wheels over rW + rR: slope of the contact off the crest
 _BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
 
 # Streams of random numbers: 0 tolerances, 1 to 5 noise, 6 phases.
@@ -63,7 +63,8 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
     ring = 1.0 + e.pole_ring * np.cos(stop.at(wheel, "phiW") + stop.phases.pole_ring)
     beat = 1.0 + e.drive_beat * np.sin(_BEAT * time)
     # The wheel load presses against the slope: in the same direction, wherever the wheel turns.
-    crest = _CREST * e.apex_offset * drawn.Fz * (1.0 + e.wheel_load)
+    load = stop.scenario.conditions.wheel_load * drawn.Fz * (1.0 + e.wheel_load)
+    crest = _CREST * load * e.apex_offset
     ideal = {
         "pB": stop.at(time - e.late_pB, "pB") + e.pressure_offset,
         "tauR": stop.at(time - e.late_tauR, "tauR") * (1.0 + e.torque_gain) * beat,
