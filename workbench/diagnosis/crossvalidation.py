@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from workbench.diagnosis.cleaning import Mask
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import lasting
 from workbench.diagnosis.quadratic import Quadratic, add, minimum
@@ -36,8 +37,8 @@ class CrossValidation:
         span = one.linearised.lasting
         return np.array(
             [
-                (errors**2 if fast else lasting(errors, span)).mean()
-                for errors in self._known[id(one)][1]
+                (errors[:, told] ** 2 if fast else lasting(errors[:, told], span)).mean()
+                for errors, told in zip(self._known[id(one)][1], self._told(one), strict=True)
             ]
         )
 
@@ -45,6 +46,11 @@ class CrossValidation:
         """Share of the explainable by which two fits differ; mean square error of the first."""
         before, after = (float(self.squares(one, fast=fast).mean()) for one in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
+
+    def _told(self, one: Fitted) -> list[Mask]:
+        """Channels that are told, of each recording or part."""
+        told = [evidence.told > 0 for evidence in one.linearised.evidence]
+        return told * self._fit.parts if self._fit.unknowns.count == 1 else told
 
     def _errors(self, one: Fitted) -> list[Matrix]:
         if self._fit.unknowns.count == 1:

@@ -68,10 +68,10 @@ class Linearised:
         return float(sum(one.residual @ one.residual for one in self.evidence))
 
     @property
-    def _squares(self) -> tuple[int, Vector]:
-        """Number of blocks, and mean square of their errors by channel (m,)."""
+    def _squares(self) -> tuple[Vector, Vector]:
+        """Number of blocks that are told, and mean square of their errors, by channel (m,)."""
         errors = np.concatenate([one.errors for one in self.evidence])
-        return len(errors), np.square(errors).mean(axis=0)
+        return _told(self.evidence), _share(self.evidence) * np.square(errors).mean(axis=0)
 
     @property
     def deviance(self) -> float:
@@ -113,8 +113,20 @@ def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
     against that, not against the noise.
     """
     squares = np.concatenate([lasting(one.errors, blocks) for one in evidence])
-    slow: Vector = np.maximum(1.0, squares.mean(axis=0))
+    slow: Vector = np.maximum(1.0, _share(evidence) * squares.mean(axis=0))
     return slow
+
+
+def _told(evidence: Sequence[Evidence]) -> Vector:
+    """Number of blocks that are told, by channel (m,)."""
+    counts: Vector = np.sum([one.told for one in evidence], axis=0)
+    return counts
+
+
+def _share(evidence: Sequence[Evidence]) -> Vector:
+    """Blocks over those that are told, by channel (m,): silent ones have no errors."""
+    share: Vector = sum(len(one.errors) for one in evidence) / _told(evidence)
+    return share
 
 
 def between(one: Point, other: Point) -> Point:

@@ -92,9 +92,9 @@ class Outcome:
 
     @property
     def missing(self) -> tuple[Signal, ...]:
-        """What could be compared, if all recordings had it."""
+        """What could be compared, if recordings had it."""
         judged = self.system.judged
-        return tuple(one for one in judged if not all(one.name in case for case in self.cases))
+        return tuple(one for one in judged if not any(one.name in case for case in self.cases))
 
     @property
     def turns(self) -> bool:

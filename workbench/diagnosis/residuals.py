@@ -63,7 +63,7 @@ class Residuals:
     name : of the recording.
     time : (n,) [s] of the balances.
     balances : that the system's companion knows.
-    channels : that are compared.
+    channels : that are compared, and that it has.
     block_time : (b,) [s].
     before, after : (b, c) prediction errors of the nominal and of the last model, by channel.
     sigma : (b, c) their standard deviation by noise.
@@ -97,17 +97,20 @@ def residuals(
     system, known = simulations.system, _balances(simulations.system)
     found = []
     for k, (case, one) in enumerate(zip(simulations.cases, simulations.recordings, strict=True)):
-        inverse = np.linalg.inv(one.whitening)
+        told = np.flatnonzero(~one.silent)
+        inverse = np.linalg.inv(one.whitening[:, told[:, None], told])
         unwhitened: list[Matrix] = [
-            np.einsum("bij,bj->bi", inverse, lin.evidence[k].errors) for lin in (before, after)
+            np.einsum("bij,bj->bi", inverse, lin.evidence[k].errors[:, told])
+            for lin in (before, after)
         ]
+        formed = channels(system, one.signals)
         fitted = {**simulations.nominal, **values[k]}
         found.append(
             Residuals(
                 name=case.name,
                 time=case.time,
                 balances=tuple(known.balances(system, case, one, fitted)) if known else (),
-                channels=channels(system, one.signals),
+                channels=tuple(formed[c] for c in told),
                 block_time=case.time[one.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
                 after=unwhitened[1],
@@ -132,13 +135,17 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
     signs = [sign(case, system) for case in simulations.cases]
     pairs = list(zip(signs, found, strict=True))
     table = []
-    for c, channel in enumerate(found[0].channels):
-        before = [mark * one.before[:, c] / one.sigma[:, c] for mark, one in pairs]
-        after = [mark * one.after[:, c] / one.sigma[:, c] for mark, one in pairs]
+    for channel in dict.fromkeys(channel for one in found for channel in one.channels):
+        before, after, along = [], [], []
+        for (mark, one), own in zip(pairs, influences, strict=True):
+            if channel in one.channels:
+                c = one.channels.index(channel)
+                before.append(mark * one.before[:, c] / one.sigma[:, c])
+                after.append(mark * one.after[:, c] / one.sigma[:, c])
+                along.append(own)
         for name in influences[0]:
             shares = (
-                _explained(errors, influences, name, apart=name in turning)
-                for errors in (before, after)
+                _explained(errors, along, name, apart=name in turning) for errors in (before, after)
             )
             table.append(Dependence(channel.name, name, *shares))
     return sorted(table, key=lambda one: -one.before)

@@ -44,6 +44,8 @@ def errors_of(
         sizes = [lin.evidence[k].sizes for lin in (before, after)]
         samples = int(one.told.sum())
         for c, channel in enumerate(channels(simulations.system, one.signals)):
+            if one.silent[c]:
+                continue
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
             found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))
     return found

@@ -36,6 +36,7 @@ from workbench.system import Channel, Comparison, Mode, System
 
 _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
+_WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-12 of chi-squared
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,9 @@ class Samples:
     time : (n,) [s].
     inputs : names of the columns of u.
     u : (n, m) measured inputs, without noise that the model would not feel.
-    signals : names of the columns of y: outputs, and what is judged if it was measured.
-    y, read : (n, c) measured, without and with what is wrong.
+    signals : names of the columns of y: outputs, and what is judged if some recording has it.
+    y, read : (n, c) measured, without and with what is wrong; zero of what this one has not.
+    silent : (c,) channels of signals that this one has not: their errors have no weight.
     told : (n,) samples whose errors are told: those that are not wrong and that no reason excludes.
     limits : (2, c) of what the sensors read.
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
@@ -72,6 +74,7 @@ class Samples:
     signals: tuple[str, ...]
     y: Matrix
     read: Matrix
+    silent: Mask
     told: Mask
     limits: Matrix
     gain: Vector
@@ -136,10 +139,11 @@ class Samples:
     def sizes(self, errors: Matrix) -> Matrix:
         """Root mean square and mean absolute error of samples that are told, by channel, (2, c).
 
-        Where a sensor saturates, so does what the model says that it reads.
+        Where a sensor saturates, so does what the model says that it reads; NaN of what is silent.
         """
         said = np.clip(self.y - errors, *self.limits)
         by_channel = (self.read - said)[self.told] @ self.slopes.T
+        by_channel[:, self.silent] = np.nan
         return np.array(
             [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
         )
@@ -179,8 +183,8 @@ class Samples:
 
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
-    """Signals that all cases have: outputs, and what is only there to judge by."""
-    judged = [one.name for one in system.judged if all(one.name in case for case in cases)]
+    """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
+    judged = [one.name for one in system.judged if any(one.name in case for case in cases)]
     return (*(one.name for one in system.outputs), *judged)
 
 
@@ -216,12 +220,17 @@ def prepare(
         If the recording has too little that counts.
     """
     time, h = case.time, float(np.median(np.diff(case.time)))
-    names = (*case.inputs, *signals)
-    counted = count(case, system, names, sound, restarting=restarting)
+    own = tuple(name for name in signals if name in case)
+    counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
-    formed = channels(system, signals)
+    formed, told = channels(system, signals), channels(system, own)
     slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    gain, lead, ahead = _led(case, system, signals, clean, deviation, counted.wrong, motion)
+    own_slopes = np.array([one.formula.slopes(own, values) for one in told])
+    gain, lead, ahead = _led(case, system, own, clean, deviation, counted.wrong, motion)
+    silent = np.array([one not in told for one in formed])
+    scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
+    white = whitening(system, counted, own, own_slopes, ahead)
+    nothing = np.zeros(time.size)
     driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
     rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
@@ -233,8 +242,9 @@ def prepare(
         inputs=case.inputs,
         u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
         signals=signals,
-        y=np.ascontiguousarray(np.column_stack([clean[name] for name in signals])),
-        read=np.column_stack([case[name] for name in signals]),
+        y=np.ascontiguousarray(np.column_stack([clean.get(name, nothing) for name in signals])),
+        read=np.column_stack([case[name] if name in own else nothing for name in signals]),
+        silent=silent,
         told=counted.told,
         limits=np.array([system.signals[name].limits for name in signals]).T,
         gain=gain,
@@ -246,10 +256,20 @@ def prepare(
         rest_noise=rest_noise,
         blocks=blocks,
         slopes=slopes,
-        whitening=whitening(system, counted, signals, slopes, ahead),
+        whitening=_beside_silent(white, silent, scales),
         modes=modes,
         set_aside=counted.set_aside,
     )
+
+
+def _beside_silent(white: NDArray[np.float64], silent: Mask, scales: Vector) -> NDArray[np.float64]:
+    """Whitening (b, c, c) of channels that are told, and of silent ones, which have no weight."""
+    if not silent.any():
+        return white
+    beside = np.tile(np.diag(1.0 / (_WEIGHTLESS * scales)), (len(white), 1, 1))
+    told = np.flatnonzero(~silent)
+    beside[:, told[:, None], told] = white
+    return beside
 
 
 def _led(

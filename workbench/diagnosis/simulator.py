@@ -32,7 +32,8 @@ class Evidence:
     ----------
     errors : (b, c) whitened prediction errors of the blocks, by channel.
     rest : whitened error of the input at rest.
-    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units.
+    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units; NaN of
+        a silent channel.
     jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
     """
 
@@ -40,6 +41,12 @@ class Evidence:
     rest: float
     sizes: Matrix
     jacobian: Matrix
+
+    @property
+    def told(self) -> Vector:
+        """(c,) number of blocks whose errors are told."""
+        counts: Vector = len(self.errors) * ~np.isnan(self.sizes[0])
+        return counts
 
     @property
     def residual(self) -> Vector:

@@ -33,7 +33,7 @@ from workbench.system import Channel, System
 from workbench.system_experiments import Experiments
 from workbench.system_parts import Signal
 
-__all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop"]
+__all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop", "with_sensor"]
 
 _SETTINGS = 3  # of which all profiles are tried
 _TOGETHER = 6  # experiments of which models are fitted again at a time
@@ -79,7 +79,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         if len(first.groups) < len(rivals.models):
             for sensor in experiments.sensors:
                 report(f"the same with a sensor of {sensor.label}")
-                sensed = replace(asked, system=_with_sensor(system, sensor))
+                sensed = replace(asked, system=with_sensor(system, sensor))
                 tried = [one.candidate for one in ranked[:_SENSED]]
                 cases = _cases(sensed, tried, workers)
                 found = chosen(refitted_predictions(sensed, cases, workers))[0]
@@ -168,7 +168,7 @@ def _cases(
     return planned
 
 
-def _with_sensor(system: System, sensor: Signal) -> System:
+def with_sensor(system: System, sensor: Signal) -> System:
     """The system with a further signal that is compared."""
     channel = Channel(
         sensor.name,

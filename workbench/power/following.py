@@ -15,7 +15,7 @@ from workbench.case import Case
 from workbench.diagnosis import Diagnosis, Effect
 from workbench.diagnosis.rivals import Rivals
 from workbench.errors import InputError, WorkerError
-from workbench.experiments import RankedExperiment, foreseen, next_stop
+from workbench.experiments import RankedExperiment, foreseen, next_stop, with_sensor
 from workbench.experiments.candidates import drawn
 from workbench.pool import Pool
 from workbench.power.diagnosing import build_everything, distances_in_set, rivals_of_set
@@ -32,6 +32,8 @@ _NOISE = 2.0  # deviations by which noise moves it, in 95 %
 SHARES = {
     "proposed": "groups that the recording which is proposed first parts",
     "drawn": "recordings that are drawn which part their group",
+    "sensed": "groups that it parts with a sensor that is named, of those where one is",
+    "answered": "groups that it parts, with that sensor where one is named",
     "foreseen": "groups that it parts, of those that it is foreseen to part",
     "never": "groups that it parts, of those that no experiment is foreseen to part",
     "separations": "separations of these recordings shown as predicted, within a fifth or noise",
@@ -105,6 +107,8 @@ def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "proposed": share(one["parts"] for one in made),
         "drawn": share(one["parts"] for one in drawn_),
+        "sensed": share(one["parts"] for row in groups if (one := row["sensed"]) is not None),
+        "answered": share((row["sensed"] or row["proposed"])["parts"] for row in groups),
         "foreseen": share(one["parts"] for one in made if one["foreseen"]),
         "never": share(one["parts"] for one in made if not one["foreseen"]),
         "separations": share(map(_as_predicted, away)),
@@ -132,6 +136,7 @@ def _begun(planting: Planting) -> dict[str, Any]:
         "sensors": [],
         "proposed": None,
         "drawn": [],
+        "sensed": None,
         "error": "",
     }
 
@@ -170,6 +175,14 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
     plan = [drawn(experiments, rng) for _ in range(_DRAWN)]
     rest = (setup, planting, rivals, cases)
     row["proposed"] = _made(asked.tried[0], *rest)
+    if not row["proposed"]["foreseen"]:
+        at = asked.names.index(planted)
+        for sensor in experiments.sensors:
+            sensed = asked.sensors.get(sensor.label)
+            if sensed is not None and (at,) in sensed.prediction.groups:
+                fitted = replace(setup, system=with_sensor(setup.system, sensor))
+                row["sensed"] = {"sensor": sensor.label, **_made(sensed, fitted, *rest[1:])}
+                break
     row["drawn"] = [_made(one, *rest) for one in foreseen(setup.system, rivals, plan, 1)]
 
 

@@ -182,6 +182,9 @@ def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
             then = " or ".join(made["named"]) or made["verdict"]
             drawn = ["parts" if one["parts"] else "does not" for one in row["drawn"]]
             said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+        if (sensed := row["sensed"]) is not None:
+            then = " or ".join(sensed["named"]) or sensed["verdict"]
+            said += f"; with a sensor of {sensed['sensor']}: {then}"
         lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
     return "\n".join([*lines, "", *_shares(summary, following.SHARES)])
 

@@ -88,13 +88,15 @@ def _followed() -> Schema:
     away = closed({"from": TEXT, "predicted": NUMBER, "shown": or_null(NUMBER)})
     texts = {name: TEXT for name in ("experiment", "verdict")}
     flags = {name: FLAG for name in ("foreseen", "parts")}
-    made = closed({**texts, **flags, "named": listed(TEXT), "separations": listed(away)})
+    said = {**texts, **flags, "named": listed(TEXT), "separations": listed(away)}
+    made = closed(said)
     one = {
         **{name: TEXT for name in ("rig", "planted", "verdict", "sentence", "error")},
         "multiple": NUMBER,
         **{name: listed(TEXT) for name in ("group", "sensors")},
         "proposed": or_null(made),
         "drawn": listed(made),
+        "sensed": or_null(closed({"sensor": TEXT, **said})),
     }
     shares = {name: SHARE for name in following.SHARES}
     return summary("power --follow", _SETS, {**shares, "sets": listed(closed(one))})

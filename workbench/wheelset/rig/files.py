@@ -22,6 +22,9 @@ _COLUMNS = {
     "omegaW": ("rad/s", 1.0, 4),
     "omegaR": ("rad/s", 1.0, 3),
     "Fx": ("N", 1.0, 0),
+    "arms": ("N", 1.0, 0),
+    "load": ("N", 1.0, 0),
+    "surface": ("m/s", 1.0, 3),
 }
 
 
@@ -74,6 +77,7 @@ def write_recording(
     measured = {
         f"{name} [{unit}]": (channels[name][kept] * factor, f"%.{digits}f")
         for name, (unit, factor, digits) in _COLUMNS.items()
+        if name in channels
     }
     truth = {
         f"{name} [{unit}]": (stop.truth[name][recorded][kept][::every], "%.7g")

@@ -14,6 +14,7 @@ from workbench.recording import read_text
 from workbench.system import System
 from workbench.wheelset.rig.drive import TRAIN_INERTIA
 from workbench.wheelset.rig.scenarios import FRICTION, WHEEL_LOAD, Conditions, Scenario, Surface
+from workbench.wheelset.rig.sensors import FURTHER
 
 _NAME = "30_next"
 _SURFACES: Mapping[str, Surface] = {"dry": "dry", "wet": "wet"}
@@ -49,6 +50,8 @@ def proposed_stop(result: Path, system: System) -> Scenario:
 def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     """A stop whose pressure follows the profile of an experiment, as `workbench next` writes it.
 
+    All sensors of the system that the rig may have besides are fitted.
+
     Raises
     ------
     ValueError, KeyError, TypeError
@@ -72,4 +75,5 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     load = WHEEL_LOAD if asked_load == USUAL else float(asked_load)
     conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
-    return Scenario(_NAME, conditions, FRICTION[rail], None, True, steps, imitated)
+    sensors = tuple(one.name for one in system.judged if one.name in FURTHER)
+    return Scenario(_NAME, conditions, FRICTION[rail], None, True, steps, imitated, sensors)

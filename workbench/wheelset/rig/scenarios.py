@@ -57,6 +57,7 @@ class Scenario:
     protected : whether the wheel-slide protection is switched on.
     steps : demands that follow the first, (time after that [s], pressure [Pa]) each.
     imitated : inertia that the drive lets the roller have [kg.m2].
+    sensors : that are fitted besides the usual ones, by name.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Scenario:
     protected: bool
     steps: tuple[tuple[float, float], ...] = ()
     imitated: float = TRAIN_INERTIA
+    sensors: tuple[str, ...] = ()
 
     def demand(self, braking: float) -> float:
         """Brake pressure that is asked for [Pa], a time [s] after the first demand."""

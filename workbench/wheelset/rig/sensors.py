@@ -36,11 +36,19 @@ MEASURED = {
 }
 
 
+FURTHER = {
+    "arms": Sensor(200.0, 0.0, 10.0),
+    "load": Sensor(400.0, 0.0, 10.0),
+    "surface": Sensor(0.02, 0.0, 1e-3),
+}
+"""What may be fitted besides: force in the guidance arms, wheel load, speed of the roller."""
+
 _CREST = 2.0 / 1.16  # [1/m] of both wheels over rW + rR: slope of the contact off the crest
+_ROLLER = 0.70  # [m] radius
 _BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
 
-# Streams of random numbers: 0 tolerances, 1 to 5 noise, 6 phases.
-_NOISE, _SPIKES, _DROPOUTS = 1, 7, 12
+# Streams of random numbers: 0 tolerances, 1 to 5 noise, 6 phases, 7 to 11 spikes.
+_NOISE, _SPIKES, _DROPOUTS, _FURTHER = 1, 7, 12, 13
 
 
 def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vector]:
@@ -56,7 +64,7 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
 
     Returns
     -------
-    channels : pB, tauR, omegaW, omegaR, Fx, each (n,) in SI units.
+    channels : pB, tauR, omegaW, omegaR, Fx, and what is fitted besides, each (n,) in SI units.
     """
     e, drawn = effects, stop.drawn
     wheel = time - e.speed_delay - e.time_skew
@@ -82,6 +90,14 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
     if e.spikes:
         for i, name in enumerate(MEASURED):
             readings[name] = _corrupt(readings[name], e.spikes, time, _rng(stop, _SPIKES + i))
+    besides = {
+        "arms": stop.at(time, "Fx"),
+        "load": np.full(time.size, load),
+        "surface": (_ROLLER + e.roller_radius) * stop.at(time, "omegaR"),
+    }
+    for i, (name, sensor) in enumerate(FURTHER.items()):
+        if name in stop.scenario.sensors:
+            readings[name] = _read(besides[name], sensor, 1.0 + e.noise, _rng(stop, _FURTHER + i))
     return readings
 
 
