@@ -26,7 +26,7 @@ from workbench.modelica import read_library
 from workbench.system import OBSERVER, System
 from workbench.system_file import with_model
 from workbench.systems import load_system
-from workbench.wheelset.rig import SCENARIOS, Effects, select
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, select
 
 from .recordings import record
 
@@ -116,6 +116,38 @@ def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden() -> Non
     named = {name for name, _, _ in PLANTED.values()}
     hidden = {"CaliperHysteresis", "AdhesionRecovery", "FallingFriction", "WheelInertia"}
     assert named | hidden == {effect.name for effect in EFFECTS}
+
+
+def test_a_wheel_load_that_is_said_is_no_finding_and_one_that_is_not_said_is(
+    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    for scenario in select(STOPS):
+        light = replace(scenario, conditions=replace(scenario.conditions, wheel_load=60e3))
+        record(light, 38, CONSTANT_PADS, tmp_path / scenario.name)
+    cases = read_cases([tmp_path], SYSTEM)
+    assert diagnosed(cases).verdict == "nothing"
+    unsaid = [
+        replace(one, conditions={n: c for n, c in one.conditions.items() if n != "wheel_load"})
+        for one in cases
+    ]
+    (cause,) = diagnosed(unsaid).causes
+    assert {cause.effect.name, *cause.confusable_with} == {"WheelLoad", "CreepStiffness"}
+
+
+def test_a_force_that_one_recording_has_not_tells_in_the_others(
+    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
+) -> None:
+    cases = recorded(tmp_path, plant(CONSTANT_PADS, ["fx_gain=0.02"]), 39)
+    some = [cases[0].without(["Fx"]), *cases[1:]]
+    widths = []
+    for which in (cases, some, some[1:]):
+        (cause,) = diagnosed(which).causes
+        assert "FxGain" in {cause.effect.name, *cause.confusable_with}
+        (size,) = cause.parameters.values()
+        widths.append(size.high - size.low)
+        assert size.low < 0.02 < size.high
+    # Less is known than of all forces, and no less than of the recordings that have one.
+    assert widths[0] < widths[1] < 1.02 * widths[2]
 
 
 @pytest.mark.parametrize("planted", mostly_long(PLANTED, SHORT))

@@ -17,7 +17,7 @@ from workbench.diagnosis.clocks import in_time
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, sizes_by_component, source, variables
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.linearised import Linearised, Point
+from workbench.diagnosis.linearised import Linearised, Point, slowness
 from workbench.diagnosis.motion import motion
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import (
@@ -101,6 +101,32 @@ def stop(time: Vector, signals: dict[str, Vector]) -> Case:
 def prepare(case: Case, fmu: FMU) -> Samples:
     signals = compared(SYSTEM, [case])
     return prepare_samples(case, SYSTEM, signals, fmu.defaults, motion(fmu, SYSTEM))
+
+
+def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(
+    everything: Path,
+) -> None:
+    """Beside one that has it."""
+    case = simulated(everything, {})
+    rng = np.random.default_rng(5)
+    noise = {name: SYSTEM.signals[name].deviation(case[name]) for name in case.signals}
+    case = case.with_signals(
+        {n: case[n] + noise[n] * rng.standard_normal(case.time.size) for n in case.signals}
+    )
+    speeds = replace(case.without(["Fx"]), name="speeds")
+    values = {"muWR": 0.4}
+    with Simulations(everything, SYSTEM, {}, [case, speeds], 1) as both:
+        told, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
+    with Simulations(everything, SYSTEM, {}, [speeds], 1) as alone:
+        (without,) = alone.at([values])
+    assert silent.told.tolist() == [*without.told, 0]
+    assert np.array_equal(silent.errors[:, :2], without.errors)
+    assert np.array_equal(silent.sizes[:, :2], without.sizes)
+    assert np.isnan(silent.sizes[:, 2]).all()
+    assert np.square(silent.errors[:, 2]).sum() < 1e-9
+    # What lasts in one of two recordings is as large as in that one.
+    loud = replace(told, errors=3.0 * told.errors)
+    assert slowness([loud, silent], 20)[2] == pytest.approx(slowness([loud], 20)[2], rel=1e-9)
 
 
 def errors_of(case: Case, fmu: FMU, values: dict[str, float]) -> tuple[Samples, Matrix]:

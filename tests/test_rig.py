@@ -17,6 +17,7 @@ import pytest
 from workbench.__main__ import main
 from workbench.case import read_case, read_cases
 from workbench.errors import InputError
+from workbench.experiments import with_sensor
 from workbench.systems import load_system
 from workbench.wheelset.rig import (
     ORDINARY_PADS,
@@ -28,6 +29,7 @@ from workbench.wheelset.rig import (
     sample,
     select,
     simulate,
+    stop_of,
 )
 from workbench.wheelset.rig.drive import Drive, Losses
 
@@ -221,6 +223,15 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
         1.2e5,
         3e5,
     ]
+
+
+def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for() -> None:
+    assert SYSTEM.experiments is not None
+    asked = PROPOSED | {"conditions": {**PROPOSED["conditions"], "wheel_load": 60e3}}
+    (surface,) = (one for one in SYSTEM.experiments.sensors if one.name == "surface")
+    usual, light = stop_of(PROPOSED, SYSTEM), stop_of(asked, with_sensor(SYSTEM, surface))
+    assert (usual.conditions.wheel_load, usual.sensors) == (80e3, ())
+    assert (light.conditions.wheel_load, light.sensors) == (60e3, ("surface",))
 
 
 def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses() -> None:

@@ -27,11 +27,11 @@ CHANNELS = ("pB", "tauR", "omegaW", "omegaR", "Fx")
 
 
 @cache
-def make(speed: float = 40.0, direction: int = 1) -> StopTruth:
+def make(speed: float = 40.0, direction: int = 1, load: float = 80e3) -> StopTruth:
     """A stop from a speed [km/h] on constant pads, of ten seconds unless said otherwise."""
     usual = SCENARIOS["03_dry_120_3.6"]
     conditions = dataclasses.replace(
-        usual.conditions, initial_speed=speed / 3.6, direction=direction
+        usual.conditions, initial_speed=speed / 3.6, direction=direction, wheel_load=load
     )
     scenario = dataclasses.replace(usual, conditions=conditions)
     return simulate(scenario, SEED, CONSTANT_PADS, REFERENCE)
@@ -91,6 +91,28 @@ def test_sensor_has_the_white_noise_of_the_data_sheet(
     assert scaled[1:] @ scaled[:-1] / n == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
 
 
+def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise() -> None:
+    stop = make(speed=160.0)
+    fitted = dataclasses.replace(
+        stop, scenario=dataclasses.replace(stop.scenario, sensors=("arms", "load", "surface"))
+    )
+    time, wrong = recorded(stop), plant(CONSTANT_PADS, ["roller_radius=0.002", "wheel_load=0.05"])
+    without, found = (sample(one, wrong, time) for one in (stop, fitted))
+    assert set(found) - set(without) == {"arms", "load", "surface"}
+    assert all(np.array_equal(found[name], without[name]) for name in CHANNELS)
+    # What the sensors feel: the contact's force, the load on it, the rim of the roller.
+    truth = {
+        "arms": (stop.at(time, "Fx"), 200.0),
+        "load": (np.full(time.size, 80e3 * stop.drawn.Fz * 1.05), 400.0),
+        "surface": (0.702 * stop.at(time, "omegaR"), 0.02),
+    }
+    for name, (felt, noise) in truth.items():
+        error = (found[name] - felt) / noise
+        # Four sigma of the estimates, as above.
+        assert error.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(error.size)), name
+        assert error.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * error.size)), name
+
+
 # --- effects ---
 
 
@@ -136,13 +158,15 @@ def test_pole_ring_ripples_with_the_phase_of_its_stop() -> None:
     assert sine == pytest.approx(0.0, abs=9e-5)
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_apex_offset_adds_the_same_force_in_both_directions(direction: int) -> None:
-    stop = make(speed=20.0, direction=direction)
-    slope = 2.0 * 80e3 * stop.drawn.Fz / (WHEEL_RADIUS + ROLLER_RADIUS)
+@pytest.mark.parametrize(("direction", "load"), [(1, 80e3), (-1, 80e3), (1, 60e3)])
+def test_apex_offset_adds_a_share_of_the_load_in_both_directions(
+    direction: int, load: float
+) -> None:
+    stop = make(speed=20.0, direction=direction, load=load)
+    slope = 2.0 * load * stop.drawn.Fz / (WHEEL_RADIUS + ROLLER_RADIUS)
     # Readings are rounded to 10 N: the mean of 1500 differences to 0.3 N.
     assert added("apex_offset=0.002", stop)["Fx"].mean() == pytest.approx(0.002 * slope, abs=0.5)
-    assert slope == pytest.approx(138e3, rel=0.01)
+    assert slope == pytest.approx(138e3 * load / 80e3, rel=0.01)
 
 
 def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:

@@ -109,6 +109,14 @@ MISTAKES = {
         ("\nwet = { muWR = 0.28", "\nwet = { muWR = [0.28]"),
         r"parameters wet.* muWR: found \[0\.28\]; expected a number",
     ),
+    "parameter that a condition sets and there is none of": (
+        ('sets = "Fz"', 'sets = "FZ"'),
+        r"\[conditions\.wheel_load\.sets\] FZ: .*closest: 'Fz'.* a parameter of the model",
+    ),
+    "choices that set a parameter": (
+        ('choices = ["dry", "wet"]\nlasts', 'choices = ["dry", "wet"]\nsets = "Fz"\nlasts'),
+        r"wheel_rail sets: found 'Fz'; expected .*parameters\], where there are choices",
+    ),
     "signal without a size": (
         ('scale = "3 bar"', 'scale = "-0 bar"'),
         r"\[inputs\.pB\] scale: found .*; expected a size above 0",

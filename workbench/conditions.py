@@ -14,14 +14,13 @@ from workbench.units import quantity
 
 Value = float | int | str | tuple[Any, ...]
 UNKNOWN = "unknown"  # a condition that nobody knows any more
-USUAL = "usual"  # one that sets a parameter of the model, which is as the model has it
 
 
 def read_conditions(table: Table, system: System) -> dict[str, Value]:
     """Conditions of a recording, as the system declares them.
 
     What nobody knows any more is written as "unknown", and is UNKNOWN then; what sets a parameter
-    of the model may be missing, and is USUAL then.
+    of the model may be missing, and is so then.
 
     Raises
     ------
@@ -32,15 +31,14 @@ def read_conditions(table: Table, system: System) -> dict[str, Value]:
     table.refuse_unknown(one.name for one in system.conditions)
     signs = [f"'{one.name}' holds the sign" for one in system.conditions if one.sign]
     remedy = "; ".join(["give the magnitude", *signs])
-    return {one.name: _condition(table, one, remedy) for one in system.conditions}
+    said = [one for one in system.conditions if one.name in table or not one.sets]
+    return {one.name: _condition(table, one, remedy) for one in said}
 
 
 def _condition(table: Table, one: Condition, remedy: str) -> Value:
     """One condition; `remedy` for a quantity that is too small."""
     if table.content.get(one.name) == UNKNOWN and not one.sign:
         return UNKNOWN
-    if one.sets and table.content.get(one.name, USUAL) == USUAL:
-        return USUAL
     if one.count:
         items = table.take(one.name, list)
         if len(items) != one.count:

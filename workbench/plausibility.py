@@ -263,8 +263,8 @@ def _conditions(
     """Conditions that the record contradicts."""
     for one in system.conditions:
         shown = shown_by(one, signals, system)
-        if one.agrees is None or shown is None or isinstance(conditions[one.name], str):
-            continue  # a text: nobody knows it any more
+        if one.agrees is None or shown is None or isinstance(conditions.get(one.name, ""), str):
+            continue  # nobody says it, or knows it any more
         at_start = one.agrees.place == FIRST
         values = system.evaluate(one.agrees.formula, signals)
         sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])

@@ -242,7 +242,8 @@ class System:
         """Parameters that the conditions of a recording set, SI."""
         found: dict[str, float] = {}
         for one in self.conditions:
-            found |= one.means(conditions[one.name])
+            if one.name in conditions:
+                found |= one.means(conditions[one.name])
         return found
 
     def model(self, role: str) -> Model:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from workbench.case import Case
-from workbench.conditions import USUAL
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import variables
@@ -166,7 +165,7 @@ def _values(asked: Outlook, candidate: Experiment, rival: Rival) -> dict[str, fl
     values = dict(rivals.given)
     for condition in system.conditions:
         setting = candidate.settings.get(condition.name)
-        usual = condition.choices[0] if condition.choices else USUAL
+        usual = condition.choices[0] if condition.choices else ""
         values |= condition.means(setting.value if setting else usual)
     for (name, choice), level in rival.levels.items():
         if name in system.comparison.levels and choice in _choices(system, name, candidate):

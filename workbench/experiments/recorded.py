@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from workbench.case import Case, read_only
-from workbench.conditions import USUAL, Value
+from workbench.conditions import Value
 from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment
 from workbench.fmu import CoSimulation, Matrix, Vector
@@ -130,11 +130,9 @@ def _conditions(
     for one in system.conditions:
         if one.name in candidate.settings:
             found[one.name] = candidate.settings[one.name].value
-        elif one.sets:
-            found[one.name] = USUAL
         elif one.choices:
             found[one.name] = (one.choices[0],) * one.count if one.count else one.choices[0]
-        else:
+        elif not one.sets:
             found[one.name] = _told(system, one, clean)
     return found
 

@@ -169,11 +169,10 @@ def _piece(
     sources = {
         key: "given" if key in given else "shown by the record" if key in shown else UNKNOWN
         for key in read
-        if key in conditions
     }
     origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
     found = doubts(time, signals, read, system, origin)
-    ordered = {key: conditions[key] for key in sources}
+    ordered = {key: conditions[key] for key in read}
     return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
 
 

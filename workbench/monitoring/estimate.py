@@ -140,7 +140,7 @@ def _parameters(case: Case, system: System) -> dict[str, float]:
     """Parameters of the model that the conditions of a recording set, but for those estimated."""
     found: dict[str, float] = {}
     for one in system.conditions:
-        if one.count or not (one.parameters or one.sets):
+        if one.count or not (one.parameters or one.sets) or one.name not in case.conditions:
             continue
         said = case.conditions[one.name]
         if said == UNKNOWN:

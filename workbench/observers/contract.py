@@ -219,7 +219,7 @@ class Estimator(ABC):
         self._known = {
             name: value
             for one in self.system.conditions
-            if one.told
+            if one.told and one.name in conditions
             for name, value in one.means(conditions[one.name]).items()
             if name in self.fmu.parameters
         }

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from workbench.conditions import USUAL
 from workbench.errors import InputError
 from workbench.experiments.candidates import Profile
 from workbench.recording import read_text
@@ -71,8 +70,7 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     if len(discs) != system.condition("discs").count:
         raise ValueError
     speed, pressure = float(said["initial_speed"]), float(demand[0])
-    asked_load = said.get("wheel_load", USUAL)
-    load = WHEEL_LOAD if asked_load == USUAL else float(asked_load)
+    load = float(said.get("wheel_load", WHEEL_LOAD))
     conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
     sensors = tuple(one.name for one in system.judged if one.name in FURTHER)

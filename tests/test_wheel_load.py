@@ -1,0 +1,90 @@
+"""A wheel load that is set: a condition that is a parameter of the model, and need not be said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.case import Case, read_case
+from workbench.cosim import Run, replay
+from workbench.errors import InputError
+from workbench.fmu import FMU
+from workbench.observers import estimators
+from workbench.schemas import case_schema
+from workbench.systems import load_system, model_path
+from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, simulate
+
+from .recordings import REFERENCE, record
+
+SYSTEM = load_system("wheelset")
+STOP = SCENARIOS["01_dry_80_1.5"]
+LIGHT = replace(STOP, conditions=replace(STOP.conditions, wheel_load=60e3))
+# The contact is as stiff as its area is large, with the power 2/3 of the load (Hertz).
+SOFTER = (80.0 / 60.0) ** (2.0 / 3.0)
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    folder = tmp_path_factory.mktemp("light") / "01_light"
+    record(LIGHT, 3, CONSTANT_PADS, folder)
+    return read_case(folder, SYSTEM)
+
+
+@pytest.fixture(scope="module")
+def unsaid(light: Case) -> Case:
+    """As if nobody had said how heavy the axle was."""
+    kept = {name: said for name, said in light.conditions.items() if name != "wheel_load"}
+    return replace(light, conditions=kept)
+
+
+def open_loop(case: Case, role: str) -> Run:
+    """A model of the rig by itself."""
+    kind = estimators(SYSTEM)["open_loop"]
+    with FMU(model_path(SYSTEM, role)) as fmu:
+        return replay(case, kind(fmu, SYSTEM, kind.reasoned(fmu, SYSTEM)))
+
+
+def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light: Case, unsaid: Case) -> None:
+    assert SYSTEM.set_by(light.conditions)["Fz"] == 60e3
+    assert "Fz" not in SYSTEM.set_by(unsaid.conditions)
+    assert "Fz" not in SYSTEM.set_by({**light.conditions, "wheel_load": "unknown"})
+    required = case_schema(SYSTEM)["properties"]["conditions"]["required"]
+    assert "wheel_rail" in required
+    assert "wheel_load" not in required
+
+
+@pytest.mark.parametrize(
+    ("written", "found"),
+    [("-1 kN", "found '-1 kN'; expected above 0 N"), ("60 kg", r"found \[kg\]")],
+)
+def test_a_load_that_is_none_is_refused(written: str, found: str, tmp_path: Path) -> None:
+    record(LIGHT, 3, CONSTANT_PADS, tmp_path / "stop")
+    toml = tmp_path / "stop" / "case.toml"
+    toml.write_text(toml.read_text().replace("60 kN", written))
+    with pytest.raises(InputError, match=found):
+        read_case(tmp_path / "stop", SYSTEM)
+
+
+def test_slip_of_a_light_axle_goes_with_its_contact() -> None:
+    usual, less = (simulate(one, 3, CONSTANT_PADS, REFERENCE) for one in (STOP, LIGHT))
+    held = slice(*np.searchsorted(usual.time, usual.drawn.coasting + np.array([5.0, 10.0])))
+    more = less.truth["slip"][held] / usual.truth["slip"][held]
+    # Polach's force bends by 1 % more where less of it is left.
+    assert more == pytest.approx(SOFTER, rel=0.015)
+
+
+def test_estimators_run_with_the_load_that_was_said(light: Case, unsaid: Case) -> None:
+    runs = [open_loop(one, "observer") for one in (light, unsaid)]
+    # Where the contact carries little: the model's friction is that of a slippery rail.
+    begins = np.argmax(runs[0].signal("Fx") > 500.0)
+    said, usual = (run.signal("slip")[begins] for run in runs)
+    assert said / usual == pytest.approx(SOFTER, rel=0.02)
+    # Of both wheels, 60 kN each.
+    assert runs[0].signal("adhesion") == pytest.approx(np.abs(runs[0].signal("Fx")) / 120e3)
+
+
+def test_a_model_without_that_parameter_runs_as_it_is(light: Case, unsaid: Case) -> None:
+    """The full model has the wheel load as an output."""
+    runs = [open_loop(one, "full") for one in (light, unsaid)]
+    assert np.array_equal(runs[0].signal("slip"), runs[1].signal("slip"))
