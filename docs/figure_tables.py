@@ -183,22 +183,29 @@ def followed(summary: Summary) -> Table:
     """What two stops leave together, the third one that is proposed, and what all three say."""
     header = ["planted, by the least size that matters", "said of two stops", "the best one"]
     rows: Table = [[*header, "said of three", "drawn ones that part them"]]
-    alike: dict[str, list[str]] = {}
+    alike: dict[tuple[str, str], list[tuple[str, bool]]] = {}
     for one in summary["sets"]:
         made = one["proposed"]
         if made is None:
             continue
         planted = f"{one['planted']} x {one['multiple']:g}"
         if not made["foreseen"]:
-            alike.setdefault(" or ".join(sorted(one["group"])), []).append(planted)
+            sensed = one["sensed"] or {"sensor": "", "parts": False}
+            group = " or ".join(sorted(one["group"])), sensed["sensor"]
+            alike.setdefault(group, []).append((planted, sensed["parts"]))
             continue
         said = " or ".join(made["named"]) or made["verdict"]
         drawn = f"{sum(k['parts'] for k in one['drawn'])} of {len(one['drawn'])}"
         rows.append([planted, " or ".join(one["group"]), made["experiment"], said, drawn])
-    rows += [[", ".join(sets), group, "none parts it", "", ""] for group, sets in alike.items()]
-    seen, never, drawn = (_of(summary[name]) for name in ("foreseen", "never", "drawn"))
-    ends = f"parts: {seen}; where none was foreseen to, {never}"
-    return [*rows, ["all", "", "", ends, drawn]]
+    for (group, sensor), sets in alike.items():
+        planted = ", ".join(name for name, _ in sets)
+        with_it = f"; with a sensor of {sensor}" * bool(sensor)
+        said = f"its own cause {sum(parts for _, parts in sets)} of {len(sets)} times"
+        rows.append([planted, group, f"none parts it{with_it}", said if sensor else "", ""])
+    names = ("foreseen", "never", "sensed", "answered", "drawn")
+    seen, never, sensed, answered, drawn = (_of(summary[name]) for name in names)
+    ends = f"parts: {seen}; where none was foreseen to, {never}, with a named sensor {sensed}"
+    return [*rows, ["all", "", "", f"{ends}; together {answered}", drawn]]
 
 
 def _of(one: Summary) -> str:

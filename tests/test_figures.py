@@ -92,17 +92,26 @@ def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None
     made |= {"separations": []}
     other = made | {"foreseen": False, "parts": False, "named": ["FxGain", "DriveTorqueGain"]}
     row = {"planted": "FxGain", "multiple": 8.0, "group": other["named"], "proposed": made}
+    row |= {"sensed": None}
+    fitted = {"sensor": "the arms", **made}
     rows = [
         row | {"drawn": [made, other]},
         row | {"proposed": other, "drawn": [other, other]},
+        row | {"proposed": other, "drawn": [other, other], "sensed": fitted},
+        row | {"proposed": other, "drawn": [], "sensed": fitted | {"parts": False}},
         row | {"group": ["FxGain"], "proposed": None, "drawn": []},
     ]
-    header, first, second, last = tables.followed({"sets": rows, **summarise_following(rows)})
+    table = tables.followed({"sets": rows, **summarise_following(rows)})
+    header, first, second, third, last = table
     both = "FxGain or DriveTorqueGain"
     assert len(header) == len(last)
     assert first == ["FxGain x 8", both, "a step", "FxGain", "1 of 2"]
     assert second == ["FxGain x 8", "DriveTorqueGain or FxGain", "none parts it", "", ""]
-    assert last[3:] == ["parts: 1 of 1; where none was foreseen to, 0 of 1", "1 of 4"]
+    named = "none parts it; with a sensor of the arms"
+    assert third[0] == "FxGain x 8, FxGain x 8"
+    assert third[2:] == [named, "its own cause 1 of 2 times", ""]
+    ends = "parts: 1 of 1; where none was foreseen to, 0 of 3, with a named sensor 1 of 2"
+    assert last[3:] == [f"{ends}; together 2 of 4", "1 of 6"]
 
 
 def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
@@ -255,7 +264,7 @@ def test_a_law_is_right_where_the_cause_acts() -> None:
 
 
 def test_a_size_in_bars_stays_in_its_cell() -> None:
-    row = {"planted": "A", "multiple": 8.0, "group": ["A", "B"], "drawn": []}
+    row = {"planted": "A", "multiple": 8.0, "group": ["A", "B"], "drawn": [], "sensed": None}
     made = {"experiment": "|v| rises", "foreseen": True, "parts": True, "named": ["A"]}
     rows = [row | {"proposed": made | {"separations": []}}]
     page = figures.written("next", {"sets": rows, **summarise_following(rows)})
