@@ -77,8 +77,8 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("planted", "twin", "sensor", "answer"),
     [
-        # A force that leans on the load: 60 kN instead of 80 kN tells.
-        ("ApexOffset", "FxOffset", "", "wheel load 60 kN"),
+        # A force that leans on the load: 100 kN instead of 80 kN tells.
+        ("ApexOffset", "FxOffset", "", "wheel load 100 kN"),
         # The same law of the contact, with the friction that belongs to it.
         ("CreepStiffness", "WheelLoad", "wheel load, at the vertical cylinders", ""),
     ],
