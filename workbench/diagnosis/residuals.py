@@ -143,7 +143,7 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
                 before.append(mark * one.before[:, c] / one.sigma[:, c])
                 after.append(mark * one.after[:, c] / one.sigma[:, c])
                 along.append(own)
-        for name in influences[0]:
+        for name in (name for name in influences[0] if all(name in own for own in along)):
             shares = (
                 _explained(errors, along, name, apart=name in turning) for errors in (before, after)
             )
@@ -164,7 +164,7 @@ def _influences(simulations: Simulations, k: int) -> dict[str, Vector]:
         start = time[np.argmax(applied)] if applied.any() else time[0]
         signals[BEGINNING] = np.maximum(0.0, time - start)
     if not system.comparison.influences:
-        signals |= measured
+        signals |= {name: values for name, values in measured.items() if name in case}
     for influence in system.comparison.influences:
         values = system.evaluate(influence.formula, measured, simulations.nominal)
         match influence.way:
