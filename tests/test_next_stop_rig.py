@@ -126,7 +126,7 @@ def other_surface(system: System, rail: str, imitated: float) -> Experiment:
     """A stop from 160 km/h with a staircase, on a rail, with an inertia that the drive imitates."""
     assert system.experiments is not None
     fixed: dict[str, object] = {"initial_speed": 160.0 / 3.6, "direction": 1}
-    fixed |= {"wheel_rail": rail, "imitated": imitated}
+    fixed |= {"wheel_rail": rail, "wheel_load": 80e3, "imitated": imitated}
     (one,) = (
         experiment
         for experiment in every_setting(system.experiments)
