@@ -119,7 +119,7 @@ def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(
         told, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
     with Simulations(everything, SYSTEM, {}, [speeds], 1) as alone:
         (without,) = alone.at([values])
-    assert silent.told.tolist() == [*without.told, 0]
+    assert silent.blocks.tolist() == [*without.blocks, 0]
     assert np.array_equal(silent.errors[:, :2], without.errors)
     assert np.array_equal(silent.sizes[:, :2], without.sizes)
     assert np.isnan(silent.sizes[:, 2]).all()

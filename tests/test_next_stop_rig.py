@@ -15,6 +15,7 @@ from workbench.diagnosis.rivals import Rivals
 from workbench.experiments import NextStop, RankedExperiment, foreseen, next_stop
 from workbench.experiments.candidates import Experiment, every_setting
 from workbench.system import System
+from workbench.system_experiments import Setting
 from workbench.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
@@ -186,3 +187,22 @@ def test_what_derivatives_alone_promise_is_not_proposed(system: System, tmp_path
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
     assert max(one.prediction.separation for one in proposed.tried) < 6.4
+
+
+@pytest.mark.long
+def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(
+    system: System, tmp_path: Path
+) -> None:
+    """On a light axle and a wet rail less load lets the wheel slide, a softer contact does not."""
+    pytest.importorskip("rumoca", reason="no Modelica compiler")
+    asked = system.experiments
+    assert asked is not None
+    light = {**asked.settings, "wheel_load": (Setting(60e3, "60 kN"),)}
+    rig = replace(system, experiments=replace(asked, settings=light))
+    names = ["CreepStiffness", "WheelLoad"]
+    _, rivals, _ = of_two(rig, "creep_stiffness=-0.16", names, tmp_path)
+    proposed = next_stop(rig, rivals, 1, lambda _: None)
+    assert not proposed.parts
+    assert proposed.tried[0].prediction.separation < 4.0
+    # Of the last, which both do not claim: what a wheel that slides would show.
+    assert proposed.tried[-1].prediction.separation > 10.0

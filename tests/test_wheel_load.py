@@ -8,7 +8,10 @@ import pytest
 
 from workbench.case import Case, read_case
 from workbench.cosim import Run, replay
+from workbench.diagnosis.counting import count
+from workbench.diagnosis.thresholds import SOUND
 from workbench.errors import InputError
+from workbench.expression import Expression
 from workbench.fmu import FMU
 from workbench.observers import estimators
 from workbench.schemas import case_schema
@@ -82,6 +85,20 @@ def test_estimators_run_with_the_load_that_was_said(light: Case, unsaid: Case) -
     assert said / usual == pytest.approx(SOFTER, rel=0.02)
     # Of both wheels, 60 kN each.
     assert runs[0].signal("adhesion") == pytest.approx(np.abs(runs[0].signal("Fx")) / 120e3)
+
+
+def test_samples_are_excluded_by_the_load_that_was_said(light: Case, unsaid: Case) -> None:
+    (slide, *_) = SYSTEM.comparison.exclusions
+    usage = Expression("Fx/(2*Fz)", "a test")
+    much = replace(slide, reason="much adhesion", formula=usage, above=0.04, from_rest=False)
+    much = replace(much, smoothed=0.0, within=0.0, only_while=None, restarted=())
+    system = replace(SYSTEM, comparison=replace(SYSTEM.comparison, exclusions=(much,)))
+    for case, load in ((light, 60e3), (unsaid, 80e3)):
+        found = count(case, system, tuple(case.signals), SOUND, restarting=False)
+        beyond = np.abs(found.clean["Fx"]) > 0.04 * 2.0 * load
+        assert 0.01 < beyond.mean() < 0.99
+        # But for the first samples and the last one, of which no mean is formed.
+        assert np.array_equal(found.excluded["much adhesion"][5:-5], beyond[5:-5])
 
 
 def test_a_model_without_that_parameter_runs_as_it_is(light: Case, unsaid: Case) -> None:

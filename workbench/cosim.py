@@ -167,12 +167,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)
-    values, sigma = with_indirect(
-        system,
-        np.asarray(estimate.values),
-        np.asarray(estimate.sigma),
-        system.set_by(case.conditions),
-    )
+    told = np.asarray(estimate.values), np.asarray(estimate.sigma)
+    values, sigma = with_indirect(system.under(case.conditions), *told)
     return Run(
         case=case.name,
         estimator=estimator.name,
@@ -189,23 +185,17 @@ def replay(case: Case, estimator: Estimator) -> Run:
     )
 
 
-def with_indirect(
-    system: System, values: Matrix, sigma: Matrix, parameters: Mapping[str, float]
-) -> tuple[Matrix, Matrix]:
+def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix, Matrix]:
     """Estimates and standard deviations, (n, w + d), with those of `System.indirect` behind them.
 
     Standard deviations to first order: by what a formula changes over both of its column's.
-
-    Parameters
-    ----------
-    parameters : of the model, where they are others than this machine's.
     """
     more, deviations = [values], [sigma]
     for one, name in system.indirect.values():
         at = list(system.columns).index(name)
         value, reach = values[:, at], sigma[:, at]
         middle, high, low = (
-            system.evaluate(one.formula, {name: column}, parameters)
+            system.evaluate(one.formula, {name: column})
             for column in (value, value + reach, value - reach)
         )
         more.append(middle[:, None])

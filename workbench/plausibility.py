@@ -83,6 +83,7 @@ def doubts(
     InputError
         At what is impossible.
     """
+    system = system.under(conditions)
     found = list(_ranges(time, signals, system, origin))
     _refuse(found)  # what is out of range has no use in formulas
     with np.errstate(all="ignore"):  # a formula may divide by a signal at rest

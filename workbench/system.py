@@ -238,13 +238,17 @@ class System:
         """A condition by name."""
         return next(one for one in self.conditions if one.name == name)
 
-    def set_by(self, conditions: Mapping[str, object]) -> dict[str, float]:
-        """Parameters that the conditions of a recording set, SI."""
+    def set_by(self, conditions: Mapping[str, object], *, told: bool = False) -> dict[str, float]:
+        """Parameters that the conditions of a recording set, SI; if `told`, those told alone."""
         found: dict[str, float] = {}
         for one in self.conditions:
-            if one.name in conditions:
+            if one.name in conditions and (one.told or not told):
                 found |= one.means(conditions[one.name])
         return found
+
+    def under(self, conditions: Mapping[str, object]) -> "System":
+        """The same machine, with the parameters that the conditions of a recording set."""
+        return replace(self, values={**self.values, **self.set_by(conditions)})
 
     def model(self, role: str) -> Model:
         """The model in a role, or the observer's where the system has none.
@@ -256,23 +260,17 @@ class System:
         """
         return self.models.get(role, self.models[OBSERVER])
 
-    def signal(
-        self,
-        name: str,
-        measured: Mapping[str, Vector],
-        parameters: Mapping[str, float] | None = None,
-    ) -> Vector:
+    def signal(self, name: str, measured: Mapping[str, Vector]) -> Vector:
         """A measured or derived signal of a recording, (n,) SI.
 
         Parameters
         ----------
         measured : signals by name, (n,) each.
-        parameters : of the model, where they are others than this machine's.
         """
         if name in measured:
             return measured[name]
         derived = next(one for one in self.derived if one.name == name)
-        return self.evaluate(derived.formula, measured, parameters)
+        return self.evaluate(derived.formula, measured)
 
     def evaluate(
         self,
@@ -286,7 +284,7 @@ class System:
         values: dict[str, Any] = {}
         for name in formula.names:
             if name in measured or any(one.name == name for one in self.derived):
-                values[name] = self.signal(name, measured, parameters)
+                values[name] = self.signal(name, measured)
             else:
                 values[name] = known[name]
         size = next(iter(measured.values())).size

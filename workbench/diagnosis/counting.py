@@ -77,6 +77,7 @@ def count(
     InputError
         If too few do.
     """
+    system = system.under(case.conditions)
     compare, time, h = system.comparison, case.time, float(np.median(np.diff(case.time)))
     beyond = {name: saturated(case[name], system.signals[name]) for name in names}
     faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}

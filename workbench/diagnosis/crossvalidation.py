@@ -49,7 +49,7 @@ class CrossValidation:
 
     def _told(self, one: Fitted) -> list[Mask]:
         """Channels that are told, of each recording or part."""
-        told = [evidence.told > 0 for evidence in one.linearised.evidence]
+        told = [evidence.blocks > 0 for evidence in one.linearised.evidence]
         return told * self._fit.parts if self._fit.unknowns.count == 1 else told
 
     def _errors(self, one: Fitted) -> list[Matrix]:

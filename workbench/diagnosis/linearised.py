@@ -119,7 +119,7 @@ def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
 
 def _told(evidence: Sequence[Evidence]) -> Vector:
     """Number of blocks that are told, by channel (m,)."""
-    counts: Vector = np.sum([one.told for one in evidence], axis=0)
+    counts: Vector = np.sum([one.blocks for one in evidence], axis=0)
     return counts
 
 

@@ -43,8 +43,8 @@ class Evidence:
     jacobian: Matrix
 
     @property
-    def told(self) -> Vector:
-        """(c,) number of blocks whose errors are told."""
+    def blocks(self) -> Vector:
+        """(c,) number of blocks, none of a silent channel."""
         counts: Vector = len(self.errors) * ~np.isnan(self.sizes[0])
         return counts
 

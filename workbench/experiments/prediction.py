@@ -147,7 +147,7 @@ def claimed_alike(
 ) -> list[bool]:
     """Whether all rivals stay within what the system claims, or leave it for the same reasons.
 
-    Where a wheel slides by one of them alone, what it then does is foreseen by none.
+    What one of them alone takes out of them is foreseen by none.
     """
     plan = [candidate for candidate, _ in planned]
     first = [left_claims(case, asked.system) for _, case in planned]

@@ -138,20 +138,16 @@ def appraising(system: System) -> Iterator[Appraiser]:
 
 def _parameters(case: Case, system: System) -> dict[str, float]:
     """Parameters of the model that the conditions of a recording set, but for those estimated."""
-    found: dict[str, float] = {}
     for one in system.conditions:
-        if one.count or not (one.parameters or one.sets) or one.name not in case.conditions:
-            continue
-        said = case.conditions[one.name]
-        if said == UNKNOWN:
+        if (one.parameters or one.sets) and case.conditions.get(one.name) == UNKNOWN:
             raise InputError(
                 where=str(case.source),
                 found=f"{one.label}: unknown",
                 expected="what it was, because the model is another one by that",
                 remedy=f"write {one.name} into case.toml, if anybody knows",
             )
-        found |= one.means(said)
     estimated = {one.name for one in system.estimated}
+    found = system.set_by(case.conditions)
     return {name: value for name, value in found.items() if name not in estimated}
 
 

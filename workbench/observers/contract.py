@@ -216,13 +216,8 @@ class Estimator(ABC):
         Those that estimators are told, and their model has; estimates of quantities start there.
         One that finds a condition by itself has a model for each choice, to which this is nothing.
         """
-        self._known = {
-            name: value
-            for one in self.system.conditions
-            if one.told and one.name in conditions
-            for name, value in one.means(conditions[one.name]).items()
-            if name in self.fmu.parameters
-        }
+        told = self.system.set_by(conditions, told=True)
+        self._known = {name: told[name] for name in told if name in self.fmu.parameters}
 
     def start(self, u: Vector, y: Vector) -> None:
         """Start FMU and memory from the first sample; `advance` takes it again, after no time."""

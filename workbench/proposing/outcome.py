@@ -215,5 +215,5 @@ def description_length(best: Fitted) -> float:
     Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
     """
     lin = best.linearised
-    count = sum(one.told.sum() for one in lin.evidence) / lin.lasting
+    count = sum(one.blocks.sum() for one in lin.evidence) / lin.lasting
     return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)

@@ -257,7 +257,7 @@ def _measured(
     """A signal as measured, at the blocks."""
     unit = shown_unit(system, signal)
     factor = per_shown(system, signal, unit)
-    values = system.signal(signal, case.signals, system.set_by(case.conditions))
+    values = system.under(case.conditions).signal(signal, case.signals)
     curve = Curve("measured", parted(np.interp(one.block_time, case.time, values / factor)))
     low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
     room = 0.08 * (high - low) or 1.0

@@ -84,7 +84,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     known = [(styles[name], run) for name, run in result.runs.items()]
     best = [] if result.reference is None else [(_REFERENCE, result.reference)]
     curves: list[Curve] = []
-    measured, set_by = None, system.set_by(case.conditions)
+    measured, here = None, system.under(case.conditions)
     for number, name in enumerate(view.signals):
         factor, judged = per_shown(system, name, unit), name == system.objective.judged
         if judged or name not in fed:
@@ -96,7 +96,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
                 curves.insert(0, Curve("raw", case[name] / factor))
             curves.append(Curve("measured", measured))
         elif name in case or _is_fed(system, name):
-            values = system.signal(name, case.signals, set_by) / factor
+            values = here.signal(name, case.signals) / factor
             curves.append(Curve("measured", values, dashed=number > 0))
     signals = [curve.values for curve in curves]
     low, high = _range(signals) if measured is None else _range([measured], margin=0.25)
