@@ -149,7 +149,7 @@ def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
     slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
     cylinder, loss = slots["cylinder"], slots["wheelsetLoss"]
     assert (cylinder.inputs, cylinder.outputs) == (("pB", "restBefore"), ("p", "rest"))
-    assert slots["padFriction"].inputs == ("level", "Fperp", "v")
+    assert slots["padFriction"].inputs == ("level", "Fperp", "v", "lackBefore")
     # A loss takes a speed and gives a torque; its power follows by an equation of the slot.
     assert (loss.inputs, loss.outputs) == (("omega",), ("tau",))
     assert {slot.name for slot in slots.values() if not slot.chained} == {
@@ -157,6 +157,32 @@ def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
         "wheelsetLoss",
         "rollerLoss",
     }
+
+
+def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_it(
+    tmp_path: Path,
+) -> None:
+    """Water on one of three discs, before and behind laws that hold for all of them."""
+    slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
+    assert slots["padFriction"].outputs == ("mu",)
+    assert slots["padFriction"].handed == {"lack": "lackBefore"}
+    assert not any(slot.handed for name, slot in slots.items() if name != "padFriction")
+    fmu = tmp_path / "AllEffects.fmu"
+    text = source(WHEELSET, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "All effects")
+    build(WHEELSET, "AllEffects", text, fmu, every_platform=False)
+
+    def force(size: str, film: float) -> float:
+        """Of the disc that brakes least [N], at 50 rad/s and 2.7 bar."""
+        with FMU(fmu) as model:
+            model.start({"omegaW": 50.0, "omegaR": 50.0 * 0.46 / 0.70}, {size: film})
+            model.set(model.variables(["pB"]), np.array([2.7e5]))
+            (found,) = model.get(model.variables(["FDisc"]))
+        return float(found)
+
+    dry = force("padFriction.waterFilm.film", 0.0)
+    # Half wet it rubs half way from 0.30 to 0.12, as it does where all are.
+    for size in ("padFriction.waterFilm.film", "padFriction.singleDiscWaterFilm.film"):
+        assert force(size, 0.5) == pytest.approx(dry * 0.21 / 0.30, rel=1e-12)
 
 
 def test_of_effects_that_look_the_same_the_usual_one_stands_first() -> None:
@@ -232,6 +258,37 @@ def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path)
         np.testing.assert_allclose(fmu.derivatives(), [expected], rtol=1e-12)
         reading = fmu.get(fmu.variables(["reading"]))
         np.testing.assert_allclose(reading, [1.5 * 1.2], rtol=1e-12)
+
+
+def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path: Path) -> None:
+    library = tank(
+        tmp_path,
+        (
+            'output Real q(unit="m3/s") "Flow";',
+            'output Real q(unit="m3/s") "Flow";\n'
+            '    input Real siltBefore(unit="1") = 0.0 "From earlier in the slot";\n'
+            '    output Real silt(unit="1") = siltBefore "Share of the orifice";',
+        ),
+        (
+            "extends PartialOutflow;\n    parameter Real share",
+            "extends PartialOutflow(silt=siltBefore + share);\n    parameter Real share",
+        ),
+        (
+            '    output Real reading(unit="m") = gauge',
+            '    output Real silt(unit="1") = orifice.silt "Share of the orifice";\n'
+            '    output Real reading(unit="m") = gauge',
+        ),
+    )
+    effects = read_effects(library, "Base")
+    text = source(library, "Base", "Extended", effects, {}, {}, "")
+    path = tmp_path / "Extended.fmu"
+    build(library, "Extended", text, path, every_platform=False)
+    with FMU(path) as fmu:
+        fmu.start({}, {"orifice.clogging.share": 0.3, "orifice.leak.area": 2e-4})
+        (silt,) = fmu.get(fmu.variables(["silt"]))
+        assert silt == pytest.approx(0.3, rel=1e-12)  # the leak, which comes behind, says nothing
+        (rate,) = fmu.derivatives()
+        assert rate == pytest.approx(-(0.7e-3 + 2e-4) * np.sqrt(2.0 * 9.81) / 2.0, rel=1e-12)
 
 
 def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_path: Path) -> None:

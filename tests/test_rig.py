@@ -20,6 +20,7 @@ from workbench.errors import InputError
 from workbench.experiments import with_sensor
 from workbench.systems import load_system
 from workbench.wheelset.rig import (
+    CONSTANT_PADS,
     ORDINARY_PADS,
     SCENARIOS,
     STANDARD,
@@ -232,6 +233,22 @@ def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for()
     usual, light = stop_of(PROPOSED, SYSTEM), stop_of(asked, with_sensor(SYSTEM, surface))
     assert (usual.conditions.wheel_load, usual.sensors) == (80e3, ())
     assert (light.conditions.wheel_load, light.sensors) == (60e3, ("surface",))
+
+
+def test_protection_is_off_where_the_roller_stops_faster_than_a_train() -> None:
+    """It would take that for a slide, and vent."""
+    held = {"pB": {"profile": "step", "levels": [2.7e5], "every": 5.0}}
+    light = stop_of(PROPOSED | {"inputs": held}, SYSTEM)
+    assert stop_of(PROPOSED | {"settings": {"imitated": TRAIN_INERTIA}}, SYSTEM).protected
+    made = simulate(light, SEED, CONSTANT_PADS, REFERENCE)
+    braking = (made.time > made.drawn.coasting) & (made.time < made.standstill)
+    assert np.all(np.diff(made.truth["pB"][braking]) >= 0.0)
+    # Three discs at a radius of 0.30 m stop roller and wheelset, once pressure is there: 1.1 s late
+    # by its lags. Tolerances of the stop are 2 % of friction and 1 % of inertia; losses help.
+    inertia = 1500.0 + 110.0 * (0.70 / 0.46) ** 2
+    torque = 3 * 0.30 * made.truth["Fperp"].max() * 0.30 * 0.70 / 0.46
+    expected = 1.1 + 40.0 / 0.70 * inertia / torque
+    assert made.standstill - made.drawn.coasting == pytest.approx(expected, rel=0.06)
 
 
 def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses() -> None:

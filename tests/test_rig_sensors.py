@@ -19,6 +19,7 @@ from workbench.wheelset.rig import (
     simulate,
     write_recording,
 )
+from workbench.wheelset.rig.sensors import FURTHER
 
 REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1
@@ -94,23 +95,42 @@ def test_sensor_has_the_white_noise_of_the_data_sheet(
 def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise() -> None:
     stop = make(speed=160.0)
     fitted = dataclasses.replace(
-        stop, scenario=dataclasses.replace(stop.scenario, sensors=("arms", "load", "surface"))
+        stop, scenario=dataclasses.replace(stop.scenario, sensors=tuple(FURTHER))
     )
     time, wrong = recorded(stop), plant(CONSTANT_PADS, ["roller_radius=0.002", "wheel_load=0.05"])
     without, found = (sample(one, wrong, time) for one in (stop, fitted))
-    assert set(found) - set(without) == {"arms", "load", "surface"}
+    assert set(found) - set(without) == set(FURTHER)
     assert all(np.array_equal(found[name], without[name]) for name in CHANNELS)
-    # What the sensors feel: the contact's force, the load on it, the rim of the roller.
+    # What the sensors feel: the contact's force, the load on it, the rim of the roller, one of three
+    # discs that are all alike.
+    way = np.sign(stop.at(time, "omegaW"))
     truth = {
         "arms": (stop.at(time, "Fx"), 200.0),
         "load": (np.full(time.size, 80e3 * stop.drawn.Fz * 1.05), 400.0),
         "surface": (0.702 * stop.at(time, "omegaR"), 0.02),
+        "disc": (stop.at(time, "muDC1") * stop.at(time, "Fperp") * way, 100.0),
     }
+    assert set(truth) == set(FURTHER)
     for name, (felt, noise) in truth.items():
         error = (found[name] - felt) / noise
         # Four sigma of the estimates, as above.
         assert error.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(error.size)), name
         assert error.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * error.size)), name
+
+
+def test_the_disc_that_brakes_least_is_the_wet_one() -> None:
+    """Also where it is wet no more, and its friction differs from that of others by noise alone."""
+    usual = SCENARIOS["03_dry_120_3.6"]
+    scenario = dataclasses.replace(usual, sensors=("disc",))
+    wet = plant(CONSTANT_PADS, ["single_disc_film=0.5"])
+    stop = simulate(scenario, SEED, wet, REFERENCE)
+    time = recorded(stop)
+    time = time[time < stop.standstill]
+    felt = sample(stop, plant(wet, ["noise=-1"]), time)["disc"]
+    expected = stop.at(time, "muDC2") * stop.at(time, "Fperp")
+    np.testing.assert_allclose(felt, expected, atol=5.0)  # half the resolution
+    first = np.argmax(stop.at(time, "Fperp") > 0.0)
+    assert stop.at(time[first:], "muDC2")[0] < 0.8 * stop.at(time[first:], "muDC1")[0]
 
 
 # --- effects ---

@@ -25,6 +25,7 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   output Units.Velocity slip "Slip velocity";
   output Units.Velocity v = rollerRadius.y*omegaR "Speed of the roller's surface";
   output Units.Force Q = wheelLoad.y "Wheel load that acts";
+  output Units.Force FDisc "Friction force of the disc that brakes least";
   output Units.AngularVelocity omegaWReading = speedSensorW.y "Reading of speedSensorW";
   output Units.AngularVelocity omegaRReading = speedSensorR.y "Reading of speedSensorR";
   output Units.Force FxReading = forceSensor.y "Reading of forceSensor";
@@ -76,6 +77,7 @@ equation
   slip = v - wheelRadius.y*omegaW;
   Fx = 2.0*Contact.creepForce(slip, v, Q, creepStiffness.y, adhesion.mu0, polach);
   tauB = nDiscs*padFriction.mu*actuation.Fperp*rB*tanh(omegaW/omega0);
+  FDisc = (padFriction.mu - padFriction.lack)*actuation.Fperp*tanh(omegaW/omega0);
   wheelInertia.y*der(omegaW) =
     wheelRadius.y*Fx - tauB - wheelsetLoss.tau + wheelInertia.y*correctionW;
   rollerInertia.y*der(omegaR) =

@@ -5,7 +5,7 @@ Needs the extra `[compiler]` to build; sources can be written without it.
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -142,7 +142,7 @@ def _chain(label: str, slot: Slot, given: Mapping[str, Mapping[str, str]]) -> st
     for model, values in given.items():
         lines.append(_declaration(model, {**before, **values}))
         outlets = {outlet: f"{component(model)}.{outlet}" for outlet in slot.outputs}
-        before |= dict(zip(slot.inputs, outlets.values(), strict=False))
+        before |= dict(zip(slot.inputs, outlets.values(), strict=False)) | _handed(slot, model)
     return _class(label, slot, given, lines, outlets)
 
 
@@ -158,7 +158,9 @@ def _sum(label: str, slot: Slot, given: Mapping[str, Mapping[str, str]]) -> str:
         )
     before = {name: name for name in (*slot.counts, *slot.inputs)}
     lines = [_declaration(slot.nominal, before)]
-    lines += [_declaration(model, {**before, **values}) for model, values in given.items()]
+    for model, values in given.items():
+        lines.append(_declaration(model, {**before, **values}))
+        before |= _handed(slot, model)
     nominal = component(slot.nominal)
     outlets = {
         outlet: " + ".join(
@@ -197,6 +199,11 @@ def _declaration(model: str, bindings: Mapping[str, str]) -> str:
     return f"    {model} {component(model)}({given});"
 
 
+def _handed(slot: Slot, model: str) -> dict[str, str]:
+    """Inputs of the next one in a slot, of what an effect hands on."""
+    return {inlet: f"{component(model)}.{outlet}" for outlet, inlet in slot.handed.items()}
+
+
 def _short(model: str) -> str:
     return model.rpartition(".")[2]
 
@@ -204,14 +211,16 @@ def _short(model: str) -> str:
 def _class(
     label: str,
     slot: Slot,
-    models: Iterable[str],
+    models: Collection[str],
     declarations: Sequence[str],
     outlets: Mapping[str, str],
 ) -> str:
+    *_, last = models
+    handed = ", ".join(f"{outlet}={component(last)}.{outlet}" for outlet in slot.handed)
     return "\n".join(
         [
             f'  model {label} "{", ".join(map(_short, models))}"',
-            f"    extends {slot.partial};",
+            f"    extends {slot.partial}{f'({handed})' if handed else ''};",
             *declarations,
             "  equation",
             *(f"    {outlet} = {value};" for outlet, value in outlets.items()),

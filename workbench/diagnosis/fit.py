@@ -29,6 +29,8 @@ from workbench.fmu import Vector
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
 _PARTS = 10
 _HALVED = 4  # times: after that a step is given up
+_ROUNDS = 8  # evaluations of a least chi-squared, at most
+_WORTH = 1.0  # of chi-squared: what noise moves it by
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -326,6 +328,33 @@ class Fit:
             else:
                 point, halved = between(best.point, point), halved + 1
         return best
+
+    def least(
+        self, best: Linearised, active: Sequence[Effect], inflation: Vector
+    ) -> tuple[float, Linearised]:
+        """Least chi-squared, tolerances included, and its point: channels weighed as is said.
+
+        Gauss-Newton; a step that makes it worse is halved.
+
+        Parameters
+        ----------
+        best : where to begin.
+        inflation : (m,) variance of what is wrong in each channel over that of white noise.
+        """
+        best = self.linearise(replace(best, inflation=inflation), active)
+        least = self.quadratics(best).chi_squared
+        point = self.stepped(best, inflation, {})
+        for _ in range(_ROUNDS):
+            fall = -np.inf
+            if (tried := self.tried(point)) is not None:
+                tried = self.linearise(replace(tried, inflation=inflation), active)
+                fall = least - self.quadratics(tried).chi_squared
+                if fall > 0.0:
+                    best, least = tried, least - fall
+            if abs(fall) < _WORTH:
+                break
+            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
+        return least, best
 
     def stepped(self, lin: Linearised, spread: Vector, held: Mapping[Key, float]) -> Point:
         """Where derivatives have the best point, beside what is held at values of its own."""

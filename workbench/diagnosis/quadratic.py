@@ -255,6 +255,12 @@ class Joint:
             prior=Quadratic(N, g, c, 0),
         )
 
+    @property
+    def chi_squared(self) -> float:
+        """At the point itself, tolerances and the prior included."""
+        own = sum(one.r @ one.r + one.deviations @ one.deviations for one in self.systems)
+        return float(own) + self.prior.c
+
     def stops(self) -> list[Quadratic]:
         """Chi-squared of each stop."""
         return [system.eliminated() for system in self.systems]

@@ -3,9 +3,11 @@
 All follows from the partial class that constrains a slot. Where each of its outputs is of the same
 kind as the input of its place, values go in and come out, and effects form a chain: the k-th output
 of one is the k-th input of the next. Where it is not, as where a speed goes in and a torque comes
-out, each effect sees the same inputs, and what they change adds up.
+out, each effect sees the same inputs, and what they change adds up. An output whose value in the
+partial class is one of the inputs is handed on, by effects that say nothing of it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from workbench.errors import InputError
@@ -26,6 +28,7 @@ class Slot:
     chained : whether outputs continue inputs; else changes add up.
     nominal : dotted name of the class in the base model.
     settled : whether the base model gives that class its inputs and counts and nothing else.
+    handed : outputs that are handed on, and the input that each is.
     """
 
     name: str
@@ -36,6 +39,7 @@ class Slot:
     chained: bool
     nominal: str
     settled: bool
+    handed: Mapping[str, str]
 
 
 def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
@@ -91,6 +95,11 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
                 ),
                 nominal=library.resolve(component.type, component.owner),
                 settled=component.modifier.inner.keys() <= names,
+                handed={
+                    one.name: one.modifier.value
+                    for one in declared.values()
+                    if "output" in one.prefixes and one.modifier.value in names
+                },
             )
         )
     return tuple(slots)

@@ -221,7 +221,7 @@ def _refitted(asked: Outlook, candidate: Experiment, case: Case) -> Prediction:
 
         def again(true: _Row, other: _Row, _: int) -> tuple[float, Matrix]:
             refit = Refit(fit, other.lin, true.joint.systems[0].r, other.information)
-            return refit.least(other.active)
+            return refit.left(other.active)
 
         return _prediction(simulations, fit, asked.rivals, rows, 0, candidate, again)
 

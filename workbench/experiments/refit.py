@@ -7,12 +7,9 @@ import numpy as np
 
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.linearised import Linearised, between
+from workbench.diagnosis.linearised import Linearised
 from workbench.diagnosis.quadratic import Joint, Key, Quadratic
 from workbench.fmu import Matrix, Vector
-
-_ROUNDS = 8  # evaluations at most
-_WORTH = 1.0  # of chi-squared: what noise moves it by
 
 
 class Refit(Fit):
@@ -43,29 +40,8 @@ class Refit(Fit):
         N = self._information
         return replace(joint, systems=(system,), prior=Quadratic(N, N @ d, float(d @ N @ d), 0))
 
-    def least(self, active: Sequence[Effect]) -> tuple[float, Matrix]:
-        """Chi-squared that the rival leaves, and whitened errors by block and channel, (b, c).
-
-        Gauss-Newton; a step that makes it worse is halved.
-        """
-        best, inflation = self._begun, self._begun.inflation
-        least, errors = self._chi_squared(best)
-        point = self.stepped(best, inflation, {})
-        for _ in range(_ROUNDS):
-            fall = -np.inf
-            if (tried := self.tried(point)) is not None:
-                tried = self.linearise(replace(tried, inflation=inflation), active)
-                value, left = self._chi_squared(tried)
-                fall = least - value
-                if fall > 0.0:
-                    best, least, errors = tried, value, left
-            if abs(fall) < _WORTH:
-                break
-            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
-        return least, errors
-
-    def _chi_squared(self, lin: Linearised) -> tuple[float, Matrix]:
-        joint = self.quadratics(lin)
-        (one,) = joint.systems
-        value = one.r @ one.r + one.deviations @ one.deviations + joint.prior.c
-        return float(value), one.r[:-1].reshape(-1, one.channels)
+    def left(self, active: Sequence[Effect]) -> tuple[float, Matrix]:
+        """Chi-squared that the rival leaves, and whitened errors by block and channel, (b, c)."""
+        value, lin = self.least(self._begun, active, self._begun.inflation)
+        (one,) = self.quadratics(lin).systems
+        return value, one.r[:-1].reshape(-1, one.channels)

@@ -12,7 +12,7 @@ from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.rivals import Rivals, gathered
-from workbench.diagnosis.search import Fitted, beyond, examine, extended
+from workbench.diagnosis.search import Fitted, examine, extended
 from workbench.diagnosis.verdict import conclude
 from workbench.modelica import read_library
 from workbench.system import System
@@ -68,6 +68,10 @@ def distances_in_set(
 ) -> tuple[Diagnosis, dict[str, float]]:
     """Diagnose one set, and tell how far effects stay from the true one, each fitted alone.
 
+    What an experiment promises is the least chi-squared of a wrong model, in units of what the right
+    one leaves wrong in each channel. A fit of a diagnosis is another one: it lets a channel go that
+    is wrong. So each is fitted again, in these units.
+
     Returns
     -------
     distances : by name [standard deviations], negative if it is nearer than the true one; of those
@@ -82,11 +86,12 @@ def distances_in_set(
             if name in (true, *others) and name not in fits:
                 fits[name] = extended(fit, base, score)
         right = fits.get(true)
-        away = {
-            name: beyond(one, right)
+        least = {
+            name: fit.least(one.linearised, one.active, right.linearised.inflation)[0]
             for name, one in fits.items()
-            if name != true and one is not None and right is not None
+            if one is not None and right is not None
         }
+        away = {name: c - least[true] for name, c in least.items() if name != true}
         return found, {name: float(np.sign(c) * np.sqrt(abs(c))) for name, c in away.items()}
 
 

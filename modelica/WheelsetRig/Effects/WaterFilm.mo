@@ -1,6 +1,6 @@
 within WheelsetRig.Effects;
 model WaterFilm "Water on all discs, until their friction has dried it"
-  extends Brakes.PartialPadFriction;
+  extends Brakes.PartialPadFriction(lack=lackBefore + (1.0 - wet)*loss);
   parameter Real film(unit="1", min=0.0, max=1.2) = 0.0 "Film at the start, 1 on a wet disc";
   parameter Units.FrictionCoefficient muWet = 0.12 "Friction of a wet disc";
   parameter Units.Energy E0(min=0.05e6, max=2e6) = 0.45e6

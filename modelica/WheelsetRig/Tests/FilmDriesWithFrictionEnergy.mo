@@ -15,5 +15,7 @@ equation
   assert(abs(reverse.mu - film.mu) < 1e-6, "Direction");
   assert(abs(light.mu - film.mu) < 1e-6, "Half the power and half of E0");
   assert(abs(single.mu - 0.30*(1.0 - deficit/3.0)) < 1e-6, "Deficit of one wet disc");
+  assert(abs(single.mu - single.lack - film.mu) < 1e-6, "It lacks what each of three does");
+  assert(abs(film.lack) < 1e-12, "Discs that are all alike lack nothing of their mean");
   annotation (experiment(StopTime=10.0, Tolerance=1e-8));
 end FilmDriesWithFrictionEnergy;

@@ -40,6 +40,9 @@ TRUTH = {
     "phiW": "rad",
 }
 
+FELT = {"Fperp": "N"}
+"""Known besides, for sensors alone: the force that presses the pads of one disc."""
+
 _OUTPUTS = ("Fx", "FcellL", "FcellR", "slip", *(f"discPower[{i}]" for i in (1, 2, 3)))
 _INPUTS = (
     *("pB", "tauR", "dmuWR", "actuation.kappa", "wheelsetLoss.c0"),
@@ -102,7 +105,7 @@ class StopTruth:
     drawn : deviations of this stop.
     phases : of this stop.
     time : (n,) [s] in steps of 1/RATE, negative before the recording.
-    truth : (n,) each, by the names of TRUTH.
+    truth : (n,) each, by the names of TRUTH and FELT.
     standstill : [s] when wheelset and roller stood.
     model : hash of the FMU.
     """
@@ -141,7 +144,7 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
         rows, standstill = _brake_to_standstill(fmu, scenario, drawn, phases, effects)
         model = fmu.sha256
     time = np.arange(len(rows)) / RATE - _RUN_IN
-    truth = dict(zip(TRUTH, np.array(rows).T.copy(), strict=True))
+    truth = dict(zip((*TRUTH, *FELT), np.array(rows).T.copy(), strict=True))
     return StopTruth(scenario, seed, drawn, phases, time, truth, standstill, model)
 
 
@@ -268,7 +271,7 @@ def _brake_to_standstill(
         fmu.set(inputs, inputs.values)
         Fx, FcellL, FcellR, slip, *powers = fmu.get(outputs).tolist()
         motion = (Fx, FcellL + FcellR, slip, omegaW, omegaR, tauR, brake.cylinder, brake.pads)
-        rows.append((*motion, muWR, *mu, *pads.temperature, *pads.film, phiW))
+        rows.append((*motion, muWR, *mu, *pads.temperature, *pads.film, phiW, force))
         pads.heat(powers, speed, force)
         contact.rub(0.5 * abs(Fx * slip))
         rim, omegaR, phiW = fmu.step(dt)[states].tolist()

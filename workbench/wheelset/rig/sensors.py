@@ -40,11 +40,14 @@ FURTHER = {
     "arms": Sensor(200.0, 0.0, 10.0),
     "load": Sensor(400.0, 0.0, 10.0),
     "surface": Sensor(0.02, 0.0, 1e-3),
+    "disc": Sensor(100.0, 0.0, 10.0),
 }
-"""What may be fitted besides: force in the guidance arms, wheel load, speed of the roller."""
+"""What may be fitted besides: force in the guidance arms, wheel load, speed of the roller, friction
+force of the disc that brakes least."""
 
 _CREST = 2.0 / 1.16  # [1/m] of both wheels over rW + rR: slope of the contact off the crest
 _ROLLER = 0.70  # [m] radius
+_DISCS = ("muDC1", "muDC2", "muDC3")
 _BEAT = 2.0 * np.pi * 0.2  # [rad/s] of drive_beat
 
 # Streams of random numbers: 0 tolerances, 1 to 5 noise, 6 phases, 7 to 11 spikes.
@@ -94,11 +97,21 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
         "arms": stop.at(time, "Fx"),
         "load": np.full(time.size, load),
         "surface": (_ROLLER + e.roller_radius) * stop.at(time, "omegaR"),
+        "disc": _least_disc(stop, time),
     }
     for i, (name, sensor) in enumerate(FURTHER.items()):
         if name in stop.scenario.sensors:
             readings[name] = _read(besides[name], sensor, 1.0 + e.noise, _rng(stop, _FURTHER + i))
     return readings
+
+
+def _least_disc(stop: StopTruth, time: Vector) -> Vector:
+    """Friction force [N] of the disc that has braked least in the whole stop, (n,)."""
+    pressed = stop.truth["Fperp"]
+    least = min(_DISCS, key=lambda disc: float(stop.truth[disc] @ pressed))
+    way = np.sign(stop.at(time, "omegaW"))
+    force: Vector = stop.at(time, least) * stop.at(time, "Fperp") * way
+    return force
 
 
 def received(stop: StopTruth, effects: Effects, time: Vector) -> NDArray[np.bool_]:
