@@ -101,8 +101,8 @@ def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise() -> No
     without, found = (sample(one, wrong, time) for one in (stop, fitted))
     assert set(found) - set(without) == set(FURTHER)
     assert all(np.array_equal(found[name], without[name]) for name in CHANNELS)
-    # What the sensors feel: the contact's force, the load on it, the rim of the roller, one of three
-    # discs that are all alike.
+    # What the sensors feel: the contact's force, the load on it, the rim of the roller, and one of
+    # three discs that are all alike.
     way = np.sign(stop.at(time, "omegaW"))
     truth = {
         "arms": (stop.at(time, "Fx"), 200.0),

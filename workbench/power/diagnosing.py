@@ -68,9 +68,9 @@ def distances_in_set(
 ) -> tuple[Diagnosis, dict[str, float]]:
     """Diagnose one set, and tell how far effects stay from the true one, each fitted alone.
 
-    What an experiment promises is the least chi-squared of a wrong model, in units of what the right
-    one leaves wrong in each channel. A fit of a diagnosis is another one: it lets a channel go that
-    is wrong. So each is fitted again, in these units.
+    What an experiment promises is the least chi-squared of a wrong model, in units of what the
+    right one leaves wrong in each channel. The fit of a diagnosis is another one, which lets a
+    channel go that is wrong. So each is fitted again, in these units.
 
     Returns
     -------
