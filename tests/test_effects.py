@@ -149,7 +149,7 @@ def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
     slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
     cylinder, loss = slots["cylinder"], slots["wheelsetLoss"]
     assert (cylinder.inputs, cylinder.outputs) == (("pB", "restBefore"), ("p", "rest"))
-    assert slots["padFriction"].inputs == ("level", "Fperp", "v", "lackBefore")
+    assert slots["padFriction"].inputs == ("level", "Fperp", "v", "TBefore", "lackBefore")
     # A loss takes a speed and gives a torque; its power follows by an equation of the slot.
     assert (loss.inputs, loss.outputs) == (("omega",), ("tau",))
     assert {slot.name for slot in slots.values() if not slot.chained} == {

@@ -12,6 +12,8 @@ from workbench.report.power_checks import format_followed
 
 from .schemas import check
 
+DISC = "the disc that brakes least, at its caliper"
+
 
 def made(parts: bool, foreseen: bool, predicted: float, shown: float | None) -> dict[str, Any]:
     """A recording that was made."""
@@ -66,7 +68,7 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) 
     check("followed", said)
     (row,) = said["sets"]
     assert set(row["group"]) >= {"FxGain", "DriveTorqueGain"}
-    assert "imitates 1500 kg.m2" in row["proposed"]["experiment"]
+    assert "imitates 0 kg.m2" in row["proposed"]["experiment"]
     assert (row["proposed"]["foreseen"], row["proposed"]["named"]) == (True, ["FxGain"])
     assert len(row["drawn"]) == 2
     # What imitates the whole train tells nothing, whatever else is drawn.
@@ -79,6 +81,8 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) 
     [
         # A force that leans on the load: 100 kN instead of 80 kN tells.
         ("ApexOffset", "FxOffset", "", "wheel load 100 kN"),
+        # Three slightly wet discs look like one that is wetter.
+        ("SingleDiscWaterFilm", "WaterFilm", f"friction force of {DISC}", ""),
         # The same law of the contact, with the friction that belongs to it.
         ("CreepStiffness", "WheelLoad", "wheel load, at the vertical cylinders", ""),
     ],

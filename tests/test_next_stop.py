@@ -21,10 +21,27 @@ from workbench.diagnosis.rivals import read_rivals
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.experiments import NextStop, RankedExperiment, next_stop
-from workbench.experiments.candidates import Profile, drawn, every_setting, other_profiles
+from workbench.experiments.candidates import (
+    Profile,
+    drawn,
+    every_setting,
+    other_profiles,
+    other_settings,
+    some_settings,
+)
 from workbench.experiments.separation import precision, refitted, told_apart
+from workbench.expression import Expression
 from workbench.system import System
-from workbench.system_experiments import SINE, STAIRCASE, STEP, VariedInput
+from workbench.system_experiments import (
+    RELEASE,
+    SINE,
+    STAIRCASE,
+    STEP,
+    Cost,
+    Experiments,
+    Setting,
+    VariedInput,
+)
 from workbench.systems import load_system
 
 from .distances import parted
@@ -142,6 +159,46 @@ def test_a_lag_is_of_first_order() -> None:
     # The filter is exact at samples, one of which the demand may come earlier.
     found = Profile(varied, STEP, (1.0,), 4.0).signal(time)
     assert np.abs(found - expected).max() < 0.01 / 0.7 + 1e-9
+
+
+def a_grid(counts: list[int]) -> Experiments:
+    """Settings with so many values each."""
+    settings = {
+        f"s{k}": tuple(Setting(float(value), f"{value}") for value in range(count))
+        for k, count in enumerate(counts)
+    }
+    cost = Cost(Expression("duration", "a test"), "s")
+    return Experiments(60.0, None, settings, {}, {}, (), {}, cost, ())
+
+
+def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> None:
+    varied = VariedInput("u", 2.0, 5.0, (RELEASE,), 3.0, 4.0, ())
+    asked = replace(a_grid([1]), varied=(varied,))
+    (first,) = every_setting(asked)
+    (half,), (full,) = (one.profiles for one in (first, *other_profiles(asked, first)))
+    time = np.arange(0.0, 60.0, 0.1)
+    assert_allclose(full.demand(time), np.where((time >= 3.0) & (time < 7.0), 5.0, 0.0))
+    assert_allclose(half.demand(time), 0.7 * full.demand(time))
+
+
+@pytest.mark.parametrize(
+    ("counts", "parts"), [([4, 12], 1), ([3, 2, 2, 2, 2, 2], 2), ([6, 6, 6], 5)]
+)
+def test_of_a_large_grid_a_fraction_is_tried_with_every_value(
+    counts: list[int], parts: int
+) -> None:
+    asked = a_grid(counts)
+    every, some = every_setting(asked), some_settings(asked)
+    assert len(some) <= 48
+    assert len(some) == pytest.approx(len(every) / parts, abs=1.0)
+    for name, values in asked.settings.items():
+        often = [sum(one.settings[name] == value for one in some) for value in values]
+        assert min(often) > 0
+        assert np.ptp(often) <= 2
+    # What is left out differs from something that is tried in one setting.
+    near = [one for each in some for one in other_settings(asked, each)]
+    assert len(other_settings(asked, every[0])) == sum(counts) - len(counts)
+    assert all(one in near for one in every if one not in some)
 
 
 # --- a heated block, whose recordings solve the equations by SciPy ---

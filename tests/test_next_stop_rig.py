@@ -155,7 +155,7 @@ def of_two(
     ("planted", "names", "rail", "imitated"),
     [
         ("creep_stiffness=0.16", ["CreepStiffness", "WheelLoad"], "wet", 7840.0),
-        ("fx_gain=0.016", ["FxGain", "DriveTorqueGain"], "dry", 1500.0),
+        ("fx_gain=0.016", ["FxGain", "DriveTorqueGain"], "dry", 0.0),
     ],
 )
 def test_rivals_that_bend_far_are_fitted_again_in_full(

@@ -7,6 +7,7 @@ from workbench.expression import Expression
 from workbench.system import System
 from workbench.system_conditions import Condition
 from workbench.system_experiments import (
+    RELEASE,
     SINE,
     STAIRCASE,
     STEP,
@@ -20,7 +21,8 @@ from workbench.system_tables import read_measured
 from workbench.tables import Table
 from workbench.units import check_unit, quantity
 
-_KINDS = (STEP, STAIRCASE, SINE)
+_USUAL = (STEP, STAIRCASE, SINE)
+_KINDS = (*_USUAL, RELEASE)  # which leaves the range: a machine has to allow it
 
 
 def read_experiments(table: Table, system: System) -> Experiments:
@@ -59,7 +61,7 @@ def read_varied(table: Table, name: str, unit: str) -> VariedInput:
     low, high = table.numbers("range", unit, 2)
     if not low < high:
         raise table.wrong("range", "[low, high]")
-    profiles = table.texts("profiles") or _KINDS
+    profiles = table.texts("profiles") or _USUAL
     if not set(profiles) <= set(_KINDS):
         raise table.wrong("profiles", f"some of {', '.join(_KINDS)}")
     every = table.number("every", "s")

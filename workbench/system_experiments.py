@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from workbench.expression import Expression
 from workbench.system_parts import Signal
 
-STEP, STAIRCASE, SINE = "step", "staircase", "sine"
+STEP, STAIRCASE, SINE, RELEASE = "step", "staircase", "sine", "release"
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class VariedInput:
     low, high : range of the demand [unit].
     profiles : kinds that are tried.
     begins : [s] before which the demand is zero.
-    every : [s] that a stair lasts, and the period of a sine.
+    every : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
     lags : [s] of first order, one after the other, from the demand to the input.
     """
 

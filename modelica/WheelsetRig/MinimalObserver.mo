@@ -8,6 +8,7 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   parameter Units.Force Fz(min=1000.0) = 80000.0 "Wheel load";
   parameter Units.FrictionCoefficient muWR(min=0.01) = 0.15 "Friction wheel-rail at zero slip velocity";
   parameter Units.FrictionCoefficient muDC = 0.30 "Friction disc-pad";
+  parameter Units.Temperature TDisc = 333.15 "Temperature of the discs before the stop";
   parameter Units.AngularVelocity omega0(min=1e-6) = 0.05 "Speed below which pad friction is smoothed";
   parameter Contact.PolachParameters polach "Law of the creep force";
   final parameter Integer nDiscs = 3 "Brake discs on the axle";
@@ -36,9 +37,9 @@ model MinimalObserver "Minimal observer model: wheelset and roller, two degrees 
   replaceable Brakes.LinearActuation actuation(pB=cylinder.p)
     constrainedby Brakes.PartialActuation(pB=cylinder.p) "Brake actuation";
   replaceable Brakes.ConstantPadFriction padFriction(
-    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW)
+    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW, TBefore=TDisc)
     constrainedby Brakes.PartialPadFriction(
-    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW) "Pad friction";
+    level=muDC + dmuDC, Fperp=actuation.Fperp, v=rB*omegaW, TBefore=TDisc) "Pad friction";
   replaceable Contact.ConstantAdhesion adhesion(
     level=muWR + dmuWR, w=slip, v=v, Fx=Fx/2.0)
     constrainedby Contact.PartialAdhesion(

@@ -16,7 +16,13 @@ from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
 from workbench.diagnosis.search import Reporter
 from workbench.errors import InputError
-from workbench.experiments.candidates import Experiment, every_setting, other_profiles
+from workbench.experiments.candidates import (
+    Experiment,
+    every_setting,
+    other_profiles,
+    other_settings,
+    some_settings,
+)
 from workbench.experiments.claims import counts
 from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
 from workbench.experiments.prediction import (
@@ -63,9 +69,19 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     """
     with _open(system, rivals, report) as asked:
         experiments = asked.experiments
-        plan = every_setting(experiments)
-        report(f"{len(plan)} settings, as {' with '.join(rivals.models[0].effects)} predicts")
+        every, plan = every_setting(experiments), some_settings(experiments)
+        named = " with ".join(rivals.models[0].effects)
+        report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
         ranked = chosen(predictions(asked, _cases(asked, plan, workers), workers))
+        near = [
+            one
+            for best in ranked[:_SETTINGS]
+            for one in other_settings(experiments, best.candidate)
+        ]
+        beside = [one for one in every if one in near and one not in plan]
+        if beside:
+            report(f"{len(beside)} others that differ from the best {_SETTINGS} in one setting")
+            ranked = chosen([*ranked, *predictions(asked, _cases(asked, beside, workers), workers)])
         best = [one.candidate for one in ranked[:_SETTINGS]]
         more = [one for setting in best for one in other_profiles(experiments, setting)]
         if more:

@@ -9,10 +9,19 @@ from scipy.signal import lfilter
 
 from workbench.fmu import Vector
 from workbench.system import System
-from workbench.system_experiments import SINE, STAIRCASE, STEP, Experiments, Setting, VariedInput
+from workbench.system_experiments import (
+    RELEASE,
+    SINE,
+    STAIRCASE,
+    STEP,
+    Experiments,
+    Setting,
+    VariedInput,
+)
 from workbench.units import si_factor
 
 _STAIRS = 3  # from the least to the largest demand
+_GRID = 48  # settings, which two cores predict in a quarter of a minute
 
 
 @dataclass(frozen=True)
@@ -21,8 +30,9 @@ class Profile:
 
     Attributes
     ----------
-    levels : of a step or staircase, one after the other and again; of a sine its ends [unit].
-    every : [s] that a stair lasts, and the period of a sine.
+    levels : of a step or staircase, one after the other and again; of a sine its ends; of what is
+        released, before it is [unit].
+    every : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
     """
 
     input: VariedInput
@@ -37,6 +47,8 @@ class Profile:
             low, high = self.levels
             wave = np.sin(2.0 * np.pi * begun / self.every)
             return np.where(begun >= 0.0, 0.5 * (low + high) + 0.5 * (high - low) * wave, 0.0)
+        if self.kind == RELEASE:
+            return np.where((begun >= 0.0) & (begun < self.every), self.levels[0], 0.0)
         stair = np.floor(np.maximum(begun, 0.0) / self.every).astype(int) % len(self.levels)
         return np.where(begun >= 0.0, np.array(self.levels)[stair], 0.0)
 
@@ -58,6 +70,8 @@ class Profile:
             return f"{signal.name} sine {shown[0]} to {shown[1]}{unit}, period {self.every:g} s"
         if self.kind == STEP:
             return f"{signal.name} step to {shown[0]}{unit}"
+        if self.kind == RELEASE:
+            return f"{signal.name} step to {shown[0]}{unit}, released after {self.every:g} s"
         return f"{signal.name} staircase {', '.join(shown)}{unit}, {self.every:g} s each"
 
 
@@ -101,6 +115,29 @@ def every_setting(experiments: Experiments) -> list[Experiment]:
     ]
 
 
+def some_settings(experiments: Experiments) -> list[Experiment]:
+    """Every setting, or a fraction of a grid that is large.
+
+    The fraction is regular, each value being in it as often as any other: of settings whose values
+    are numbered, those whose numbers add up to a multiple (G. E. P. Box, J. S. Hunter, 1961,
+    Technometrics 3, 311-351). `other_settings` has what is next to them.
+    """
+    plan = every_setting(experiments)
+    parts = -(-len(plan) // _GRID)
+    numbers = product(*(range(len(values)) for values in experiments.settings.values()))
+    return [one for one, at in zip(plan, numbers, strict=True) if sum(at) % parts == 0]
+
+
+def other_settings(experiments: Experiments, one: Experiment) -> list[Experiment]:
+    """All that differ from an experiment in one setting."""
+    return [
+        replace(one, settings={**one.settings, name: value})
+        for name, values in experiments.settings.items()
+        for value in values
+        if value != one.settings[name]
+    ]
+
+
 def other_profiles(experiments: Experiments, one: Experiment) -> list[Experiment]:
     """All other profiles, with the settings of an experiment."""
     every = product(*(_profiles(varied) for varied in experiments.varied))
@@ -117,7 +154,10 @@ def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
 
 
 def _profiles(one: VariedInput) -> list[Profile]:
-    """Stairs begun at either end; sines; steps to the ends of the range and between them."""
+    """Stairs begun at either end; sines; steps to the ends of the range and between them.
+
+    What is released was so from the upper end, and between them.
+    """
     low, high = one.low, one.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()
     stairs = (*rising, *rising[-2:0:-1])
@@ -129,4 +169,6 @@ def _profiles(one: VariedInput) -> list[Profile]:
         found += [Profile(one, SINE, (low, high), times * one.every) for times in (1.0, 2.0)]
     if STEP in one.profiles:
         found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
+    if RELEASE in one.profiles:
+        found += [Profile(one, RELEASE, (to,), one.every) for to in (0.5 * (low + high), high)]
     return found

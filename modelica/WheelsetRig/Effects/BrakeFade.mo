@@ -8,14 +8,15 @@ model BrakeFade "Pad friction that falls with the temperature of the disc"
   parameter Real share(unit="1", min=0.0, max=1.0) = 0.93 "Share of the heat; pads take the rest";
   parameter Real circumferential(unit="1", min=0.0) = 0.46/0.30
     "Wheel radius over radius of the pads";
-  Units.Temperature T(start=333.15, fixed=true, nominal=300.0) "Temperature of the disc";
+  Real rise(unit="K", start=0.0, fixed=true, nominal=100.0) "Since the stop began";
+  Units.Temperature T = TBefore + rise "Temperature of the disc";
 protected
   Real cooling(unit="W/K") "Convection of one disc";
 equation
   mu = level*(1.0 - fade*(T - TRef));
   // (v^2 + 0.1^2)^0.4 for |v|^0.8: its slope stays finite at standstill.
   cooling = 20.0 + 5.0*((circumferential*v)^2 + 0.01)^0.4;
-  C*der(T) = share*mu*Fperp*abs(v) - cooling*(T - TAmbient);
+  C*der(rise) = share*mu*Fperp*abs(v) - cooling*(T - TAmbient);
   annotation (
     __Workbench(effect(
       size="fade", matters=3e-5,
@@ -27,8 +28,7 @@ TAmbient)</code>, with <code>h = 20 + 5*v^0.8</code> W/m2/K at the circumferenti
 wheel in m/s: convection at a rotating disc. A hot disc starts the next stop lower, unlike with
 friction that depends on speed.</p>
 <h4>Limits</h4>
-<p>No surface temperature: what follows power within seconds is missing. Every stop starts at the
-temperature that <code>T</code> is given, 60 degC.</p>
+<p>No surface temperature: what follows power within seconds is missing.</p>
 <h4>References</h4>
 <p>J. Topczewska et al. (2022), <em>Materials</em> 15(19), 6821.</p>
 </html>"));

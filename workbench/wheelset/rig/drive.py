@@ -31,12 +31,12 @@ class Drive:
     What brakes the roller, the creep force and the losses, is told from speed and torque by a
     disturbance observer of reduced order. The losses, as the drive knows them, are given back:
     the imitated train has no resistance of its own, so that all that slows it passes the contact.
-    Of the rest the drive carries what the roller's inertia lacks.
+    Of the rest the drive carries what the roller's inertia lacks. Switched off, it does neither.
 
     Parameters
     ----------
     inertia : [kg.m2] of the roller, as the drive knows it.
-    imitated : [kg.m2] that it lets the roller have.
+    imitated : [kg.m2] that it lets the roller have; 0 where it is off.
     losses : of the roller, as the drive knows them.
     omega : [rad/s] at the start.
     dt : [s] period of the control.
@@ -46,11 +46,11 @@ class Drive:
         self, inertia: float, imitated: float, losses: Losses, omega: float, dt: float
     ) -> None:
         self._inertia = inertia
-        self._imitated = imitated
-        self._losses = losses
+        self._share = 1.0 - inertia / imitated if imitated else 0.0
+        self._losses = losses if imitated else Losses(0.0, 0.0, 0.0)
         self._dt = dt
         self._follow = 1.0 - math.exp(-dt / _TORQUE_LAG)
-        self._torque = losses.torque(omega)
+        self._torque = self._losses.torque(omega)
         # The observer starts settled, on losses alone.
         self._momentum = inertia * omega + _OBSERVER_LAG * self._torque
         self._angle = 0.0
@@ -59,8 +59,7 @@ class Drive:
         """Torque [N.m] until the next call; once stopped, the drive holds the roller still."""
         load = (self._momentum - self._inertia * omega) / _OBSERVER_LAG
         losses = self._losses.torque(omega)
-        share = 1.0 - self._inertia / self._imitated
-        wanted = -_HOLDING * omega if stopped else share * (load - losses) + losses
+        wanted = -_HOLDING * omega if stopped else self._share * (load - losses) + losses
         self._torque += self._follow * (wanted - self._torque)
         self._angle += omega * self._dt
         torque = self._torque * (1.0 + _RIPPLE * math.cos(6.0 * self._angle))

@@ -12,7 +12,7 @@ from workbench.files import write_json, write_whole
 from workbench.fmu import Vector
 from workbench.wheelset.rig.effects import Effects
 from workbench.wheelset.rig.run import RATE, TRUTH, StopTruth
-from workbench.wheelset.rig.scenarios import WHEEL_LOAD, Scenario
+from workbench.wheelset.rig.scenarios import DISC_TEMPERATURE, WHEEL_LOAD, Scenario
 from workbench.wheelset.rig.sensors import received, sample
 
 # Column of the recording, unit, factor from SI, digits that hold the resolution.
@@ -116,7 +116,9 @@ def _table(time: Vector, columns: Mapping[str, tuple[Vector, str]]) -> str:
 
 def _case(scenario: Scenario) -> str:
     c = scenario.conditions
-    load = f'wheel_load = "{c.wheel_load / 1e3:g} kN"\n' if c.wheel_load != WHEEL_LOAD else ""
+    besides = f'wheel_load = "{c.wheel_load / 1e3:g} kN"\n' if c.wheel_load != WHEEL_LOAD else ""
+    if c.disc_temperature != DISC_TEMPERATURE:
+        besides += f'disc_temperature = "{c.disc_temperature:g} K"\n'
     return f"""\
 title = "{scenario.title}"
 
@@ -126,7 +128,7 @@ brake_pressure = "{c.brake_pressure / 1e5:g} bar"
 wheel_rail = "{c.wheel_rail}"
 discs = {json.dumps(c.discs)}
 direction = {c.direction}
-{load}
+{besides}
 [measurement]
 file = "measured.csv"
 """

@@ -17,7 +17,7 @@ _STEP_AT, _STEP_WIDTH = 90.0, 5.0  # [degC], [K] of friction_step
 _SLOWING_LAG = 0.2  # [s] of friction_deceleration, longer than wheels swing
 _RIPPLE = 2.0 * math.pi * 0.3  # [rad/s] of friction_ripple
 
-_INITIAL, _AMBIENT = 60.0, 20.0  # [degC]
+_AMBIENT, _ICE = 20.0, 273.15  # [degC], [K]
 _HEAT_CAPACITY = 75.0 * 500.0  # [J/K] friction ring of 75 kg
 _INTO_DISC = 0.93  # share of the heat; the pads take the rest
 
@@ -33,6 +33,7 @@ class Pads:
     effects : gains of the dependences.
     level : friction over FRICTION, from rig to rig.
     discs : state of each disc at the start.
+    temperature : [K] of all discs at the start.
     phase : [rad] of the discs' thickness.
     dt : [s] time between two steps.
 
@@ -43,9 +44,15 @@ class Pads:
     """
 
     def __init__(
-        self, effects: Effects, level: float, discs: Sequence[Surface], phase: float, dt: float
+        self,
+        effects: Effects,
+        level: float,
+        discs: Sequence[Surface],
+        temperature: float,
+        phase: float,
+        dt: float,
     ) -> None:
-        self.temperature = [_INITIAL] * len(discs)
+        self.temperature = [temperature - _ICE] * len(discs)
         planted = [effects.water_film] * len(discs)
         planted[1] = max(planted[1], effects.single_disc_film)
         self.film = [

@@ -12,7 +12,14 @@ from workbench.experiments.candidates import Profile
 from workbench.recording import read_text
 from workbench.system import System
 from workbench.wheelset.rig.drive import TRAIN_INERTIA
-from workbench.wheelset.rig.scenarios import FRICTION, WHEEL_LOAD, Conditions, Scenario, Surface
+from workbench.wheelset.rig.scenarios import (
+    DISC_TEMPERATURE,
+    FRICTION,
+    WHEEL_LOAD,
+    Conditions,
+    Scenario,
+    Surface,
+)
 from workbench.wheelset.rig.sensors import FURTHER
 
 _NAME = "30_next"
@@ -71,9 +78,20 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
         raise ValueError
     speed, pressure = float(said["initial_speed"]), float(demand[0])
     load = float(said.get("wheel_load", WHEEL_LOAD))
-    conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load)
+    warm = float(said.get("disc_temperature", DISC_TEMPERATURE))
+    conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load, warm)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
     sensors = tuple(one.name for one in system.judged if one.name in FURTHER)
     # A roller that stops as fast as no train does is a slide to the protection, which would vent.
     protected = imitated >= TRAIN_INERTIA
-    return Scenario(_NAME, conditions, FRICTION[rail], None, protected, steps, imitated, sensors)
+    return Scenario(
+        name=_NAME,
+        conditions=conditions,
+        muWR=FRICTION[rail],
+        patch=None,
+        protected=protected,
+        steps=steps,
+        imitated=imitated,
+        lasts=system.experiments.lasts,
+        sensors=sensors,
+    )

@@ -106,7 +106,7 @@ class StopTruth:
     phases : of this stop.
     time : (n,) [s] in steps of 1/RATE, negative before the recording.
     truth : (n,) each, by the names of TRUTH and FELT.
-    standstill : [s] when wheelset and roller stood.
+    standstill : [s] when wheelset and roller stood, or the recording ended.
     model : hash of the FMU.
     """
 
@@ -205,7 +205,8 @@ def _parts(
     losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
     drive = Drive(nominal["JR"], scenario.imitated, losses, omegaR, dt)
     brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
-    pads = Pads(effects, drawn.muDC, scenario.conditions.discs, phases.disc_thickness, dt)
+    set_ = scenario.conditions
+    pads = Pads(effects, drawn.muDC, set_.discs, set_.disc_temperature, phases.disc_thickness, dt)
     wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
     contact = CleanedContact(effects.adhesion_recovery, dt)
     protection = WheelSlideProtection(scenario.conditions.initial_speed)
@@ -224,7 +225,7 @@ def _endless(scenario: Scenario, speed: float) -> InputError:
 def _brake_to_standstill(
     fmu: CoSimulation, scenario: Scenario, drawn: Drawn, phases: Phases, effects: Effects
 ) -> tuple[list[tuple[float, ...]], float]:
-    """Rows of the truth, and the time of standstill [s]."""
+    """Rows of the truth, and the time of standstill, or of the end [s]."""
     inputs, outputs = fmu.variables(_INPUTS), fmu.variables(_OUTPUTS)
     nominal = fmu.defaults
     parameters = _parameters(nominal, scenario, drawn, effects)
@@ -248,6 +249,8 @@ def _brake_to_standstill(
         speed = abs(omegaW) * rW
         if standstill is None and braking > 0.0 and max(speed, abs(omegaR) * rR) < _STANDSTILL:
             standstill = t
+        if standstill is None and t >= scenario.lasts:
+            return rows, t
         if standstill is not None:
             if t >= standstill + _REST:
                 return rows, standstill

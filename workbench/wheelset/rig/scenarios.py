@@ -1,5 +1,6 @@
 """The stops that the rig can make: fourteen standard cases, and some that are none."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -11,6 +12,7 @@ Surface: TypeAlias = Literal["dry", "wet"]
 
 FRICTION: Mapping[Surface, float] = {"dry": 0.40, "wet": 0.30}  # at zero slip velocity
 WHEEL_LOAD = 80e3  # [N] usually
+DISC_TEMPERATURE = 333.15  # [K] usually
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Conditions:
     discs : surface of each disc.
     direction : of travel, 1 or -1.
     wheel_load : [N] that the vertical cylinders are set to.
+    disc_temperature : [K].
     """
 
     initial_speed: float
@@ -33,6 +36,7 @@ class Conditions:
     discs: tuple[Surface, ...]
     direction: Literal[1, -1]
     wheel_load: float = WHEEL_LOAD
+    disc_temperature: float = DISC_TEMPERATURE
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,8 @@ class Scenario:
     patch : spell of lower friction, or None.
     protected : whether the wheel-slide protection is switched on.
     steps : demands that follow the first, (time after that [s], pressure [Pa]) each.
-    imitated : inertia that the drive lets the roller have [kg.m2].
+    imitated : inertia that the drive lets the roller have, 0 where it is off [kg.m2].
+    lasts : time after which a recording ends that does not end by standstill [s].
     sensors : that are fitted besides the usual ones, by name.
     """
 
@@ -67,6 +72,7 @@ class Scenario:
     protected: bool
     steps: tuple[tuple[float, float], ...] = ()
     imitated: float = TRAIN_INERTIA
+    lasts: float = math.inf
     sensors: tuple[str, ...] = ()
 
     def demand(self, braking: float) -> float:
@@ -92,10 +98,12 @@ class Scenario:
         wet = [str(i) for i, disc in enumerate(c.discs, start=1) if disc == "wet"]
         some = "wet:" + "+".join(wet)
         discs = {0: "dry", len(c.discs): "wet"}.get(len(wet), some)
-        load = f", wheel load {c.wheel_load / 1e3:g} kN" if c.wheel_load != WHEEL_LOAD else ""
+        besides = f", wheel load {c.wheel_load / 1e3:g} kN" if c.wheel_load != WHEEL_LOAD else ""
+        if c.disc_temperature != DISC_TEMPERATURE:
+            besides += f", discs at {c.disc_temperature:g} K"
         return (
             f"{c.initial_speed * 3.6:g} km/h, {c.brake_pressure / 1e5:g} bar, "
-            f"rail {c.wheel_rail}, discs {discs}, direction {c.direction:+d}{load}"
+            f"rail {c.wheel_rail}, discs {discs}, direction {c.direction:+d}{besides}"
         )
 
 
