@@ -36,6 +36,7 @@ end PadFriction;
 </pre>
 <p>The order in a chain matters only to second order: a film or a disc is heated by the friction up
 to its own place in it. Where outputs of a slot are of another kind than its inputs, as of
-<code>Losses.PartialLoss</code>, there is no chain: what effects change adds up.</p>
+<code>Losses.PartialLoss</code>, there is no chain: what effects change adds up. <code>lack</code> of
+pad friction, what one disc lacks of the mean, is handed on by all but films on some of the discs.</p>
 </html>"));
 end Effects;
