@@ -388,7 +388,7 @@ def test_scenarios_are_named_with_or_without_number() -> None:
         (["--effect", "fade"], r"found ''"),
         (["--effect", "fade=nan"], r"a number in \[1/K\]"),
         (["--effect", "cylinder_lag=-1"], r"0 or more"),
-        (["--effect", "fade=1", "--effect", "fade=2"], r"second gain"),
+        (["--effect", "fade=1", "--effect", "fade=2"], r"second size"),
         (["--rate", "300"], r"divisor of 1000"),
         (["--reference", "missing.fmu"], r"missing\.fmu"),
         (["--reference", str(ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu")], r"no variable"),

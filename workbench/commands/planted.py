@@ -2,14 +2,11 @@
 
 import argparse
 import json
-import math
-from collections.abc import Sequence
 from typing import Any
 
 from workbench.commands.output import Done, Output
-from workbench.errors import InputError, closest
 from workbench.files import write_whole
-from workbench.power.planting import Plantable
+from workbench.power.planting import assigned
 from workbench.power.virtual_rig import open_virtual_rig
 from workbench.system import System
 
@@ -31,7 +28,7 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
         effects = "\n".join(f"  {f'{n} [{one.unit}]':<28} {one.effect}" for n, one in known.items())
         output.result(f"recordings:\n{recordings}\n\neffects, zero if not given:\n{effects}")
         return Done({"recordings": rig.recordings, "effects": {n: known[n].effect for n in known}})
-    gains = read_gains(options.effect, known)
+    gains = assigned(options.effect, known)
     rig.write(rig.simulate(options.seed, gains), gains, options.out)
     truth: dict[str, Any] = {
         "system": system.name,
@@ -45,38 +42,3 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
     count = len(rig.recordings)
     output.result(f"{count} recordings in {options.out}")
     return Done({"out": options.out, "cases": count, "of": count})
-
-
-def read_gains(assignments: Sequence[str], known: dict[str, Plantable]) -> dict[str, float]:
-    """Sizes by name, of texts NAME=VALUE [SI].
-
-    Raises
-    ------
-    InputError
-        If a name or a value is not understood, or a name comes twice.
-    """
-    gains: dict[str, float] = {}
-    for assignment in assignments:
-        name, _, text = assignment.partition("=")
-        where = f"--effect {assignment}"
-        if name not in known or name in gains:
-            again = "a second size for" if name in gains else "unknown effect"
-            raise InputError(
-                where=where,
-                found=f"{again} '{name}'{closest(name, set(known) - set(gains))}",
-                expected=f"one of {', '.join(known)}, once",
-                remedy="correct the name",
-            )
-        try:
-            gains[name] = float(text)
-        except ValueError:
-            gains[name] = math.nan
-        if not (math.isfinite(gains[name]) and gains[name] >= known[name].least):
-            raise InputError(
-                where=where,
-                found=repr(text),
-                expected=f"a number in [{known[name].unit}]"
-                + f", {known[name].least:g} or more" * math.isfinite(known[name].least),
-                remedy=f"write for instance --effect {name}={known[name].unit_size:g}",
-            )
-    return gains

@@ -8,6 +8,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from workbench.errors import InputError, closest
+
 Kind = Literal["clean", "single", "pair", "outside", "sheet"]
 
 
@@ -57,6 +59,47 @@ class Plantable:
     shapes: Mapping[str, float] = field(default_factory=dict)
     unit_size: float = math.nan
     slot: str = ""
+
+
+def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict[str, float]:
+    """Sizes by name, of texts NAME=VALUE [SI].
+
+    Raises
+    ------
+    InputError
+        If a name or a value is not understood, or a name comes twice.
+    """
+    gains: dict[str, float] = {}
+    for assignment in assignments:
+        name, _, text = assignment.partition("=")
+        where = f"--effect {assignment}"
+        if name not in known:
+            raise InputError(
+                where=where,
+                found=f"unknown effect '{name}'{closest(name, known)}",
+                expected=f"one of {', '.join(known)}",
+                remedy="correct the name",
+            )
+        if name in gains:
+            raise InputError(
+                where=where,
+                found=f"a second size for '{name}'",
+                expected="one size for each effect",
+                remedy="give it once",
+            )
+        try:
+            gains[name] = float(text)
+        except ValueError:
+            gains[name] = math.nan
+        if not (math.isfinite(gains[name]) and gains[name] >= known[name].least):
+            raise InputError(
+                where=where,
+                found=repr(text),
+                expected=f"a number in [{known[name].unit}]"
+                + f", {known[name].least:g} or more" * math.isfinite(known[name].least),
+                remedy=f"write for instance --effect {name}={known[name].unit_size:g}",
+            )
+    return gains
 
 
 @dataclass(frozen=True)

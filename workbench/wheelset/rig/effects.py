@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from workbench.errors import InputError, closest
+from workbench.power.planting import Plantable, assigned
 
 
 def _gain(unit: str, text: str, *, least: float = -math.inf) -> Any:
@@ -110,36 +110,10 @@ def plant(base: Effects, assignments: Sequence[str]) -> Effects:
     >>> plant(CONSTANT_PADS, ["fx_gain=0.015"]).fx_gain
     0.015
     """
-    fields = {field.name: field for field in dataclasses.fields(Effects)}
-    gains: dict[str, float] = {}
-    for assignment in assignments:
-        name, _, text = assignment.partition("=")
-        where = f"--effect {assignment}"
-        if name not in fields:
-            raise InputError(
-                where=where,
-                found=f"unknown effect '{name}'{closest(name, fields)}",
-                expected=f"one of {', '.join(fields)}",
-                remedy="correct the name",
-            )
-        unit, least = fields[name].metadata["unit"], fields[name].metadata["least"]
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not (math.isfinite(value) and value >= least):
-            raise InputError(
-                where=where,
-                found=repr(text),
-                expected=f"a number in [{unit}]" + (f", {least:g} or more" * math.isfinite(least)),
-                remedy=f"write for instance --effect {name}=0.01",
-            )
-        if name in gains:
-            raise InputError(
-                where=where,
-                found=f"a second gain for '{name}'",
-                expected="one gain for each effect",
-                remedy="give it once",
-            )
-        gains[name] = value
-    return dataclasses.replace(base, **gains)
+    known = {
+        field.name: Plantable(
+            field.name, field.metadata["unit"], least=field.metadata["least"], unit_size=0.01
+        )
+        for field in dataclasses.fields(Effects)
+    }
+    return dataclasses.replace(base, **assigned(assignments, known))
