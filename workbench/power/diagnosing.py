@@ -85,11 +85,14 @@ def distances_in_set(
             name = score.effect.name
             if name in (true, *others) and name not in fits:
                 fits[name] = extended(fit, base, score)
-        right = fits.get(true)
+        if (right := fits.get(true)) is None:
+            return found, {}
+        _, settled = fit.least(right.linearised, right.active, right.linearised.inflation)
+        units = fit.at(settled.point).inflation
         least = {
-            name: fit.least(one.linearised, one.active, right.linearised.inflation)[0]
+            name: fit.least(one.linearised, one.active, units)[0]
             for name, one in fits.items()
-            if one is not None and right is not None
+            if one is not None
         }
         away = {name: c - least[true] for name, c in least.items() if name != true}
         return found, {name: float(np.sign(c) * np.sqrt(abs(c))) for name, c in away.items()}
