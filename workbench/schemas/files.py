@@ -280,7 +280,7 @@ def _stopping(formula: Schema, level: Schema) -> Schema:
 
 
 def _experiments(formula: Schema, made: Schema, measured: Schema) -> Schema:
-    profiles = {"type": "array", "items": {"enum": ["step", "staircase", "sine"]}}
+    profiles = {"type": "array", "items": {"enum": ["step", "staircase", "sine", "release"]}}
     varied = {
         "range": PAIR,
         "profiles": profiles,
