@@ -58,7 +58,7 @@ def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[d
 
 @pytest.fixture(scope="module")
 def fading_stop(extended: dict[str, FMU]) -> tuple[Case, float]:
-    """A stop from 120 km/h whose pads fade, without noise, and how much warmer discs are then [K]."""
+    """A stop from 120 km/h whose pads fade, without noise, and what discs are warmer then [K]."""
     fmu = extended["Fading"]
     assert fmu.states == FADING_STATES
     fmu.start({"omegaR": 120 / 3.6 / RR, "omegaW": 120 / 3.6 / 0.46})
