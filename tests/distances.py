@@ -12,11 +12,11 @@ from workbench.system import OBSERVER, System
 
 
 def parted(of: System, recordings: Sequence[Case], true: str, other: str) -> float:
-    """Distance of two effects [standard deviations]; negative: the other is nearer."""
+    """Distance of two effects [standard deviations]; 0: the other is nearer."""
     library = read_library(of.library)
     effects = choose([true, other], read_effects(library, of.models[OBSERVER].name))
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / "AllEffects.fmu"
         build_everything(of, effects, everything)
         _, shown = distances_in_set(of, effects, everything, recordings, true, [other])
-    return shown[other]
+    return max(0.0, shown[other])
