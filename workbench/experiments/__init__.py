@@ -43,7 +43,7 @@ __all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop", "with_sensor
 
 _SETTINGS = 3  # of which all profiles are tried
 _TOGETHER = 6  # experiments of which models are fitted again at a time
-_CONFIRMED = 18  # at most
+_CONFIRMED = 24  # at most: a quarter of what is tried
 _SENSED = 3  # experiments that are tried with further sensors
 
 
