@@ -16,11 +16,11 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.case import Case
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.quadratic import Quadratic, RecordingSystem
+from workbench.diagnosis.quadratic import Joint, Quadratic, RecordingSystem
 from workbench.diagnosis.rivals import read_rivals
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.experiments import NextStop, RankedExperiment, next_stop
+from workbench.experiments import NextStop, RankedExperiment, candidates, next_stop
 from workbench.experiments.candidates import (
     Profile,
     drawn,
@@ -113,6 +113,15 @@ def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
     left, _ = refitted(one.eliminated(), np.zeros((0, 0)))
     # The elimination adds 1e-9 to what is known of each, so that unknown ones can be solved for.
     assert_allclose(left, d @ np.linalg.solve(np.eye(9) + P @ P.T, d), rtol=1e-7)
+
+
+def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
+    """Reference: eliminating what belongs to a recording changes nothing where that is at its best."""
+    rng = np.random.default_rng(4)
+    r, P = rng.standard_normal(9), rng.standard_normal((9, 2))
+    one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, 1)
+    joint = Joint((), (), (), (one,), Quadratic(np.zeros((0, 0)), np.zeros(0), 5.0, 0))
+    assert_allclose(joint.chi_squared, joint.total().c, rtol=1e-9)
 
 
 def test_the_chance_is_the_share_of_simulated_decisions() -> None:
@@ -281,6 +290,21 @@ def test_the_first_proposal_parts_what_the_recordings_before_did_not(
     new = named_anew(made(block, proposed.tried[0]))
     (cause,) = diagnosed(block, [*mild, *new], tmp_path).diagnosis.causes
     assert (cause.effect.name, cause.confusable_with) == ("Draught", ())
+
+
+def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
+    block: System, undecided: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(candidates, "_GRID", 1)
+    assert block.experiments is not None
+    knob = {"knob": (Setting(0.0, "0"), Setting(1.0, "1"))}
+    asked = replace(block.experiments, settings={**block.experiments.settings, **knob})
+    asked = replace(asked, labels={**asked.labels, "knob": "a knob"})
+    assert len(some_settings(asked)) == 1
+    assert undecided.rivals is not None
+    found = next_stop(replace(block, experiments=asked), undecided.rivals, 1, lambda _: None)
+    turned = {one.prediction.candidate.settings["knob"].value for one in found.tried}
+    assert turned == {0.0, 1.0}
 
 
 def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed: NextStop) -> None:
