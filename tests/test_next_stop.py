@@ -116,7 +116,7 @@ def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
 
 
 def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
-    """Reference: eliminating what belongs to a recording changes nothing where that is at its best."""
+    """Reference: eliminating what is at its best already changes nothing."""
     rng = np.random.default_rng(4)
     r, P = rng.standard_normal(9), rng.standard_normal((9, 2))
     one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, 1)
