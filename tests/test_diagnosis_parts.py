@@ -327,6 +327,7 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     systems = [
         RecordingSystem(
             *(rng.normal(size=40), rng.normal(size=(40, 3)), rng.normal(size=(40, 5)), d),
+            furthest=np.full(5, np.inf),
             channels=3,
         )
         for d in rng.normal(size=(4, 5))
@@ -359,17 +360,19 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
 
 def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> None:
     rng = np.random.default_rng(4)
+    begun = rng.uniform(-1.0, 1.0, size=(4, 3))
+    far = 0.9 * np.abs(begun).max()  # some are beyond it as begun
     systems = tuple(
         RecordingSystem(
             *(rng.normal(size=40), rng.normal(size=(40, 2)), rng.normal(size=(40, 3)), d),
+            furthest=np.full(3, far),
             channels=3,
         )
-        for d in rng.uniform(-1.0, 1.0, size=(4, 3))
+        for d in begun
     )
     nothing = Quadratic(np.zeros((2, 2)), np.zeros(2), 0.0, 0)
     joint = Joint((("", "a"), ("", "b")), (), (), systems, nothing)
-    far = 0.9 * max(np.abs(one.deviations).max() for one in systems)  # some are beyond it as begun
-    step, local = joint.solve(np.full(2, -9.0), np.full(2, 9.0), np.full(3, far))
+    step, local = joint.solve(np.full(2, -9.0), np.full(2, 9.0))
     # The same by an independent solver, all local unknowns side by side.
     matrix, right = np.zeros((4 * 43, 2 + 4 * 3)), np.zeros(4 * 43)
     for k, one in enumerate(systems):
@@ -377,7 +380,7 @@ def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> 
         matrix[at, :2], matrix[at, own], right[at] = one.J, one.P, one.r
         matrix[43 * k + 40 : 43 * k + 43, own] = np.eye(3)
         right[43 * k + 40 : 43 * k + 43] = one.deviations
-    begun = np.concatenate([np.zeros(2), *(one.deviations for one in systems)])
+    begun = np.concatenate([np.zeros(2), *begun])
     reach = np.append([9.0, 9.0], np.full(12, far))
     best = lsq_linear(matrix, -right, (-reach - begun, reach - begun), tol=1e-13).x
     assert np.sum(np.abs(best + begun) > reach - 1e-9) > 0

@@ -20,7 +20,13 @@ from workbench.diagnosis.quadratic import Joint, Quadratic, RecordingSystem
 from workbench.diagnosis.rivals import read_rivals
 from workbench.diagnosis.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.experiments import NextStop, RankedExperiment, candidates, next_stop
+from workbench.experiments import (
+    NextStop,
+    RankedExperiment,
+    candidates,
+    foreseen,
+    next_stop,
+)
 from workbench.experiments.candidates import (
     Profile,
     drawn,
@@ -109,7 +115,7 @@ def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
     """Reference: d' (I + P P')^-1 d, the covariance of noise and of a tolerance of one sigma."""
     rng = np.random.default_rng(2)
     d, P = rng.standard_normal(9), rng.standard_normal((9, 2))
-    one = RecordingSystem(d, np.zeros((9, 0)), P, np.zeros(2), 1)
+    one = RecordingSystem(d, np.zeros((9, 0)), P, np.zeros(2), np.full(2, np.inf), 1)
     left, _ = refitted(one.eliminated(), np.zeros((0, 0)))
     # The elimination adds 1e-9 to what is known of each, so that unknown ones can be solved for.
     assert_allclose(left, d @ np.linalg.solve(np.eye(9) + P @ P.T, d), rtol=1e-7)
@@ -119,7 +125,7 @@ def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
     """Reference: eliminating what is at its best already changes nothing."""
     rng = np.random.default_rng(4)
     r, P = rng.standard_normal(9), rng.standard_normal((9, 2))
-    one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, 1)
+    one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, np.full(2, np.inf), 1)
     joint = Joint((), (), (), (one,), Quadratic(np.zeros((0, 0)), np.zeros(0), 5.0, 0))
     assert_allclose(joint.chi_squared, joint.total().c, rtol=1e-9)
 
@@ -330,6 +336,32 @@ def test_the_separation_is_what_recordings_then_show(
         expected = np.sqrt(one.prediction.apart[0, 1])
         shown = parted(block, [*mild, *named_anew(made(block, one))], "Draught", "Radiation")
         assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
+
+
+def test_a_rival_cannot_use_what_its_recordings_so_far_hold(
+    block: System, undecided: Outcome, proposed: NextStop
+) -> None:
+    """States at the start of recordings that are made: free, as sure as they were, and known."""
+    rivals = undecided.rivals
+    assert rivals is not None
+    apart = []
+    for furthest in (np.inf, rivals.models[0].recordings[0].furthest[0], 0.0):
+        models = [
+            replace(
+                model,
+                recordings=tuple(
+                    replace(one, furthest=np.full(one.P.shape[1], furthest))
+                    for one in model.recordings
+                ),
+            )
+            for model in rivals.models
+        ]
+        plan = [proposed.tried[0].prediction.candidate]
+        (found,) = foreseen(block, replace(rivals, models=tuple(models)), plan, 1)
+        apart.append(found.prediction.apart[0, 1])
+    # Within five standard deviations nothing is held here, and what is held parts more.
+    assert_allclose(apart[1], apart[0], rtol=1e-6)
+    assert apart[2] > 1.1 * apart[1]
 
 
 def test_each_experiment_is_drawn_as_often(block: System) -> None:

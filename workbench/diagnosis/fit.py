@@ -264,7 +264,9 @@ class Fit:
         ]
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
-        return RecordingSystem(evidence.residual * weight, J, local, point.deviations[k], m)
+        furthest = np.repeat([self.decides.furthest, _TURN], [len(tolerances), len(P)])
+        r, deviations = evidence.residual * weight, point.deviations[k]
+        return RecordingSystem(r, J, local, deviations, furthest, m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""
@@ -366,14 +368,12 @@ class Fit:
         ]
         low, high = np.array(reach).reshape(-1, 2).T
         count = len(self.unknowns.local)
-        furthest = np.full(joint.systems[0].P.shape[1], _TURN)
-        furthest[:count] = self.decides.furthest
-        step, locals_ = joint.solve(low - at, high - at, furthest)
+        step, locals_ = joint.solve(low - at, high - at)
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, value, least, greatest in zip(joint.shared, at + step, low, high, strict=True):
             kind = levels if key in levels else sizes
             kind[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
-        changes = np.array(locals_)
+        changes = np.array(locals_[: self.unknowns.count])
         locked = [name for name, parameter in joint.shared if parameter == "amplitude"]
         phases = {name: point.phases[name] + changes[:, count + j] for j, name in enumerate(locked)}
         return Point(sizes, levels, point.deviations + changes[:, :count], phases)

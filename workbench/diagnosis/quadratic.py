@@ -117,6 +117,7 @@ class RecordingSystem:
     ----------
     r : (n,); J : (n, p); P : (n, q).
     deviations : (d,) of the present point, of the first unknowns in l; phases are free.
+    furthest : (q,) from zero, of a deviation or of a step of what is no deviation.
     channels : c; r holds the errors of blocks, each by channel, and last the one of the rest.
     held : (q,) entries of l that are not free any more; NaN of those that are. None: all are.
     """
@@ -125,6 +126,7 @@ class RecordingSystem:
     J: Matrix
     P: Matrix
     deviations: Vector
+    furthest: Vector
     channels: int
     held: Vector | None = None
 
@@ -177,21 +179,36 @@ class RecordingSystem:
         own: Matrix = np.asarray(np.linalg.inv(normal), np.float64)
         return -own @ coupling, own
 
-    def holding(self, z: Vector, furthest: Vector) -> "RecordingSystem":
-        """The same where entries of l that a step z takes beyond bounds are held there.
+    @property
+    def chi_squared(self) -> float:
+        """At the point itself, tolerances included."""
+        return float(self.r @ self.r + self.deviations @ self.deviations)
 
-        Parameters
-        ----------
-        furthest : (q,) from zero, of a deviation or of a step of what is no deviation.
-        """
+    def holding(self, z: Vector) -> "RecordingSystem":
+        """The same where entries of l that a step z takes beyond bounds are held there."""
         begun = np.zeros(self.P.shape[1])
         begun[: self.deviations.size] = self.deviations
         step, free = self.local(z), self._free
-        beyond = free & (np.abs(begun + step) > furthest)
+        beyond = free & (np.abs(begun + step) > self.furthest)
         if not beyond.any():
             return self
-        ends = np.clip(begun + step, -furthest, furthest) - begun
+        ends = np.clip(begun + step, -self.furthest, self.furthest) - begun
         return replace(self, held=np.where(free & ~beyond, np.nan, np.where(free, ends, step)))
+
+    def moved(self, z: Vector) -> "RecordingSystem":
+        """About a step z of the common unknowns, with the best l within bounds."""
+        held, more = self, self.holding(z)
+        while more is not held:
+            held, more = more, more.holding(z)
+        step = held.local(z)
+        r, deviations = self.r + self.J @ z + self.P @ step, self.deviations
+        return replace(self, r=r, deviations=deviations + step[: deviations.size])
+
+    def compressed(self) -> "RecordingSystem":
+        """The same chi-squared in as few rows as it has unknowns, which are of no channel."""
+        p, q = self.J.shape[1], self.P.shape[1]
+        R = np.asarray(np.linalg.qr(np.column_stack([self.J, self.P, self.r]), "r"), np.float64)
+        return replace(self, r=R[:, -1], J=R[:, :p], P=R[:, p : p + q], channels=1)
 
 
 def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
@@ -209,7 +226,7 @@ def _cut(one: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
         rows = np.append(np.arange(first, end), one.r.size - 1)
         weight = 1.0 - rest[rows] * (first > 0)
         part = (one.r[rows] * weight, one.J[rows] * weight[:, None], one.P[rows])
-        cut.append(RecordingSystem(*part, one.deviations, one.channels))
+        cut.append(RecordingSystem(*part, one.deviations, one.furthest, one.channels))
     return tuple(cut)
 
 
@@ -247,19 +264,19 @@ class Joint:
         N[np.ix_(old, old)], g[old] = self.prior.N, self.prior.g
         N[at, at], g[at] = np.eye(one.deviations.size), one.deviations
         c = self.prior.c + float(one.deviations @ one.deviations)
+        none = np.zeros(0)
         return Joint(
             shared=(*self.known, *own, *extra),
             known=(*self.known, *own),
             levels=(*self.levels, *own),
-            systems=_cut(replace(one, J=J, P=J[:, :0], deviations=one.deviations[:0]), parts),
+            systems=_cut(RecordingSystem(one.r, J, J[:, :0], none, none, one.channels), parts),
             prior=Quadratic(N, g, c, 0),
         )
 
     @property
     def chi_squared(self) -> float:
         """At the point itself, tolerances and the prior included."""
-        own = sum(one.r @ one.r + one.deviations @ one.deviations for one in self.systems)
-        return float(own) + self.prior.c
+        return sum(one.chi_squared for one in self.systems) + self.prior.c
 
     def stops(self) -> list[Quadratic]:
         """Chi-squared of each stop."""
@@ -280,18 +297,17 @@ class Joint:
         spread[len(common) :, len(common) :] += np.mean(own, axis=0)[:count, :count] / len(own)
         return spread
 
-    def solve(self, low: Vector, high: Vector, furthest: Vector) -> tuple[Vector, list[Vector]]:
+    def solve(self, low: Vector, high: Vector) -> tuple[Vector, list[Vector]]:
         """Best step of the common unknowns, and of the local ones of each stop, within bounds.
 
         Parameters
         ----------
         low, high : (p,) of the step.
-        furthest : (q,) see `RecordingSystem.holding`.
         """
         systems = self.systems
         while True:
             step = minimum_within(replace(self, systems=systems).total(), low, high)
-            held = tuple(one.holding(step, furthest) for one in systems)
+            held = tuple(one.holding(step) for one in systems)
             if held == systems:
                 return step, [one.local(step) for one in systems]
             systems = held

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.quadratic import Key
+from workbench.diagnosis.quadratic import Key, Quadratic, RecordingSystem, add
 from workbench.diagnosis.search import Fitted, beyond
 from workbench.fmu import Matrix, Vector
 
@@ -24,17 +25,58 @@ class Rival:
     ----------
     effects : names of its causes.
     sizes, levels : common unknowns as fitted, by key, SI.
-    information : (p, p) inverse covariance of sizes and levels, in this order.
-    behind : chi-squared that it leaves beyond the best.
+    recordings : errors and derivatives there, each in as few rows as tell the same; common unknowns
+        in this order.
+    prior : what is known of these beforehand.
     explained : chi-squared that it explains beyond the nominal model.
     """
 
     effects: tuple[str, ...]
     sizes: Mapping[Key, float]
     levels: Mapping[Key, float]
-    information: Matrix
-    behind: float
+    recordings: tuple[RecordingSystem, ...]
+    prior: Quadratic
     explained: float
+
+    @property
+    def chi_squared(self) -> float:
+        """That it leaves, tolerances and what was known beforehand included."""
+        return sum(one.chi_squared for one in self.recordings) + self.prior.c
+
+    @property
+    def information(self) -> Matrix:
+        """Inverse covariance of sizes and levels, (p, p)."""
+        return add([*(one.eliminated() for one in self.recordings), self.prior]).N
+
+    def so_far(self, shared: Sequence[Key], furthest: float) -> RecordingSystem:
+        """All recordings as one, over the common unknowns of new ones.
+
+        What these do not have may change as its prior lets it.
+
+        Parameters
+        ----------
+        shared : common unknowns of new recordings.
+        furthest : standard deviations that no level goes beyond.
+        """
+        old = [*self.sizes, *self.levels]
+        J, N = np.vstack([one.J for one in self.recordings]), np.diag(self.prior.N)
+        gone = [j for j, key in enumerate(old) if key not in shared]
+        known = N[gone] > 0.0
+        spread = 1.0 / np.sqrt(np.where(known, N[gone], 1.0))
+        P = np.hstack([block_diag(*(one.P for one in self.recordings)), J[:, gone] * spread])
+        counts = [np.arange(one.P.shape[1]) < one.deviations.size for one in self.recordings]
+        first = np.argsort(~np.concatenate([*counts, known]), kind="stable")
+        away = [*(one.deviations for one in self.recordings), (self.prior.g[gone] * spread)[known]]
+        bounds = [*(one.furthest for one in self.recordings), np.where(known, furthest, np.inf)]
+        columns = [J[:, old.index(key)] if key in old else np.zeros(len(J)) for key in shared]
+        return RecordingSystem(
+            r=np.concatenate([one.r for one in self.recordings]),
+            J=np.column_stack(columns),
+            P=P[:, first],
+            deviations=np.concatenate(away),
+            furthest=np.concatenate(bounds)[first],
+            channels=1,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""
@@ -42,8 +84,12 @@ class Rival:
             "effects": list(self.effects),
             "sizes": [[*key, value] for key, value in self.sizes.items()],
             "levels": [[*key, value] for key, value in self.levels.items()],
-            "information": self.information.tolist(),
-            "behind": self.behind,
+            "recordings": [_told(one) for one in self.recordings],
+            "prior": {
+                "matrix": self.prior.N.tolist(),
+                "gradient": self.prior.g.tolist(),
+                "constant": self.prior.c,
+            },
             "explained": self.explained,
         }
 
@@ -85,10 +131,9 @@ def gathered(simulations: Simulations, fit: Fit, base: Fitted, fits: Sequence[Fi
     base : the nominal model, fitted.
     fits : of the models; the first is the one that was named.
     """
-    best = fits[0]
-    inflation = best.linearised.inflation
+    inflation = fits[0].linearised.inflation
     return Rivals(
-        models=tuple(_rival(fit, base, best, one) for one in fits),
+        models=tuple(_rival(fit, base, one, inflation) for one in fits),
         effects=tuple(fit.unknowns.effects),
         given=simulations.given,
         signals=tuple(simulations.recordings[0].signals),
@@ -96,16 +141,46 @@ def gathered(simulations: Simulations, fit: Fit, base: Fitted, fits: Sequence[Fi
     )
 
 
-def _rival(fit: Fit, base: Fitted, best: Fitted, one: Fitted) -> Rival:
-    lin = replace(fit.linearise(one.linearised, one.active), inflation=best.linearised.inflation)
+def _rival(fit: Fit, base: Fitted, one: Fitted, inflation: Vector) -> Rival:
+    lin = replace(fit.linearise(one.linearised, one.active), inflation=inflation)
+    joint = fit.quadratics(lin)
+    still = np.zeros(len(joint.shared))
     return Rival(
         effects=tuple(effect.name for effect in one.active),
         sizes=dict(one.point.sizes),
         levels=dict(one.point.levels),
-        information=fit.quadratics(lin).total().N,
-        behind=beyond(one, best),
+        recordings=tuple(one.compressed().moved(still) for one in joint.systems),
+        prior=joint.prior,
         explained=beyond(base, one),
     )
+
+
+def _told(one: RecordingSystem) -> dict[str, Any]:
+    """A recording's errors and derivatives as numbers."""
+    return {
+        "errors": one.r.tolist(),
+        "common": one.J.tolist(),
+        "own": one.P.tolist(),
+        "deviations": one.deviations.tolist(),
+        "furthest": one.furthest.tolist(),
+    }
+
+
+def _system(said: Mapping[str, Any]) -> RecordingSystem:
+    """What `_told` told."""
+    return RecordingSystem(
+        r=np.array(said["errors"], float),
+        J=np.array(said["common"], float),
+        P=np.array(said["own"], float),
+        deviations=np.array(said["deviations"], float),
+        furthest=np.array(said["furthest"], float),
+        channels=1,
+    )
+
+
+def _prior(said: Mapping[str, Any]) -> Quadratic:
+    matrix, gradient = (np.array(said[name], float) for name in ("matrix", "gradient"))
+    return Quadratic(matrix, gradient, float(said["constant"]), 0)
 
 
 def read_rivals(said: Mapping[str, Any]) -> Rivals:
@@ -126,8 +201,8 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
                 effects=tuple(map(str, one["effects"])),
                 sizes=keyed(one["sizes"]),
                 levels=keyed(one["levels"]),
-                information=np.array(one["information"], float),
-                behind=float(one["behind"]),
+                recordings=tuple(_system(recording) for recording in one["recordings"]),
+                prior=_prior(one["prior"]),
                 explained=float(one["explained"]),
             )
             for one in said["models"]

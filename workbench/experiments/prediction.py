@@ -18,10 +18,9 @@ from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
 from workbench.diagnosis.quadratic import (
     Joint,
-    Key,
     Quadratic,
     RecordingSystem,
-    covariance,
+    add,
     minimum,
 )
 from workbench.diagnosis.rivals import Rival, Rivals
@@ -220,7 +219,7 @@ def _refitted(asked: Outlook, candidate: Experiment, case: Case) -> Prediction:
     with _fitted(asked, [(candidate, case)], 1) as (simulations, fit, rows):
 
         def again(true: _Row, other: _Row, _: int) -> tuple[float, Matrix]:
-            refit = Refit(fit, other.lin, true.joint.systems[0].r, other.information)
+            refit = Refit(fit, other.lin, true.joint.systems[0].r, other.so_far)
             return refit.left(other.active)
 
         return _prediction(simulations, fit, asked.rivals, rows, 0, candidate, again)
@@ -235,15 +234,20 @@ class _Row:
     active : its causes.
     lin : errors and derivatives there.
     joint : over its common unknowns.
-    information : of these in the recordings so far, (p, p).
+    so_far : the recordings so far over these.
     bare : its responses without its causes, beside the derivatives of `joint`.
     """
 
     active: tuple[Effect, ...]
     lin: Linearised
     joint: Joint
-    information: Matrix
+    so_far: RecordingSystem
     bare: Joint
+
+    @property
+    def information(self) -> Matrix:
+        """Of the common unknowns in the recordings so far, (p, p)."""
+        return add([self.so_far.eliminated(), self.joint.prior]).N
 
 
 @contextmanager
@@ -294,30 +298,8 @@ def _linearised(fit: Fit, asked: Outlook, rival: Rival, begun: Matrix) -> _Row:
     ]
     joint = fit.quadratics(lin)
     unexplained = fit.quadratics(replace(lin, evidence=tuple(bare)))
-    return _Row(active, lin, joint, _aligned(joint, rival), unexplained)
-
-
-def _aligned(joint: Joint, rival: Rival) -> Matrix:
-    """Information of a rival over the unknowns of new recordings.
-
-    Unknowns that these do not have are left free; of new ones only the prior is known.
-    """
-    old: list[Key] = [*rival.sizes, *rival.levels]
-    kept = [key for key in old if key in joint.shared]
-    at, gone = (
-        [old.index(key) for key in keys] for keys in (kept, [k for k in old if k not in kept])
-    )
-    N = rival.information
-    own = N[np.ix_(at, at)]
-    if gone:
-        cross = N[np.ix_(at, gone)]
-        own = own - cross @ covariance(N[np.ix_(gone, gone)]) @ cross.T
-    found = joint.prior.N.copy()
-    places = [joint.shared.index(key) for key in kept]
-    found[places, :] = 0.0
-    found[:, places] = 0.0
-    found[np.ix_(places, places)] = own
-    return found
+    so_far = rival.so_far(joint.shared, fit.decides.furthest_level)
+    return _Row(active, lin, joint, so_far, unexplained)
 
 
 def _once(true: _Row, other: _Row, k: int) -> tuple[float, Matrix]:
@@ -346,7 +328,7 @@ def _prediction(
             if i == j:
                 continue
             total, errors = leaves(true, other, k)
-            apart[i, j] = total + rival.behind - model.behind
+            apart[i, j] = total + rival.chi_squared - model.chi_squared
             chance[i, j] = told_apart(apart[i, j], explained, fit.decides)
             if i == 0:
                 left.append(errors)

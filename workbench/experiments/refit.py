@@ -8,26 +8,26 @@ import numpy as np
 from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised
-from workbench.diagnosis.quadratic import Joint, Key, Quadratic
+from workbench.diagnosis.quadratic import Joint, Key, RecordingSystem
 from workbench.fmu import Matrix, Vector
 
 
 class Refit(Fit):
     """Least squares of a rival against the response of a true model, without noise.
 
-    What recordings so far know of its unknowns holds it as a prior does.
+    Recordings so far go on counting, as their derivatives have them.
 
     Parameters
     ----------
     fit : of the one recording.
     begun : the rival as it was fitted, about the experiment's own start.
     true : whitened errors of the true model, (n,).
-    information : (p, p) of the rival's common unknowns in the recordings so far.
+    so_far : the recordings so far, over the rival's common unknowns.
     """
 
-    def __init__(self, fit: Fit, begun: Linearised, true: Vector, information: Matrix) -> None:
+    def __init__(self, fit: Fit, begun: Linearised, true: Vector, so_far: RecordingSystem) -> None:
         self.__dict__.update(vars(fit))
-        self._begun, self._true, self._information = begun, true, information
+        self._begun, self._true, self._so_far = begun, true, so_far
 
     def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
         """As of `Fit`: away from the true model, and from where the rival began."""
@@ -36,12 +36,18 @@ class Refit(Fit):
         deviations = one.deviations - begun.deviations[0]
         system = replace(one, r=one.r - self._true, deviations=deviations)
         now, then = ({**point.sizes, **point.levels} for point in (lin.point, begun))
-        d = np.array([now[key] - then[key] for key in joint.shared])
-        N = self._information
-        return replace(joint, systems=(system,), prior=Quadratic(N, N @ d, float(d @ N @ d), 0))
+        z = np.array([now[key] - then[key] for key in joint.shared])
+        return replace(joint, systems=(system, self._so_far.moved(z)))
 
     def left(self, active: Sequence[Effect]) -> tuple[float, Matrix]:
-        """Chi-squared that the rival leaves, and whitened errors by block and channel, (b, c)."""
+        """Chi-squared that the rival leaves beyond what it began with.
+
+        Returns
+        -------
+        left : chi-squared.
+        errors : whitened, of the experiment by block and channel, (b, c).
+        """
         value, lin = self.least(self._begun, active, self._begun.inflation)
-        (one,) = self.quadratics(lin).systems
-        return value, one.r[:-1].reshape(-1, one.channels)
+        one = self.quadratics(lin).systems[0]
+        begun = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
+        return value - begun, one.r[:-1].reshape(-1, one.channels)

@@ -195,12 +195,20 @@ def _certainty(matrix: Schema) -> Schema:
 
 
 def _rivals(matrix: Schema) -> Schema:
+    numbers = listed(NUMBER)
+    recording = {
+        "errors": numbers,
+        "common": matrix,
+        "own": matrix,
+        "deviations": numbers,
+        "furthest": numbers,
+    }
     rival = {
         "effects": listed(TEXT),
         "sizes": listed({"type": "array"}),
         "levels": listed({"type": "array"}),
-        "information": matrix,
-        "behind": NUMBER,
+        "recordings": listed(closed(recording)),
+        "prior": closed({"matrix": matrix, "gradient": numbers, "constant": NUMBER}),
         "explained": NUMBER,
     }
     rivals = {
@@ -208,7 +216,7 @@ def _rivals(matrix: Schema) -> Schema:
         "effects": listed(TEXT),
         "given": by_name(NUMBER),
         "signals": listed(TEXT),
-        "inflation": listed(NUMBER),
+        "inflation": numbers,
     }
     return closed(rivals)
 
