@@ -49,6 +49,13 @@ def test_what_was_followed_is_counted() -> None:
     assert f"2 of 4 {SHARES['proposed']} (7% to 93%)" in told
 
 
+def test_a_rival_that_is_nearer_than_the_true_cause_is_predicted_as_such() -> None:
+    row = {"planted": "A", "multiple": 8.0, "verdict": "found", "group": ["A", "B"], "sensed": None}
+    rows = [row | {"proposed": made(False, False, -9.0, shown), "drawn": []} for shown in (-9.5, 9)]
+    found = summarise_following(rows)["separations"]
+    assert (found["hits"], found["of"]) == (1, 2)
+
+
 def test_a_rig_that_makes_no_experiments_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,6 +11,8 @@ import numpy as np
 
 from workbench.errors import InputError
 
+Formula = Callable[[Callable[[str], Any]], Any]
+
 _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -58,10 +60,13 @@ class Expression:
     def __post_init__(self) -> None:
         self.names  # noqa: B018  read once, so that a mistake shows where it stands
 
+    def __reduce__(self) -> tuple[type["Expression"], tuple[str, str]]:
+        return Expression, (self.text, self.where)  # no process takes functions of another one
+
     @cached_property
-    def _tree(self) -> ast.expr:
+    def _formula(self) -> Formula:
         try:
-            return ast.parse(self.text, mode="eval").body
+            return self._built(ast.parse(self.text, mode="eval").body)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise self._wrong(self.text) from None
 
@@ -76,14 +81,14 @@ class Expression:
 
         try:
             with np.errstate(all="ignore"):
-                self._walk(self._tree, note)
+                self._formula(note)
         except (RecursionError, OverflowError):
             raise self._wrong(self.text) from None
         return frozenset(found)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """Value where names have `values`, a float or an array."""
-        return self._walk(self._tree, values.__getitem__)
+        return self._formula(values.__getitem__)
 
     def slopes(self, names: tuple[str, ...], values: Mapping[str, float]) -> tuple[float, ...]:
         """Coefficients of some of the names, in which the formula must be linear and homogeneous.
@@ -114,21 +119,23 @@ class Expression:
             )
         return tuple(float(value) for value in slopes)
 
-    def _walk(self, node: ast.AST, value_of: Callable[[str], Any]) -> Any:
+    def _built(self, node: ast.AST) -> Formula:
+        """A function of what tells the value of a name."""
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return np.float64(number)  # divided by zero it is infinite, as an array is
+                constant = np.float64(number)  # divided by zero it is infinite, as an array is
+                return lambda value_of: constant
             case ast.Name() | ast.Attribute() | ast.Subscript():
-                return value_of(self._name(node))
+                name = self._name(node)
+                return lambda value_of: value_of(name)
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](self._walk(operand, value_of))
+                return _applied(_OPERATORS[type(op)], self._built(operand))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                sides = (self._walk(left, value_of), self._walk(right, value_of))
-                return _OPERATORS[type(op)](*sides)
+                return _applied(_OPERATORS[type(op)], self._built(left), self._built(right))
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if (
                 name in _FUNCTIONS and len(args) == _FUNCTIONS[name].nin
             ):
-                return _FUNCTIONS[name](*(self._walk(arg, value_of) for arg in args))
+                return _applied(_FUNCTIONS[name], *map(self._built, args))
         raise self._wrong(ast.unparse(node))
 
     def _name(self, node: ast.AST) -> str:
@@ -148,3 +155,12 @@ class Expression:
             expected=f"numbers, names, + - * / **, brackets, {', '.join(_FUNCTIONS)}",
             remedy="correct the formula",
         )
+
+
+def _applied(function: Callable[..., Any], *parts: Formula) -> Formula:
+    """A function of one or two parts."""
+    if len(parts) == 1:
+        (only,) = parts
+        return lambda value_of: function(only(value_of))
+    left, right = parts
+    return lambda value_of: function(left(value_of), right(value_of))

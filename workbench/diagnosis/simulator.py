@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -78,6 +79,14 @@ class Simulator:
         rest = given.system.comparison.rest
         self._rest = self._fmu.variables([rest.output]) if rest else None
         self._clocks = late_signals(given.system)
+
+    def stepped(self, parts: int) -> "Simulator":
+        """The same FMU in other steps, so many to a sample time."""
+        other = copy(self)
+        other._parts = parts
+        signals = self._recordings[0].signals
+        other._predictor = Predictor(self._fmu, self._system, signals, parts)
+        return other
 
     @property
     def parameters(self) -> set[str]:
@@ -319,15 +328,16 @@ def settled_parts(given: Simulated, values: Mapping[str, float]) -> int:
     """
 
     def errors(parts: int) -> list[Matrix]:
-        with simulating(given._replace(parts=parts)) as simulator:
-            return [simulator.errors(k, values) for k in range(len(given.recordings))]
+        stepped = simulator.stepped(parts)
+        return [stepped.errors(k, values) for k in range(len(given.recordings))]
 
-    parts, coarse = 1, errors(1)
-    while parts < _FINEST:
-        fine = errors(2 * parts)
-        moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
-        wrong = [np.square(a).sum(axis=0) for a in fine]
-        if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
-            break
-        parts, coarse = 2 * parts, fine
+    with simulating(given) as simulator:
+        parts, coarse = 1, errors(1)
+        while parts < _FINEST:
+            fine = errors(2 * parts)
+            moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
+            wrong = [np.square(a).sum(axis=0) for a in fine]
+            if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
+                break
+            parts, coarse = 2 * parts, fine
     return parts

@@ -6,11 +6,10 @@ rivals of a diagnosis, what may be varied -> recordings that the first rival pre
 
 import tempfile
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
-from workbench.case import Case
 from workbench.diagnosis import build_everything, catalogue, choose
 from workbench.diagnosis.rivals import Rivals
 from workbench.diagnosis.samples import channels
@@ -23,23 +22,18 @@ from workbench.experiments.candidates import (
     other_settings,
     some_settings,
 )
-from workbench.experiments.claims import counts
+from workbench.experiments.foresight import Foresight, foresight, with_sensor
 from workbench.experiments.outcome import PROPOSED, NextStop, RankedExperiment, chosen
-from workbench.experiments.prediction import (
-    Outlook,
-    Prediction,
-    claimed_alike,
-    predicted_cases,
-    predictions,
-    refitted_predictions,
-)
-from workbench.expression import Expression
+from workbench.experiments.prediction import Outlook, Prediction
 from workbench.modelica import read_library
-from workbench.system import Channel, System
+from workbench.pool import Pool
+from workbench.system import System
 from workbench.system_experiments import Experiments
 from workbench.system_parts import Signal
 
 __all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop", "with_sensor"]
+
+_Task = Future[Prediction | None]
 
 _SETTINGS = 3  # of which all profiles are tried
 _TOGETHER = 6  # experiments of which models are fitted again at a time
@@ -67,12 +61,11 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     InputError
         If the system does not say what may be varied, or no recording of it would count.
     """
-    with _open(system, rivals, report) as asked:
-        experiments = asked.experiments
+    with _open(system, rivals, workers, report) as (experiments, pool):
         every, plan = every_setting(experiments), some_settings(experiments)
         named = " with ".join(rivals.models[0].effects)
         report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
-        ranked = chosen(predictions(asked, _cases(asked, plan, workers), workers))
+        ranked = chosen(_foreseen(system, pool, plan))
         near = [
             one
             for best in ranked[:_SETTINGS]
@@ -81,26 +74,23 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         beside = [one for one in every if one in near and one not in plan]
         if beside:
             report(f"{len(beside)} others that differ from the best {_SETTINGS} in one setting")
-            ranked = chosen([*ranked, *predictions(asked, _cases(asked, beside, workers), workers)])
+            ranked = chosen([*ranked, *_foreseen(system, pool, beside)])
         best = [one.candidate for one in ranked[:_SETTINGS]]
         more = [one for setting in best for one in other_profiles(experiments, setting)]
         if more:
             report(f"{len(more)} profiles with the best {len(best)}")
-            ranked = chosen([*ranked, *predictions(asked, _cases(asked, more, workers), workers)])
+            ranked = chosen([*ranked, *_foreseen(system, pool, more)])
         if len(rivals.models) > 1:
             report("the best, with the models fitted again in full")
-            ranked = _confirmed(asked, ranked, workers)
+            ranked = _confirmed(pool, ranked)
         sensors = {}
         first = ranked[0]
-        if len(first.groups) < len(rivals.models):
-            for sensor in experiments.sensors:
-                report(f"the same with a sensor of {sensor.label}")
-                sensed = replace(asked, system=with_sensor(system, sensor))
-                tried = [one.candidate for one in ranked[:_SENSED]]
-                cases = _cases(sensed, tried, workers)
-                found = chosen(refitted_predictions(sensed, cases, workers))[0]
-                if len(found.groups) > len(first.groups):
-                    sensors[sensor.label] = _proposal(sensed.system, experiments, found)
+        if len(first.groups) < len(rivals.models) and experiments.sensors:
+            report("the same with further sensors")
+            best = [one.candidate for one in ranked[:_SENSED]]
+            for sensor, found in _sensed(pool, best, experiments.sensors, len(first.groups)):
+                sensed = with_sensor(system, sensor)
+                sensors[sensor.label] = _proposal(sensed, experiments, found)
     return NextStop(
         system=system,
         rivals=rivals,
@@ -120,14 +110,16 @@ def foreseen(
     InputError
         As `next_stop`.
     """
-    with _open(system, rivals, lambda _: None) as asked:
-        ranked = chosen(refitted_predictions(asked, _cases(asked, plan, workers), workers))
-        return [_proposal(system, asked.experiments, one) for one in ranked]
+    with _open(system, rivals, workers, lambda _: None) as (experiments, pool):
+        ranked = chosen(_foreseen(system, pool, plan, in_full=True))
+        return [_proposal(system, experiments, one) for one in ranked]
 
 
 @contextmanager
-def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Outlook]:
-    """The machine as its models predict it."""
+def _open(
+    system: System, rivals: Rivals, workers: int, report: Reporter
+) -> Iterator[tuple[Experiments, Pool[Foresight]]]:
+    """What the system allows, and workers with its model."""
     experiments = system.experiments
     if experiments is None:
         raise InputError(
@@ -142,10 +134,59 @@ def _open(system: System, rivals: Rivals, report: Reporter) -> Iterator[Outlook]
         everything = Path(scratch) / "AllEffects.fmu"
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
-        yield Outlook(everything, system, experiments, rivals, effects)
+        outlook = Outlook(everything, system, experiments, rivals, effects)
+        with Pool(workers, foresight, outlook) as pool:
+            yield experiments, pool
 
 
-def _confirmed(asked: Outlook, ranked: Sequence[Prediction], workers: int) -> list[Prediction]:
+def _foreseen(
+    system: System, pool: Pool[Foresight], plan: Sequence[Experiment], *, in_full: bool = False
+) -> list[Prediction]:
+    """What experiments would tell, those that would count."""
+    tasks = [
+        pool.submit(Foresight.foresee, one, number, None, in_full)
+        for number, one in enumerate(plan, 1)
+    ]
+    found = [one for task in tasks if (one := task.result()) is not None]
+    if not found:
+        raise InputError(
+            where=f"{system.source}, [next]",
+            found="no experiment with enough samples that count",
+            expected="one that a diagnosis can use",
+            remedy="let recordings last longer, or widen the ranges",
+        )
+    return found
+
+
+def _sensed(
+    pool: Pool[Foresight], plan: Sequence[Experiment], sensors: Sequence[Signal], parted: int
+) -> Iterator[tuple[Signal, Prediction]]:
+    """The best of some experiments with each sensor more that parts more groups by it.
+
+    Models are fitted again in full in the best of those where they part as linearised.
+    """
+
+    def tried(sensor: Signal, some: Sequence[Experiment], in_full: bool) -> list[_Task]:
+        return [
+            pool.submit(Foresight.foresee, one, number, sensor, in_full)
+            for number, one in enumerate(some, 1)
+        ]
+
+    def parting(tasks: Sequence[_Task]) -> list[Prediction]:
+        found = [one for task in tasks if (one := task.result()) is not None]
+        return [one for one in found if len(one.groups) > parted]
+
+    once = [(sensor, tried(sensor, plan, False)) for sensor in sensors]
+    again = [
+        (sensor, tried(sensor, [one.candidate for one in chosen(parting(tasks))[:1]], True))
+        for sensor, tasks in once
+    ]
+    for sensor, tasks in again:
+        if found := parting(tasks):
+            yield sensor, chosen(found)[0]
+
+
+def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Prediction]:
     """The best first: rivals that bend far are known by full fits alone, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
@@ -156,45 +197,17 @@ def _confirmed(asked: Outlook, ranked: Sequence[Prediction], workers: int) -> li
     left = list(ranked)
     while left and len(confirmed) < _CONFIRMED:
         some, left = left[:_TOGETHER], left[_TOGETHER:]
-        alike = claimed_alike(asked, [(one.candidate, one.case) for one in some], workers)
-        doubtful += [one for one, well in zip(some, alike, strict=True) if not well]
-        planned = [(o.candidate, o.case) for o, well in zip(some, alike, strict=True) if well]
-        if not planned:
+        tasks = [pool.submit(Foresight.confirm, one, k) for k, one in enumerate(some, 1)]
+        found = [task.result() for task in tasks]
+        doubtful += [one for one, well in zip(some, found, strict=True) if well is None]
+        sure = [one for one in found if one is not None]
+        if not sure:
             continue
-        confirmed = chosen([*confirmed, *refitted_predictions(asked, planned, workers)])
+        confirmed = chosen([*confirmed, *sure])
         last = confirmed[min(PROPOSED, len(confirmed)) - 1]
         if left and chosen([last, left[0]])[0] is last:
             break
     return [*confirmed, *left, *doubtful]
-
-
-def _cases(
-    asked: Outlook, plan: Sequence[Experiment], workers: int
-) -> list[tuple[Experiment, Case]]:
-    """Recordings of experiments, those that would count."""
-    cases = predicted_cases(asked, plan, asked.rivals.models[0], workers)
-    planned = [pair for pair in zip(plan, cases, strict=True) if counts(pair[1], asked.system)]
-    if not planned:
-        raise InputError(
-            where=f"{asked.system.source}, [next]",
-            found="no experiment with enough samples that count",
-            expected="one that a diagnosis can use",
-            remedy="let recordings last longer, or widen the ranges",
-        )
-    return planned
-
-
-def with_sensor(system: System, sensor: Signal) -> System:
-    """The system with a further signal that is compared."""
-    channel = Channel(
-        sensor.name,
-        sensor.unit,
-        sensor.label,
-        sensor.shown,
-        Expression(sensor.name, f"{system.source}, [next.sensors.{sensor.name}]"),
-    )
-    compared = replace(system.comparison, channels=(*system.comparison.channels, channel))
-    return replace(system, judged=(*system.judged, sensor), comparison=compared)
 
 
 def _proposal(system: System, experiments: Experiments, one: Prediction) -> RankedExperiment:

@@ -94,8 +94,12 @@ def distances_in_set(
             for name, one in fits.items()
             if one is not None
         }
-        away = {name: c - least[true] for name, c in least.items() if name != true}
-        return found, {name: float(np.sign(c) * np.sqrt(abs(c))) for name, c in away.items()}
+        return found, {name: distance(c - least[true]) for name, c in least.items() if name != true}
+
+
+def distance(apart: float) -> float:
+    """Standard deviations of a difference of chi-squared, with its sign."""
+    return float(np.sign(apart) * np.sqrt(abs(apart)))
 
 
 @contextmanager

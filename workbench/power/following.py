@@ -18,7 +18,12 @@ from workbench.errors import InputError, WorkerError
 from workbench.experiments import RankedExperiment, foreseen, next_stop, with_sensor
 from workbench.experiments.candidates import drawn
 from workbench.pool import Pool
-from workbench.power.diagnosing import build_everything, distances_in_set, rivals_of_set
+from workbench.power.diagnosing import (
+    build_everything,
+    distance,
+    distances_in_set,
+    rivals_of_set,
+)
 from workbench.power.planting import Group, Planting
 from workbench.power.run import Setup
 from workbench.power.statistics import share
@@ -121,8 +126,8 @@ def _as_predicted(one: dict[str, Any]) -> bool:
     if shown is None:
         return False
     near = ((1.0 + _NEAR) ** 2 - 1.0) * predicted**2
-    noise = _NOISE * 2.0 * max(predicted, 1.0)
-    return bool(abs(shown * abs(shown) - predicted**2) <= max(near, noise))
+    noise = _NOISE * 2.0 * max(abs(predicted), 1.0)
+    return bool(abs(shown * abs(shown) - predicted * abs(predicted)) <= max(near, noise))
 
 
 def _begun(planting: Planting) -> dict[str, Any]:
@@ -214,7 +219,7 @@ def _made(
         "separations": [
             {
                 "from": name,
-                "predicted": float(np.sqrt(max(0.0, one.prediction.apart[at, j]))),
+                "predicted": distance(float(one.prediction.apart[at, j])),
                 "shown": shown.get(name),
             }
             for j, name in enumerate(names)
