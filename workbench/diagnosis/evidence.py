@@ -7,7 +7,6 @@ recordings and confusability, is linear algebra on them.
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -37,40 +36,6 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-@dataclass(frozen=True)
-class Described:
-    """What an FMU says of itself.
-
-    Attributes
-    ----------
-    nominal, units, bounds : value, unit, (least, greatest) value by variable.
-    motion : about the design point.
-    """
-
-    nominal: Mapping[str, float]
-    units: Mapping[str, str]
-    bounds: Mapping[str, tuple[float, float]]
-    motion: Motion
-
-
-def described(path: Path, system: System, given: Mapping[str, float]) -> Described:
-    """Ask an FMU, some of whose variables have given values."""
-    with FMU(path, None, given) as fmu:
-        variables = fmu.description.variables
-        bounds = {
-            v.name: (
-                -np.inf if v.minimum is None else v.minimum,
-                np.inf if v.maximum is None else v.maximum,
-            )
-            for v in variables
-        }
-        late = late_signals(system)
-        # A small change: a block is short against all that the machine does.
-        bounds |= dict.fromkeys(late, (-system.comparison.block, system.comparison.block))
-        units = {**fmu.units, **dict.fromkeys(late, "s")}
-        return Described(dict(fmu.defaults), units, bounds, motion(fmu, system))
-
-
 class Simulations:
     """A model along all recordings, in worker processes if there are more than one.
 
@@ -81,7 +46,7 @@ class Simulations:
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
     report : takes a line now and then on how many simulations were made.
-    model : what the FMU says of itself, where it was asked before.
+    moving : the model about its design point, where that is known.
 
     Attributes
     ----------
@@ -102,12 +67,24 @@ class Simulations:
         report: Callable[[str], None] = lambda line: None,
         *,
         restarting: bool = True,
-        model: Described | None = None,
+        moving: Motion | None = None,
     ) -> None:
         self._pace = Pace(report, "simulations")
-        model = model or described(path, system, given)
-        self.nominal, self.units, self.bounds = model.nominal, model.units, model.bounds
-        self._motion = model.motion
+        with FMU(path, None, given) as fmu:
+            self.nominal = dict(fmu.defaults)
+            self.units = dict(fmu.units)
+            self.bounds = {
+                v.name: (
+                    -np.inf if v.minimum is None else v.minimum,
+                    np.inf if v.maximum is None else v.maximum,
+                )
+                for v in fmu.description.variables
+            }
+            self._motion = moving or motion(fmu, system)
+        for name in late_signals(system):
+            self.units[name] = "s"
+            # A small change: a block is short against all that the machine does.
+            self.bounds[name] = (-system.comparison.block, system.comparison.block)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         self._sound, self._workers = sound, min(workers, len(cases))
         self.recordings = [self._ready(one, restarting=restarting) for one in cases]

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from workbench.case import Case
-from workbench.diagnosis.evidence import described
 from workbench.diagnosis.extension import variables
+from workbench.diagnosis.motion import motion
 from workbench.diagnosis.rivals import Rival
 from workbench.diagnosis.unknowns import ALL
 from workbench.experiments.candidates import Experiment
@@ -14,7 +14,7 @@ from workbench.experiments.claims import counts, left_claims
 from workbench.experiments.prediction import Outlook, Prediction, predicted
 from workbench.experiments.recorded import recorded
 from workbench.expression import Expression
-from workbench.fmu import CoSimulation
+from workbench.fmu import FMU, CoSimulation
 from workbench.system import Channel, System
 from workbench.system_parts import Signal
 
@@ -24,7 +24,8 @@ class Foresight:
 
     def __init__(self, asked: Outlook, model: CoSimulation) -> None:
         self._asked, self._model = asked, model
-        self._described = described(asked.everything, asked.system, asked.rivals.given)
+        with FMU(asked.everything, None, asked.rivals.given) as fmu:
+            self._motion = motion(fmu, asked.system)
 
     def foresee(
         self, candidate: Experiment, number: int, sensor: Signal | None, in_full: bool
@@ -43,7 +44,7 @@ class Foresight:
         case = self._recorded(asked, candidate, asked.rivals.models[0], number)
         if not counts(case, asked.system):
             return None
-        return predicted(asked, self._described, candidate, case, in_full=in_full)
+        return predicted(asked, self._motion, candidate, case, in_full=in_full)
 
     def confirm(self, one: Prediction, number: int) -> Prediction | None:
         """The same with models fitted again in full; None where not all rivals claim it alike.
@@ -59,7 +60,7 @@ class Foresight:
             other = self._recorded(asked, one.candidate, rival, number)
             if left_claims(other, asked.system) != first:
                 return None
-        return predicted(asked, self._described, one.candidate, one.case, in_full=True)
+        return predicted(asked, self._motion, one.candidate, one.case, in_full=True)
 
     def _recorded(self, asked: Outlook, candidate: Experiment, rival: Rival, number: int) -> Case:
         """A recording of an experiment as a rival predicts it."""
