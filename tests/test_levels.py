@@ -6,6 +6,7 @@ hardly be.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from workbench.diagnosis.evidence import Simulations
+from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.thresholds import Thresholds
 from workbench.errors import InputError
 from workbench.power.diagnosing import build_everything, library_effects
 from workbench.system import System
@@ -104,6 +107,25 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
     moved = steady(0.5 * (1.0 + share)) - steady(0.5)
     # A mean over T of what is correlated over tau has the variance 2 tau/T; of blocks, block/T.
     assert_allclose(variances[1] - variances[0], moved**2 * 2.0 * over / size, rtol=1e-3)
+
+
+def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: Path) -> None:
+    """A casing that is warm already, of which the file says that it is as the room within 1 K."""
+    of = block(tmp_path / "block", "")
+    known = replace(of, spreads={"Tc": 1.0})
+    warm = recorded(G, 1).iloc[360:].reset_index(drop=True)
+    warm["time [s]"] -= warm["time [s]"][0]
+    effects, path = library_effects(of), tmp_path / "all.fmu"
+    build_everything(of, effects, path)
+    steps = {}
+    for name, system in (("free", of), ("known", known)):
+        with Simulations(path, system, system.given, cases(system, [warm]), 1) as simulations:
+            fit = Fit(simulations, effects)
+            begun = fit.linearise(fit.at(fit.unknowns.start()), [])
+            point = fit.stepped(begun, np.ones(1), {})
+            steps[name] = point.deviations[0, list(fit.unknowns.local).index("Tc")]
+    assert steps["free"] * of.spreads["Tc"] > 2.0 * Thresholds.furthest
+    assert steps["known"] == pytest.approx(Thresholds.furthest)
 
 
 @pytest.mark.parametrize(

@@ -399,6 +399,14 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     assert shown == pytest.approx(deviations[0], rel=0.2)
 
 
+def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided: Outcome) -> None:
+    assert undecided.rivals is not None
+    for model in undecided.rivals.models:
+        still = np.zeros(len(model.sizes) + len(model.levels))
+        for one in model.recordings:
+            assert_allclose(one.moved(still).deviations, one.deviations, atol=1e-6)
+
+
 def test_rivals_are_read_as_they_were_written(undecided: Outcome) -> None:
     assert undecided.rivals is not None
     said = json.loads(json.dumps(undecided.rivals.to_dict()))
