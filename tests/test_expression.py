@@ -1,5 +1,6 @@
 """Formulas of a system file: arithmetic and nothing else."""
 
+import pickle
 import re
 
 import numpy as np
@@ -51,3 +52,11 @@ def test_slopes_are_those_of_a_sum() -> None:
 def test_a_formula_that_is_no_sum_has_no_slopes(text: str) -> None:
     with pytest.raises(InputError, match="expected a sum of a, b, each times a constant"):
         Expression(text, "file").slopes(("a", "b"), {})
+
+
+def test_a_formula_that_was_used_goes_to_another_process() -> None:
+    used = Expression("max(a, b)/2", "a file")
+    assert used({"a": 1.0, "b": 3.0}) == 1.5
+    again = pickle.loads(pickle.dumps(used))
+    assert (again, again.where) == (used, "a file")
+    assert again({"a": 1.0, "b": 3.0}) == 1.5

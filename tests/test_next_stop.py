@@ -37,6 +37,7 @@ from workbench.experiments.candidates import (
 )
 from workbench.experiments.separation import precision, refitted, told_apart
 from workbench.expression import Expression
+from workbench.power.diagnosing import distance
 from workbench.system import System
 from workbench.system_experiments import (
     RELEASE,
@@ -128,6 +129,10 @@ def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
     one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, np.full(2, np.inf), 1)
     joint = Joint((), (), (), (one,), Quadratic(np.zeros((0, 0)), np.zeros(0), 5.0, 0))
     assert_allclose(joint.chi_squared, joint.total().c, rtol=1e-9)
+
+
+def test_what_is_nearer_than_the_true_cause_has_a_negative_distance() -> None:
+    assert [distance(apart) for apart in (9.0, 0.0, -4.0)] == [3.0, 0.0, -2.0]
 
 
 def test_the_chance_is_the_share_of_simulated_decisions() -> None:
