@@ -13,9 +13,10 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from workbench.errors import FMUError
-from workbench.fmu import FMU, Matrix, References, Vector
+from workbench.fmu import FMU, CoSimulation, Matrix, References, Vector
 from workbench.linking import law
 
 compiled = law()
@@ -26,7 +27,7 @@ OK, REFUSED, SINGULAR = 0, 1, 2
 
 @intrinsic
 def _call(typing, address, words):  # type: ignore[no-untyped-def]
-    """Call a C function of whole numbers, which returns an int; an array is passed by address."""
+    """Call a C function of whole numbers and doubles, which returns an int; arrays by address."""
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
         given = []
@@ -34,6 +35,8 @@ def _call(typing, address, words):  # type: ignore[no-untyped-def]
             if isinstance(kind, types.Array):
                 data = context.make_array(kind)(context, builder, value).data
                 given.append(builder.ptrtoint(data, context.get_value_type(types.intp)))
+            elif isinstance(kind, types.Float):
+                given.append(value)
             else:
                 given.append(context.cast(builder, value, kind, types.intp))
         function = ir.FunctionType(ir.IntType(32), [word.type for word in given])
@@ -112,6 +115,50 @@ def instance(
     )
 
 
+class Stepping(NamedTuple):
+    """One instance of a Co-Simulation FMU, as `Instance`.
+
+    Attributes
+    ----------
+    address, set_real, get_real, inputs, outputs, u, y : see `Instance`.
+    do_step : address of the FMU's function.
+    fmi : version, 2 or 3.
+    time : (1,) where the next step begins [s].
+    told, reached : (3,) and (1,) what FMI 3.0 says of a step.
+    """
+
+    address: int
+    set_real: int
+    get_real: int
+    do_step: int
+    fmi: int
+    inputs: References
+    outputs: References
+    u: Vector
+    y: Vector
+    time: Vector
+    told: NDArray[np.bool_]
+    reached: Vector
+
+
+def stepping(fmu: CoSimulation, inputs: Sequence[str], outputs: Sequence[str]) -> Stepping:
+    """Prepare an FMU that was started for compiled loops; it must outlive the result."""
+    return Stepping(
+        address=fmu.instance_address,
+        set_real=fmu.function_address("set"),
+        get_real=fmu.function_address("get"),
+        do_step=fmu.function_address("do_step"),
+        fmi=int(fmu.version[0]),
+        inputs=fmu.variables(inputs).references,
+        outputs=fmu.variables(outputs).references,
+        u=np.zeros(len(inputs)),
+        y=np.zeros(len(outputs)),
+        time=np.zeros(1),
+        told=np.zeros(3, np.bool_),
+        reached=np.zeros(1),
+    )
+
+
 @inlined
 def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
     """Set `count` inputs from number `first` on to model.u; returns a status."""
@@ -146,6 +193,19 @@ def read(model):  # type: ignore[no-untyped-def]
     """Outputs into model.y; returns a status."""
     n = model.y.size
     status = _call(model.get_real, (model.address, model.outputs, n, model.y, n))
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def do_step(model, h):  # type: ignore[no-untyped-def]
+    """Advance a Co-Simulation FMU by h [s] with inputs held; returns a status."""
+    t = model.time[0]
+    if model.fmi == 2:
+        status = _call(model.do_step, (model.address, t, h, 0))
+    else:
+        told, words = model.told, (model.address, t, h, 0)
+        status = _call(model.do_step, (*words, told, told[1:], told[2:], model.reached))
+    model.time[0] = t + h
     return REFUSED if status > 1 else OK
 
 

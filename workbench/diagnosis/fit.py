@@ -336,26 +336,26 @@ class Fit:
     ) -> tuple[float, Linearised]:
         """Least chi-squared, tolerances included, and its point: channels weighed as is said.
 
-        Gauss-Newton; a step that makes it worse is halved.
+        Gauss-Newton; a step that makes it worse is halved. Derivatives may be missing there.
 
         Parameters
         ----------
         best : where to begin.
         inflation : (m,) variance of what is wrong in each channel over that of white noise.
         """
-        best = self.linearise(replace(best, inflation=inflation), active)
+        best, fall = self.linearise(replace(best, inflation=inflation), active), np.inf
         least = self.quadratics(best).chi_squared
-        point = self.stepped(best, inflation, {})
         for _ in range(_ROUNDS):
+            best = self.linearise(best, active)
+            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
             fall = -np.inf
             if (tried := self.tried(point)) is not None:
-                tried = self.linearise(replace(tried, inflation=inflation), active)
-                fall = least - self.quadratics(tried).chi_squared
+                tried = replace(tried, inflation=inflation)
+                fall = least - self.quadratics(tried.derived_as(best)).chi_squared
                 if fall > 0.0:
                     best, least = tried, least - fall
             if abs(fall) < _WORTH:
                 break
-            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
         return least, best
 
     def stepped(self, lin: Linearised, spread: Vector, held: Mapping[Key, float]) -> Point:

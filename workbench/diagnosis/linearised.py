@@ -62,6 +62,14 @@ class Linearised:
         )
         return replace(self, keys=(*self.keys, *keys), evidence=evidence)
 
+    def derived_as(self, other: "Linearised") -> "Linearised":
+        """The same with derivatives at another point, where errors alone are asked for."""
+        evidence = tuple(
+            replace(one, jacobian=there.jacobian)
+            for one, there in zip(self.evidence, other.evidence, strict=True)
+        )
+        return replace(self, keys=other.keys, evidence=evidence)
+
     @property
     def misfit(self) -> float:
         """Chi-squared of all stops at the point, in units of the noise."""

@@ -11,6 +11,16 @@ from workbench.conditions import Value
 from workbench.errors import InputError
 from workbench.experiments.candidates import Experiment
 from workbench.fmu import CoSimulation, Matrix, Vector
+from workbench.kernel import (
+    OK,
+    REFUSED,
+    checked,
+    compiled,
+    do_step,
+    read,
+    set_inputs,
+    stepping,
+)
 from workbench.system import Condition, System
 from workbench.system_conditions import LARGEST
 from workbench.system_experiments import Experiments
@@ -85,41 +95,49 @@ def _driven(
         start_of(system, experiments, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
-    names = [one.name for one in system.inputs]
-    inputs = model.variables(names)
-    read = model.variables(
-        [system.signals[key].reading for key in (*(one.name for one in system.outputs), *judged)]
-    )
+    names, recorded = [one.name for one in system.inputs], [one.name for one in system.outputs]
+    readings = [system.signals[key].reading for key in (*recorded, *judged)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []
     variables = {v.name for v in model.description.variables}
     felt = model.variables(sorted({key for one in formulas for key in one.names} & variables))
-    u, y = np.zeros((time.size, len(names))), np.zeros((time.size, read.references.size))
+    u, y = np.zeros((time.size, len(names))), np.zeros((time.size, len(readings)))
     for one in candidate.profiles:
         u[:, names.index(one.input.name)] = one.signal(time)
-    driven = [(names.index(key), formula) for key, formula in experiments.driven.items()]
-    held = [j for j, one in enumerate(system.inputs) if one.held]
+    held = np.array([one.held for one in system.inputs], np.bool_)
     h = float(time[1] - time[0])
     every = max(1, round(system.comparison.block / h))
-    for k in range(time.size):
-        if k > 0:
-            for j, _ in driven:
-                u[k, j] = u[k - 1, j]
-            inputs.values[:] = 0.5 * (u[k - 1] + u[k])
-            inputs.values[held] = u[k - 1, held]
-            model.set(inputs, inputs.values)
-            model.step(h)
-        model.set(inputs, u[k])
-        if k % every == 0:
-            feels = {**known, **dict(zip(felt.names, model.get(felt).tolist(), strict=True))}
-            for j, formula in driven:
-                u[k, j] = formula(feels)
-            model.set(inputs, u[k])
-            ends = experiments.ends
-            if ends is not None and abs(float(ends.formula(feels))) < ends.below:
-                return u[:k], y[:k]
-        y[k] = model.get(read)
+    model.set(model.variables(names), u[0])
+    running = stepping(model, names, readings)
+    for k in range(0, time.size, every):
+        block = slice(k, k + every + 1)
+        feels = {**known, **dict(zip(felt.names, model.get(felt).tolist(), strict=True))}
+        for key, formula in experiments.driven.items():
+            u[block, names.index(key)] = formula(feels)
+        ends = experiments.ends
+        if ends is not None and abs(float(ends.formula(feels))) < ends.below:
+            return u[:k], y[:k]
+        checked(_followed(running, h, held, u[block], y[block]), model)
     return u, y
+
+
+@compiled
+def _followed(model, h, held, u, y):  # type: ignore[no-untyped-def]
+    """Readings (n, c) while inputs go from sample to sample, (n, m), h [s] apart; a status."""
+    m = u.shape[1]
+    for k in range(len(u)):
+        if k > 0:
+            for j in range(m):
+                model.u[j] = u[k - 1, j] if held[j] else 0.5 * (u[k - 1, j] + u[k, j])
+            if set_inputs(model, 0, m) or do_step(model, h):
+                return REFUSED
+        for j in range(m):
+            model.u[j] = u[k, j]
+        if set_inputs(model, 0, m) or read(model):
+            return REFUSED
+        for i in range(y.shape[1]):
+            y[k, i] = model.y[i]
+    return OK
 
 
 def _conditions(

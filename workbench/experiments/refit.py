@@ -48,6 +48,6 @@ class Refit(Fit):
         errors : whitened, of the experiment by block and channel, (b, c).
         """
         value, lin = self.least(self._begun, active, self._begun.inflation)
-        one = self.quadratics(lin).systems[0]
+        one = self.quadratics(lin.derived_as(self._begun)).systems[0]
         begun = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
         return value - begun, one.r[:-1].reshape(-1, one.channels)
