@@ -496,30 +496,28 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
 def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
-    simulator = Simulator(Simulated(MINIMAL, SYSTEM, (samples,)))
-    with FMU(MINIMAL) as fmu:
-        nominal = {name: fmu.defaults[name] for name in steps} | point
-    found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
-    found = np.column_stack([simulator.at(0, nominal).jacobian, found])
-    for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
-        sides = [simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
-        central = (sides[0].residual - sides[1].residual) / step
-        # Derivatives of the motion, stepped, against those of its steps: they differ by less than
-        # a thousandth. The wheel load does a thousandth of what friction does: there, a hundredth.
-        share = {"Fz": 0.02}.get(name, 1e-3)
-        np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
-    simulator.close()
+    with simulating(Simulated(MINIMAL, SYSTEM, (samples,))) as simulator:
+        with FMU(MINIMAL) as fmu:
+            nominal = {name: fmu.defaults[name] for name in steps} | point
+        found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
+        found = np.column_stack([simulator.at(0, nominal).jacobian, found])
+        for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
+            sides = [simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
+            central = (sides[0].residual - sides[1].residual) / step
+            # Derivatives of the motion, stepped, against those of its steps: they differ by less than
+            # a thousandth. The wheel load does a thousandth of what friction does: there, a hundredth.
+            share = {"Fz": 0.02}.get(name, 1e-3)
+            np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
 
 
 def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
-    simulator = Simulator(Simulated(MINIMAL, SYSTEM, (samples,)))
-    # An inertia less than none: the wheel runs away from what presses it on, yet stays a number.
-    runaway = {**point, "JW": -55.0}
-    assert np.isfinite(simulator.at(0, runaway).errors).all()
-    with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):
-        simulator.derivatives(0, runaway, [Variation(("JW",))])
-    simulator.close()
+    with simulating(Simulated(MINIMAL, SYSTEM, (samples,))) as simulator:
+        # An inertia less than none: the wheel runs away from what presses it on, yet stays a number.
+        runaway = {**point, "JW": -55.0}
+        assert np.isfinite(simulator.at(0, runaway).errors).all()
+        with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):
+            simulator.derivatives(0, runaway, [Variation(("JW",))])
 
 
 def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None:
@@ -546,14 +544,13 @@ def test_states_of_effects_that_are_absent_change_no_derivative(everything: Path
     present = {variables(fade, "fade")[0]: 4e-4, "muWR": 0.4}
     columns = [Variation((name,)) for name in ("muDC", "Fz", "JW")]
     samples = ready(simulated(everything, present))
-    simulator = Simulator(Simulated(everything, SYSTEM, (samples,)))
-    values = {delay("Fx"): 0.002, **present}
-    every = simulator.derivatives(0, values, columns)
-    less = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
-    # What the others add to the motion is zero, but for rounding; the fade is there.
-    apart = np.abs(less - every).max(axis=0)
-    assert (apart < 1e-10 * np.abs(every).max(axis=0)).all()
-    simulator.close()
+    with simulating(Simulated(everything, SYSTEM, (samples,))) as simulator:
+        values = {delay("Fx"): 0.002, **present}
+        every = simulator.derivatives(0, values, columns)
+        less = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
+        # What the others add to the motion is zero, but for rounding; the fade is there.
+        apart = np.abs(less - every).max(axis=0)
+        assert (apart < 1e-10 * np.abs(every).max(axis=0)).all()
 
 
 RISING = """

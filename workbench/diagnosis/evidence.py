@@ -7,6 +7,7 @@ recordings and confusability, is linear algebra on them.
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -15,7 +16,7 @@ import numpy as np
 
 from workbench.case import Case
 from workbench.diagnosis.clocks import late_signals
-from workbench.diagnosis.motion import Motion, motion
+from workbench.diagnosis.motion import Opened, opened
 from workbench.diagnosis.pace import Pace
 from workbench.diagnosis.prediction import Variation
 from workbench.diagnosis.samples import Samples, compared, prepare
@@ -46,7 +47,7 @@ class Simulations:
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
     report : takes a line now and then on how many simulations were made.
-    moving : the model about its design point, where that is known.
+    model : the FMU with these values, where it is open already; it must outlive the simulations.
 
     Attributes
     ----------
@@ -67,41 +68,30 @@ class Simulations:
         report: Callable[[str], None] = lambda line: None,
         *,
         restarting: bool = True,
-        moving: Motion | None = None,
+        model: Opened | None = None,
     ) -> None:
         self._pace = Pace(report, "simulations")
-        with FMU(path, None, given) as fmu:
-            self.nominal = dict(fmu.defaults)
-            self.units = dict(fmu.units)
-            self.bounds = {
-                v.name: (
-                    -np.inf if v.minimum is None else v.minimum,
-                    np.inf if v.maximum is None else v.maximum,
-                )
-                for v in fmu.description.variables
-            }
-            self._motion = moving or motion(fmu, system)
-        for name in late_signals(system):
-            self.units[name] = "s"
-            # A small change: a block is short against all that the machine does.
-            self.bounds[name] = (-system.comparison.block, system.comparison.block)
         self.system, self.given, self.cases = system, dict(given), list(cases)
         self._sound, self._workers = sound, min(workers, len(cases))
-        self.recordings = [self._ready(one, restarting=restarting) for one in cases]
-        coarse = Simulated(path, system, tuple(self.recordings))
-        self.simulated = coarse._replace(parts=settled_parts(coarse, self.nominal))
         self._alone = self._workers == 1
         self._at = list(range(len(cases)))  # of each recording, among all forms
         self._without = list(self._at)
         self._refused: dict[int, InputError] = {}
-        self._forms = self._weighed([*self.recordings, *self._lesser()])
-        self._pool = Pool(
-            self._workers, simulating, self.simulated._replace(recordings=tuple(self._forms))
-        )
+        self._interrupted = threading.Event()
+        with ExitStack() as stack:
+            self._model = model or stack.enter_context(opened(path, system, given))
+            self._tell(self._model.fmu)
+            self.recordings = [self._ready(one, restarting=restarting) for one in cases]
+            coarse = Simulated(path, system, tuple(self.recordings))
+            parts = settled_parts(self._simulator(coarse), self.nominal)
+            self.simulated = coarse._replace(parts=parts)
+            self._forms = self._weighed([*self.recordings, *self._lesser()])
+            every = self.simulated._replace(recordings=tuple(self._forms))
+            self._pool = stack.enter_context(self._workers_with(every))
+            self._open = stack.pop_all()
         self._choose()
         # Long ones first: the last one to finish leaves the other processors idle.
         self._order = sorted(range(len(cases)), key=lambda k: -self.recordings[k].time.size)
-        self._interrupted = threading.Event()
 
     def __enter__(self) -> Self:
         return self
@@ -112,12 +102,38 @@ class Simulations:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._pool.close()
+        self._open.close()
+
+    def _tell(self, fmu: FMU) -> None:
+        """What the model says of its variables."""
+        self.nominal = dict(fmu.defaults)
+        self.units = dict(fmu.units)
+        self.bounds = {
+            v.name: (
+                -np.inf if v.minimum is None else v.minimum,
+                np.inf if v.maximum is None else v.maximum,
+            )
+            for v in fmu.description.variables
+        }
+        for name in late_signals(self.system):
+            self.units[name] = "s"
+            # A small change: a block is short against all that the machine does.
+            self.bounds[name] = (-self.system.comparison.block, self.system.comparison.block)
+
+    def _simulator(self, given: Simulated) -> Simulator:
+        """One in this process, with the FMU that is open."""
+        return Simulator(given, self._model.fmu)
+
+    def _workers_with(self, given: Simulated) -> Pool[Simulator]:
+        """Simulators in processes, or the one of this process."""
+        if self._alone:
+            return Pool(1, lambda given: nullcontext(self._simulator(given)), given)
+        return Pool(self._workers, simulating, given)
 
     def _ready(self, case: Case, *, restarting: bool) -> Samples:
         """A recording made ready."""
         signals = compared(self.system, self.cases)
-        given = (case, self.system, signals, self.nominal, self._motion, self._sound)
+        given = (case, self.system, signals, self.nominal, self._model.motion, self._sound)
         return prepare(*given, restarting=restarting)
 
     def _lesser(self) -> list[Samples]:
@@ -134,12 +150,12 @@ class Simulations:
     def _weighed(self, forms: Sequence[Samples]) -> list[Samples]:
         """Forms of recordings, with what is uncertain in them weighed."""
         owners = [*self._at, *(k for k, at in enumerate(self._without) if at != k)]
-        with simulating(self.simulated._replace(recordings=tuple(forms))) as own:
-            weighed = []
-            for at, k in enumerate(owners):
-                said = self.system.set_by(self.cases[k].conditions)
-                weighed.append(own.weighed(at, {**self.given, **said}))
-            self._begins = [own.begin(at) for at in range(len(forms))]
+        own = self._simulator(self.simulated._replace(recordings=tuple(forms)))
+        weighed = []
+        for at, k in enumerate(owners):
+            said = self.system.set_by(self.cases[k].conditions)
+            weighed.append(own.weighed(at, {**self.given, **said}))
+        self._begins = [own.begin(at) for at in range(len(forms))]
         return weighed
 
     def _choose(self) -> None:

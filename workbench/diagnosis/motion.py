@@ -6,8 +6,10 @@ white where the model is right and last where it is not.
 Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +44,26 @@ class Motion:
     D: Matrix
     nominal: Vector
     ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """An FMU that is open in this process, for one set of recordings after the other.
+
+    Attributes
+    ----------
+    motion : of the model at its design point.
+    """
+
+    fmu: FMU
+    motion: Motion
+
+
+@contextmanager
+def opened(path: Path, system: System, given: Mapping[str, float]) -> Iterator[Opened]:
+    """Open an FMU, with values that it has instead of its defaults."""
+    with FMU(path, None, given) as fmu:
+        yield Opened(fmu, motion(fmu, system))
 
 
 @dataclass(frozen=True, eq=False)

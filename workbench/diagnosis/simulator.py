@@ -65,19 +65,19 @@ class Simulated(NamedTuple):
 
 
 class Simulator:
-    """An FMU along recordings, in one process."""
+    """An FMU along recordings, in one process; the FMU must outlive it."""
 
-    def __init__(self, given: Simulated) -> None:
-        self._fmu = FMU(given.path)
+    def __init__(self, given: Simulated, fmu: FMU) -> None:
+        self._fmu = fmu
         self._recordings = given.recordings
         self._system, self._parts = given.system, given.parts
         signals = given.recordings[0].signals
-        self._predictor = Predictor(self._fmu, given.system, signals, given.parts)
+        self._predictor = Predictor(fmu, given.system, signals, given.parts)
         self._delays = {
             j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
         }
         rest = given.system.comparison.rest
-        self._rest = self._fmu.variables([rest.output]) if rest else None
+        self._rest = fmu.variables([rest.output]) if rest else None
         self._clocks = late_signals(given.system)
 
     def stepped(self, parts: int) -> "Simulator":
@@ -93,11 +93,10 @@ class Simulator:
         """Names of the FMU's variables that have a default."""
         return set(self._fmu.defaults)
 
-    def errors(self, number: int, values: Mapping[str, float]) -> Matrix:
-        """Prediction errors of the samples of one recording that count, (m, c)."""
-        one = self._recordings[number]
-        found: Matrix = self._simulated(number, values)[0][one.told]
-        return found
+    def errors(self, values: Mapping[str, float]) -> list[Matrix]:
+        """Prediction errors of the samples that count, of each recording, (m, c)."""
+        recordings = enumerate(self._recordings)
+        return [self._simulated(k, values)[0][one.told] for k, one in recordings]
 
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""
@@ -108,10 +107,6 @@ class Simulator:
     def begin(self, number: int) -> dict[str, float]:
         """Start values of states that a recording's outputs show."""
         return self._predictor.begin(self._recordings[number])
-
-    def close(self) -> None:
-        """Free the FMU."""
-        self._fmu.close()
 
     def at(self, number: int, values: Mapping[str, float]) -> Evidence:
         """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
@@ -308,15 +303,12 @@ def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[lis
 
 @contextmanager
 def simulating(given: Simulated) -> Iterator[Simulator]:
-    """Open a simulator."""
-    simulator = Simulator(given)
-    try:
-        yield simulator
-    finally:
-        simulator.close()
+    """Open an FMU and simulate with it."""
+    with FMU(given.path) as fmu:
+        yield Simulator(given, fmu)
 
 
-def settled_parts(given: Simulated, values: Mapping[str, float]) -> int:
+def settled_parts(simulator: Simulator, values: Mapping[str, float]) -> int:
     """Steps of a sample time from which on finer ones hardly move prediction errors.
 
     A step that is long for what oscillates damps it and turns its phase, and a wrong law would be
@@ -328,16 +320,14 @@ def settled_parts(given: Simulated, values: Mapping[str, float]) -> int:
     """
 
     def errors(parts: int) -> list[Matrix]:
-        stepped = simulator.stepped(parts)
-        return [stepped.errors(k, values) for k in range(len(given.recordings))]
+        return simulator.stepped(parts).errors(values)
 
-    with simulating(given) as simulator:
-        parts, coarse = 1, errors(1)
-        while parts < _FINEST:
-            fine = errors(2 * parts)
-            moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
-            wrong = [np.square(a).sum(axis=0) for a in fine]
-            if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
-                break
-            parts, coarse = 2 * parts, fine
+    parts, coarse = 1, errors(1)
+    while parts < _FINEST:
+        fine = errors(2 * parts)
+        moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
+        wrong = [np.square(a).sum(axis=0) for a in fine]
+        if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
+            break
+        parts, coarse = 2 * parts, fine
     return parts

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from workbench.case import Case
 from workbench.diagnosis.extension import variables
-from workbench.diagnosis.motion import motion
+from workbench.diagnosis.motion import Opened, opened
 from workbench.diagnosis.rivals import Rival
 from workbench.diagnosis.unknowns import ALL
 from workbench.experiments.candidates import Experiment
@@ -14,7 +14,7 @@ from workbench.experiments.claims import counts, left_claims
 from workbench.experiments.prediction import Outlook, Prediction, predicted
 from workbench.experiments.recorded import recorded
 from workbench.expression import Expression
-from workbench.fmu import FMU, CoSimulation
+from workbench.fmu import CoSimulation
 from workbench.system import Channel, System
 from workbench.system_parts import Signal
 
@@ -22,10 +22,8 @@ from workbench.system_parts import Signal
 class Foresight:
     """The model with all effects, at hand for one experiment after the other."""
 
-    def __init__(self, asked: Outlook, model: CoSimulation) -> None:
-        self._asked, self._model = asked, model
-        with FMU(asked.everything, None, asked.rivals.given) as fmu:
-            self._motion = motion(fmu, asked.system)
+    def __init__(self, asked: Outlook, model: CoSimulation, derived: Opened) -> None:
+        self._asked, self._model, self._derived = asked, model, derived
 
     def foresee(
         self, candidate: Experiment, number: int, sensor: Signal | None, in_full: bool
@@ -44,7 +42,7 @@ class Foresight:
         case = self._recorded(asked, candidate, asked.rivals.models[0], number)
         if not counts(case, asked.system):
             return None
-        return predicted(asked, self._motion, candidate, case, in_full=in_full)
+        return predicted(asked, self._derived, candidate, case, in_full=in_full)
 
     def confirm(self, one: Prediction, number: int) -> Prediction | None:
         """The same with models fitted again in full; None where not all rivals claim it alike.
@@ -60,7 +58,7 @@ class Foresight:
             other = self._recorded(asked, one.candidate, rival, number)
             if left_claims(other, asked.system) != first:
                 return None
-        return predicted(asked, self._motion, one.candidate, one.case, in_full=True)
+        return predicted(asked, self._derived, one.candidate, one.case, in_full=True)
 
     def _recorded(self, asked: Outlook, candidate: Experiment, rival: Rival, number: int) -> Case:
         """A recording of an experiment as a rival predicts it."""
@@ -76,8 +74,9 @@ class Foresight:
 @contextmanager
 def foresight(asked: Outlook) -> Iterator[Foresight]:
     """What a worker is prepared with."""
-    with CoSimulation(asked.everything) as model:
-        yield Foresight(asked, model)
+    path, system, given = asked.everything, asked.system, asked.rivals.given
+    with CoSimulation(path) as model, opened(path, system, given) as derived:
+        yield Foresight(asked, model, derived)
 
 
 def _values(asked: Outlook, candidate: Experiment, rival: Rival) -> dict[str, float]:

@@ -14,7 +14,7 @@ from workbench.diagnosis.catalogue import Effect
 from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point
-from workbench.diagnosis.motion import Motion
+from workbench.diagnosis.motion import Opened
 from workbench.diagnosis.quadratic import (
     Joint,
     Quadratic,
@@ -113,18 +113,18 @@ class Outlook:
 
 
 def predicted(
-    asked: Outlook, moving: Motion, candidate: Experiment, case: Case, *, in_full: bool
+    asked: Outlook, model: Opened, candidate: Experiment, case: Case, *, in_full: bool
 ) -> Prediction:
     """What an experiment would tell.
 
     Parameters
     ----------
-    moving : the model about its design point.
+    model : with all effects.
     case : a recording of it as the first rival predicts it.
     in_full : whether rivals are fitted again, or taken as they are linearised where they are.
     """
     given = (asked.everything, asked.system, asked.rivals.given, [case], 1)
-    with Simulations(*given, moving=moving) as simulations:
+    with Simulations(*given, model=model) as simulations:
         fit = Fit(simulations, list(asked.effects.values()), beside=[case])
         begun = _begun(fit, start_of(asked.system, asked.experiments, candidate))
         rows = [_linearised(fit, asked, one, begun) for one in asked.rivals.models]
