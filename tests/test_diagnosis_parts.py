@@ -33,7 +33,7 @@ from workbench.diagnosis.samples import Samples, compared
 from workbench.diagnosis.samples import prepare as prepare_samples
 from workbench.diagnosis.search import extended, joined
 from workbench.diagnosis.selection import anew
-from workbench.diagnosis.simulator import Evidence, Simulated, Simulator, Variation, delay
+from workbench.diagnosis.simulator import Evidence, Simulated, Variation, delay, simulating
 from workbench.diagnosis.thresholds import SOUND
 from workbench.diagnosis.trial import Prospect
 from workbench.errors import FMUError, InputError
@@ -502,10 +502,13 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
         found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
         found = np.column_stack([simulator.at(0, nominal).jacobian, found])
         for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
-            sides = [simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)]
+            sides = [
+                simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)
+            ]
             central = (sides[0].residual - sides[1].residual) / step
-            # Derivatives of the motion, stepped, against those of its steps: they differ by less than
-            # a thousandth. The wheel load does a thousandth of what friction does: there, a hundredth.
+            # Derivatives of the motion, stepped, against those of its steps: they differ by less
+            # than a thousandth. The wheel load does a thousandth of what friction does: there, a
+            # hundredth.
             share = {"Fz": 0.02}.get(name, 1e-3)
             np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
 
@@ -513,7 +516,8 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
 def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     with simulating(Simulated(MINIMAL, SYSTEM, (samples,))) as simulator:
-        # An inertia less than none: the wheel runs away from what presses it on, yet stays a number.
+        # An inertia less than none: the wheel runs away from what presses it on, yet stays a
+        # number.
         runaway = {**point, "JW": -55.0}
         assert np.isfinite(simulator.at(0, runaway).errors).all()
         with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):

@@ -88,9 +88,8 @@ class Fit:
     @property
     def own_clocks(self) -> tuple[Effect, ...]:
         """A clock of each recorded signal but the reference, whatever the loggers."""
-        one = self._simulations.recordings[0]
-        every = own_clocks(self._simulations.system)
-        return tuple(clock for clock in every if {*clock.late} <= {*one.inputs, *one.signals})
+        one, system = self._simulations.recordings[0], self._simulations.system
+        return tuple(c for c in own_clocks(system) if {*c.late} <= {*one.inputs, *one.signals})
 
     def beside(self, effects: Sequence[Effect]) -> "Fit":
         """The same with more effects that may be asked for."""
@@ -332,29 +331,30 @@ class Fit:
         return best
 
     def least(
-        self, best: Linearised, active: Sequence[Effect], inflation: Vector
+        self, best: Linearised, active: Sequence[Effect], inflation: Vector, right: float = np.inf
     ) -> tuple[float, Linearised]:
-        """Least chi-squared, tolerances included, and its point: channels weighed as is said.
+        """Least chi-squared, tolerances included, and its point, where derivatives may be missing.
 
-        Gauss-Newton; a step that makes it worse is halved. Derivatives may be missing there.
+        Gauss-Newton; a worse step is halved. Two small falls end it: in a bent valley one may be.
 
         Parameters
         ----------
         best : where to begin.
         inflation : (m,) variance of what is wrong in each channel over that of white noise.
+        right : what a right model leaves, if known; noise moves what is beyond by twice its root.
         """
         best, fall = self.linearise(replace(best, inflation=inflation), active), np.inf
-        least = self.quadratics(best).chi_squared
+        least, point = self.quadratics(best).chi_squared, best.point
         for _ in range(_ROUNDS):
             best = self.linearise(best, active)
             point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
-            fall = -np.inf
+            before, fall = abs(fall), -np.inf
             if (tried := self.tried(point)) is not None:
                 tried = replace(tried, inflation=inflation)
                 fall = least - self.quadratics(tried.derived_as(best)).chi_squared
                 if fall > 0.0:
                     best, least = tried, least - fall
-            if abs(fall) < _WORTH:
+            if abs(fall) < _WORTH or max(before, abs(fall)) ** 2 < least - right:
                 break
         return least, best
 
@@ -374,8 +374,8 @@ class Fit:
             kind = levels if key in levels else sizes
             kind[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
         changes = np.array(locals_[: self.unknowns.count])
-        locked = [name for name, parameter in joint.shared if parameter == "amplitude"]
-        phases = {name: point.phases[name] + changes[:, count + j] for j, name in enumerate(locked)}
+        locked = enumerate(name for name, parameter in joint.shared if parameter == "amplitude")
+        phases = {name: point.phases[name] + changes[:, count + j] for j, name in locked}
         return Point(sizes, levels, point.deviations + changes[:, :count], phases)
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:

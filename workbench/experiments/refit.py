@@ -47,7 +47,7 @@ class Refit(Fit):
         left : chi-squared.
         errors : whitened, of the experiment by block and channel, (b, c).
         """
-        value, lin = self.least(self._begun, active, self._begun.inflation)
+        right = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
+        value, lin = self.least(self._begun, active, self._begun.inflation, right)
         one = self.quadratics(lin.derived_as(self._begun)).systems[0]
-        begun = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
-        return value - begun, one.r[:-1].reshape(-1, one.channels)
+        return value - right, one.r[:-1].reshape(-1, one.channels)
