@@ -195,10 +195,14 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
     confirmed: list[Prediction] = []
     doubtful: list[Prediction] = []
     left = list(ranked)
-    while left and len(confirmed) < _CONFIRMED:
+    # All at once: no processor waits for the last one of a part.
+    tasks = [
+        pool.submit(Foresight.confirm, one, number)
+        for number, one in enumerate(left[:_CONFIRMED], 1)
+    ]
+    while tasks:
         some, left = left[:_TOGETHER], left[_TOGETHER:]
-        tasks = [pool.submit(Foresight.confirm, one, k) for k, one in enumerate(some, 1)]
-        found = [task.result() for task in tasks]
+        found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
         doubtful += [one for one, well in zip(some, found, strict=True) if well is None]
         sure = [one for one in found if one is not None]
         if not sure:
@@ -207,6 +211,8 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
         last = confirmed[min(PROPOSED, len(confirmed)) - 1]
         if left and chosen([last, left[0]])[0] is last:
             break
+    for task in tasks:
+        task.cancel()
     return [*confirmed, *left, *doubtful]
 
 
