@@ -18,7 +18,7 @@ from workbench.diagnosis.evidence import Simulations
 from workbench.diagnosis.extension import build, sizes_by_component, source, variables
 from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.linearised import Linearised, Point, slowness
-from workbench.diagnosis.motion import motion
+from workbench.diagnosis.motion import Opened, motion, opened
 from workbench.diagnosis.prediction import Predictor
 from workbench.diagnosis.quadratic import (
     Joint,
@@ -522,6 +522,24 @@ def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
         assert np.isfinite(simulator.at(0, runaway).errors).all()
         with pytest.raises(FMUError, match="derivatives of stop grow beyond all bounds"):
             simulator.derivatives(0, runaway, [Variation(("JW",))])
+
+
+def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything: Path) -> None:
+    """One set after the other, whatever the one before left in the model, which stays open."""
+    inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
+    values = given_values(everything, SYSTEM)
+
+    def evidence(case: Case, model: Opened | None) -> Evidence:
+        with Simulations(everything, SYSTEM, values, [case], 1, model=model) as simulations:
+            fit = Fit(simulations, [inertia])
+            (found,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).evidence
+        return found
+
+    with opened(everything, SYSTEM, values) as model:
+        for case in (noisy(6), noisy(7)):
+            alone, shared = evidence(case, None), evidence(case, model)
+            np.testing.assert_array_equal(shared.errors, alone.errors)
+            np.testing.assert_array_equal(shared.jacobian, alone.jacobian)
 
 
 def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None:

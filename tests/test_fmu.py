@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from workbench.errors import FMUError, InputError
-from workbench.fmu import FMU
+from workbench.fmu import FMU, CoSimulation
+from workbench.kernel import OK, checked, do_step, read, set_inputs, stepping
 
 INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
 
@@ -162,6 +163,29 @@ def test_co_simulation_equals_model_exchange(
     # Tolerance 1e-8 of about 80 rad/s per step, accumulated over 400 steps; FMPy holds the input
     # of the beginning of each interval, as the reference does.
     assert_allclose(simulated, states, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+def test_compiled_loops_step_as_the_fmu_itself_does(root: Path, version: str) -> None:
+    path, read_ = root / "fmus" / version / "MinimalObserver.fmu", ["omegaW", "omegaR", "Fx"]
+    with CoSimulation(path) as called, CoSimulation(path) as compiled:
+        inputs, outputs = called.variables(["pB", "tauR"]), called.variables(read_)
+        for one in (called, compiled):
+            one.start({"omegaW": 60.0, "omegaR": 39.5})
+        running = stepping(compiled, inputs.names, read_)
+        for k in range(100):
+            values = np.array([1e5 * np.sin(0.1 * k) ** 2, 50.0 * k])
+            called.set(inputs, values)
+            called.step(0.005)
+            running.u[:] = values
+            assert set_inputs(running, 0, 2) == OK
+            assert do_step(running, 0.005) == OK
+            assert read(running) == OK
+            assert_array_equal(running.y, called.get(outputs))
+        # What the FMU refuses is a status there, and an error here.
+        running.u[0] = np.nan
+        with pytest.raises(FMUError, match="nan"):
+            checked(set_inputs(running, 0, 2), compiled)
 
 
 def test_implicit_step_converges_with_order_one(
