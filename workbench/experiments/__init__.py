@@ -195,14 +195,13 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
     confirmed: list[Prediction] = []
     doubtful: list[Prediction] = []
     left = list(ranked)
-    # All at once: no processor waits for the last one of a part.
-    tasks = [
-        pool.submit(Foresight.confirm, one, number)
-        for number, one in enumerate(left[:_CONFIRMED], 1)
-    ]
-    while tasks:
-        some, left = left[:_TOGETHER], left[_TOGETHER:]
+    tasks: list[_Task] = []
+    while left and len(confirmed) < _CONFIRMED:
+        if not tasks:  # all at once: no processor waits for the last one of a part
+            some = left[: _CONFIRMED - len(confirmed)]
+            tasks = [pool.submit(Foresight.confirm, one, k) for k, one in enumerate(some, 1)]
         found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
+        some, left = left[: len(found)], left[len(found) :]
         doubtful += [one for one, well in zip(some, found, strict=True) if well is None]
         sure = [one for one in found if one is not None]
         if not sure:

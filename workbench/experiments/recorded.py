@@ -95,8 +95,8 @@ def _driven(
         start_of(system, experiments, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
-    names, recorded = [one.name for one in system.inputs], [one.name for one in system.outputs]
-    readings = [system.signals[key].reading for key in (*recorded, *judged)]
+    names, outputs = [one.name for one in system.inputs], [one.name for one in system.outputs]
+    readings = [system.signals[key].reading for key in (*outputs, *judged)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []
     variables = {v.name for v in model.description.variables}
