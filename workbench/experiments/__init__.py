@@ -197,12 +197,13 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
     left = list(ranked)
     tasks: list[_Task] = []
     while left and len(confirmed) < _CONFIRMED:
-        if not tasks:  # all at once: no processor waits for the last one of a part
-            some = left[: _CONFIRMED - len(confirmed)]
-            tasks = [pool.submit(Foresight.confirm, one, k) for k, one in enumerate(some, 1)]
+        # A few ahead: no processor waits for the last one of a part.
+        wanted = min(_TOGETHER + pool.workers - 1, _CONFIRMED - len(confirmed))
+        some = enumerate(left[len(tasks) : wanted], len(tasks) + 1)
+        tasks += [pool.submit(Foresight.confirm, one, number) for number, one in some]
         found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
-        some, left = left[: len(found)], left[len(found) :]
-        doubtful += [one for one, well in zip(some, found, strict=True) if well is None]
+        judged, left = left[: len(found)], left[len(found) :]
+        doubtful += [one for one, well in zip(judged, found, strict=True) if well is None]
         sure = [one for one in found if one is not None]
         if not sure:
             continue
