@@ -11,6 +11,7 @@ import pytest
 import workbench as wb
 from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
+from workbench.diagnosis.fit import Fit
 from workbench.diagnosis.rivals import Rivals
 from workbench.experiments import NextStop, RankedExperiment, foreseen, next_stop
 from workbench.experiments.candidates import Experiment, every_setting
@@ -98,6 +99,26 @@ def test_the_separation_is_what_the_stop_then_shows(
     shown = parted(one_speed, [*alike, made(one, one_speed, tmp_path)], *EFFECTS)
     assert shown == pytest.approx(expected, rel=0.2, abs=2.0)
     assert (one.prediction.right > 0.5) == (rank == 0)
+
+
+def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
+    one_speed: System, undecided: Outcome, proposed: NextStop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of some stops: what is left moves by half of what noise moves it by, at most."""
+    rivals = undecided.rivals
+    assert rivals is not None
+    plan = [one.prediction.candidate for one in proposed.tried[1::2]]
+    ended = foreseen(one_speed, rivals, plan, workers=1)
+    least = Fit.least
+    monkeypatch.setattr(Fit, "least", lambda *given: least(*given[:4]))
+    further = foreseen(one_speed, rivals, plan, workers=1)
+    at, then = (
+        {one.text: np.sqrt(np.abs(one.prediction.apart)) for one in some}
+        for some in (ended, further)
+    )
+    assert at.keys() == then.keys()
+    for text, separation in at.items():
+        np.testing.assert_allclose(separation, then[text], rtol=0.0, atol=0.5)
 
 
 @pytest.mark.long
