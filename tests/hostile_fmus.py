@@ -61,7 +61,7 @@ def hostile(path: Path) -> Path:
 def workbench(
     folder: Path, *arguments: str | Path, **environment: str
 ) -> "subprocess.CompletedProcess[str]":
-    """Run the command line with temporary files and cache in a folder, `tmp` and `cache`."""
+    """Run the command line with temporary files in a folder, `tmp`."""
     with running(folder, *arguments, **environment) as process:
         out, errors = process.communicate(timeout=120)
     return subprocess.CompletedProcess(process.args, process.returncode, out, errors)
