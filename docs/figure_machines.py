@@ -6,7 +6,7 @@ from typing import Literal
 from figure import Summary, Table
 from figure_tables import verdict
 
-from workbench.units import si_factor
+from workbench.system.units import si_factor
 
 
 @dataclass(frozen=True)

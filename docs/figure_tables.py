@@ -5,12 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from figure import Summary, Table
 
-from workbench.lab import said
-from workbench.report.views import label
-from workbench.systems import load_system
-from workbench.wheelset.accuracy import ROWS, Worst
-from workbench.wheelset.accuracy_report import cell
-from workbench.wheelset.bands import COVERED
+from workbench.machines.wheelset.accuracy import COVERED, ROWS, Worst
+from workbench.machines.wheelset.accuracy_report import cell
+from workbench.observers import label
+from workbench.system.registry import load_system
+from workbench.system.units import said
 
 TUNED = ("disturbance_observer", "parameter_estimator")
 SYSTEM = load_system("wheelset")

@@ -8,7 +8,7 @@ import numpy as np
 from figure import Figure, Summary, Table
 from figure_tables import labelled, sizes, verdict
 
-from workbench.lab import said
+from workbench.system.units import said
 
 # What an independent simulator planted in four stops each, by the name of the set.
 FAULTS = {

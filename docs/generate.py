@@ -19,15 +19,14 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 import workbench
-from workbench.commands.options import command_line, parsers
+from workbench.cli.parser import command_line, parsers
+from workbench.cli.schemas import case_schema, gains_schema, summaries, system_schema
 from workbench.diagnosis import Effect, read_effects
-from workbench.diagnosis.thresholds import Soundness, Thresholds, thresholds
-from workbench.installed import system_files
-from workbench.modelica import Library, read_library
-from workbench.schemas import case_schema, gains_schema, summaries, system_schema
-from workbench.system import OBSERVER, System
-from workbench.system_comparison import RATE
-from workbench.systems import load_system
+from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, thresholds
+from workbench.models.modelica import Library, read_library
+from workbench.system.comparison import RATE
+from workbench.system.registry import load_system, system_files
+from workbench.system.system import OBSERVER, System
 
 _WIDE = 90  # characters of a line of code on a page
 ROOT = Path(__file__).resolve().parents[1]
@@ -346,7 +345,7 @@ _FORMATS = """
 JSON Schema (2020-12). `case.toml` has a schema for each machine: [case.toml](case-file.md). Objects
 are closed: a file with another key is refused. Every summary begins with `answer`, the result in a
 sentence and in numbers with units, and holds `provenance.run`, what made it; [runs](results.md) are
-compared by them. In Python: `from workbench.schemas import summaries`.
+compared by them. In Python: `from workbench.cli.schemas import summaries`.
 """
 
 

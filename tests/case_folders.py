@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case, read_case
+from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.recording import Vector
-from workbench.system import Sampling, Signal, System
-from workbench.systems import load_system
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system
+from workbench.system.system import Sampling, Signal, System
 
 ROUNDING = 1e-14  # some ten roundings of 1.1e-16: text, unit factor, product
 

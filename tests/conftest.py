@@ -16,14 +16,14 @@ import fmpy
 import lxml.html
 import pytest
 
-from workbench.case import Case, read_case
-from workbench.fmu import FMU
-from workbench.pool import Pool
-from workbench.prepare import write_cases
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
+from workbench.models.fmu import FMU
+from workbench.recordings.case import Case, read_case
+from workbench.recordings.datasets import write_cases
+from workbench.runtime.pool import Pool
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 from workbench.tuning import Evaluator, Job, Problem, pose, tunable
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
 pytest.register_assert_rewrite(

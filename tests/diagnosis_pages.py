@@ -8,8 +8,8 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.diagnosis import Residuals
-from workbench.diagnosis.residuals import Balance
-from workbench.systems import load_system
+from workbench.diagnosis.inference.residuals import Balance
+from workbench.system.registry import load_system
 
 STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
 PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second

@@ -4,11 +4,11 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from workbench.case import Case
 from workbench.diagnosis import choose, read_effects
-from workbench.modelica import read_library
-from workbench.power.diagnosing import build_everything, distances_in_set
-from workbench.system import OBSERVER, System
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case
+from workbench.studies.power.diagnosing import build_everything, distances_in_set
+from workbench.system.system import OBSERVER, System
 
 
 def parted(of: System, recordings: Sequence[Case], true: str, other: str) -> float:

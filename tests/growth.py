@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.fmu import Matrix, Vector
-from workbench.observers.arrow import BlockKalmanFilter
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import OBSERVER, Estimated, System
-from workbench.systems import load_system, open_model
+from workbench.arrays import Matrix, Vector
+from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import OBSERVER, Estimated, System
 
 from .built import build_here
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pandas as pd
 
 from workbench import case_from_frame
-from workbench.case import Case
 from workbench.diagnosis import Outcome, diagnose, read_effects
-from workbench.modelica import read_library
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 LIBRARY = """within ;
 package Heater "A heated block in a casing"

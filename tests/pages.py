@@ -15,17 +15,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import workbench.template
-from workbench.commands.options import command_line
-from workbench.compiler import build, native
+import workbench.system.template
+from workbench.cli.parser import command_line
 from workbench.diagnosis import read_effects
-from workbench.modelica import read_library
+from workbench.models.compiler import build, native
+from workbench.models.modelica import read_library
 
 _FENCE = re.compile(
     r"(?:<!-- (?P<mark>long|parsed)(?:: [^>]+)? -->\n)?^```(?P<kind>\w*)\n(?P<code>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-_PACKAGE = Path(workbench.template.__file__).with_name("package.mo")
+_PACKAGE = Path(workbench.system.template.__file__).with_name("package.mo")
 _LIMIT = 300  # [s] of one block
 _CALL = re.compile(r'^(?:\w+="[^"]*" )*(?:python -m )?workbench (.*)$')
 

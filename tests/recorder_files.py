@@ -15,8 +15,8 @@ from asammdf import Signal as Logged
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
-from workbench.case import Case
-from workbench.system import System
+from workbench.recordings.case import Case
+from workbench.system.system import System
 
 BEGAN = datetime.datetime(2024, 3, 1, 8, 15, tzinfo=datetime.UTC)
 DIGITS = 6  # after the decimal point, in files of text

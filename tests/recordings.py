@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from workbench import fmu, loaded
-from workbench.wheelset import rig
-from workbench.wheelset.rig import Effects, Scenario, simulate, write_recording
+from workbench.machines.wheelset import rig
+from workbench.machines.wheelset.rig import Effects, Scenario, simulate, write_recording
+from workbench.models import fmu
 
 REFERENCE = Path(__file__).parent.parent / "fmus" / "fmi2" / "Reference.fmu"
 RATE = 200  # [Hz]
 _MOST = 256  # of 0.5 MB; a run of all tests makes some 150
 _SOURCES = [
     *sorted(Path(rig.__file__).parent.glob("*.py")),
-    *(Path(module.__file__) for module in (fmu, loaded)),
+    *(Path(module.__file__) for module in (fmu,)),
     REFERENCE,
     Path(__file__),
 ]

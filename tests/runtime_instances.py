@@ -20,7 +20,7 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
 
 MODELS = Path(__file__).parent / "runtime"
-RUNTIME = Path(__file__).parents[1] / "workbench" / "compiler" / "runtime"
+RUNTIME = Path(__file__).parents[1] / "workbench" / "models" / "compiler" / "runtime"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 DISCARD, ERROR = 2, 3
 VERSIONS = pytest.mark.parametrize("version", [2, 3])

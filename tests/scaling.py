@@ -17,8 +17,8 @@ from pathlib import Path
 from distributed import LocalCluster
 
 from workbench.__main__ import main as workbench
-from workbench.prepare import write_cases
-from workbench.published.train.stops import USUAL, Faults, draw_train, make, write_stop
+from workbench.machines.train.stops import USUAL, Faults, draw_train, make, write_stop
+from workbench.recordings.datasets import write_cases
 
 
 def write_fleet(folder: Path, trains: int, days: int) -> None:

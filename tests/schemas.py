@@ -4,7 +4,7 @@ from typing import Any
 
 import jsonschema
 
-from workbench.schemas import summaries
+from workbench.cli.schemas import summaries
 
 
 def validator(schema: dict[str, Any]) -> jsonschema.Draft202012Validator:

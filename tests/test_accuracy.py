@@ -9,29 +9,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import Case, read_cases
-from workbench.cosim import replay
-from workbench.objective import score
-from workbench.observers import Estimator
-from workbench.observers import estimators as all_estimators
-from workbench.observers.gains_file import usual_gains
-from workbench.recording import read_columns
-from workbench.systems import load_system, open_model
-from workbench.wheelset.accuracy import (
+from workbench.machines.wheelset.accuracy import (
+    COVERED,
     KnownStop,
     contact_errors,
     fall_delay,
     force_error,
     friction_error,
+    held,
     minimum_error,
     observe_stop,
     rise_delay,
     slide_error,
 )
-from workbench.wheelset.bands import COVERED, held
-from workbench.wheelset.claims import PeakForce
-from workbench.wheelset.rig import ORDINARY_PADS, Effects, select
-from workbench.wheelset.truth import read_truth
+from workbench.machines.wheelset.claims import PeakForce
+from workbench.machines.wheelset.rig import ORDINARY_PADS, Effects, select
+from workbench.machines.wheelset.truth import read_truth
+from workbench.observers import Estimator
+from workbench.observers import estimators_of as all_estimators
+from workbench.observers.gains_file import usual_gains
+from workbench.observers.replay import replay
+from workbench.observers.score import score
+from workbench.recordings.case import Case, read_cases
+from workbench.recordings.csv import read_columns
+from workbench.system.registry import load_system, open_model
 
 from .recordings import record
 

@@ -12,31 +12,33 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
-from workbench.case import Case, read_case
-from workbench.cosim import Ending, Run
-from workbench.fmu import Vector
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system, open_model
-from workbench.wheelset.accuracy import (
+from workbench.arrays import Vector
+from workbench.machines.wheelset.accuracy import (
     ROWS,
     Accuracy,
+    Held,
     KnownStop,
     StopAccuracy,
     accuracy,
     contact_errors,
+    covered,
     force_error,
     friction_error,
     minimum_error,
+    needed,
     observe_stop,
     rise_delay,
     slide_error,
     stop_accuracy,
     worst,
 )
-from workbench.wheelset.accuracy_report import format_accuracy
-from workbench.wheelset.bands import Held, covered, needed
-from workbench.wheelset.truth import Truth, read_truth
+from workbench.machines.wheelset.accuracy_report import format_accuracy
+from workbench.machines.wheelset.truth import Truth, read_truth
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.run import Ending, Run
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 from .page_rules import check_page
 from .schemas import check

@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from workbench.case import read_cases
-from workbench.cosim import Run, replay
-from workbench.fmu import FMU, Vector
-from workbench.objective import judged_window
-from workbench.observers import Estimate, adaptive, estimators
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.observers.mhe import MovingHorizonEstimator
-from workbench.observers.unscented import UnscentedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.arrays import Vector
+from workbench.models.fmu import FMU
+from workbench.observers import Estimate, estimators_of
+from workbench.observers.estimators import kalman
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.moving_horizon.estimator import MovingHorizonEstimator
+from workbench.observers.estimators.unscented import UnscentedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.run import Run
+from workbench.observers.score import judged_window
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 ROOT = Path(__file__).parent.parent
 WHEELSET = load_system("wheelset")
@@ -128,7 +131,7 @@ def test_a_jump_of_a_friction_is_followed_at_once(
 
 @pytest.fixture(scope="module")
 def runs(fmu: FMU) -> dict[str, list[tuple[slice, Run]]]:
-    made = {name: estimators(WHEELSET)[name] for name in FILTERS}
+    made = {name: estimators_of(WHEELSET)[name] for name in FILTERS}
     ready = {name: kind(fmu, WHEELSET, kind.reasoned(fmu, WHEELSET)) for name, kind in made.items()}
     cases = read_cases([ROOT / "cases"], WHEELSET)
     return {
@@ -150,11 +153,11 @@ def test_innovations_on_the_rig_are_as_large_as_filters_say(
 
 def test_one_sample_speaks_for_three_standard_deviations_at_most() -> None:
     """Else a wrong sample that is still possible would widen all bands after it."""
-    levels = adaptive.levels(2, 1)
-    adaptive.reset(levels)
+    levels = kalman.levels(2, 1)
+    kalman.reset(levels)
     noise, explained = 4.0, 5.0  # variances; an innovation scatters by 3
     told = []
     for innovation in (3.0, 9.0, 90.0):
-        adaptive.note(levels, 0, innovation, explained, noise)
+        kalman.note(levels, 0, innovation, explained, noise)
         told.append(levels.scatter[0])
     assert told == pytest.approx([1.0, (81.0 - 5.0) / 4.0, (81.0 - 5.0) / 4.0])

@@ -10,18 +10,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.__main__ import main
 from workbench.api import observe
-from workbench.case import Case, read_case, read_cases
-from workbench.conditions import Value
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.monitoring.estimate import watched
-from workbench.observers import estimators
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.published.train.planting import virtual_rig
-from workbench.published.train.rig import points
-from workbench.published.train.stops import Made
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.machines.train.planting import virtual_rig
+from workbench.machines.train.rig import points
+from workbench.machines.train.stops import Made
+from workbench.models.fmu import FMU
+from workbench.observers import estimators_of
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.recordings.case import Case, Value, read_case, read_cases
+from workbench.studies.monitoring.estimate import watched
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -99,7 +99,7 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(
     name: str, still: System, level: FMU
 ) -> None:
     """In closed form: of n readings of variance R and k of variance r, (n/R + k/r)^-1."""
-    kind = estimators(still)[name]
+    kind = estimators_of(still)[name]
     t, u, y = samples(40)
     found = kind(level, still, kind.reasoned(level, still)).run(t, u, y)
     weights = np.isfinite(y) / np.array([0.2, 0.05]) ** 2
@@ -143,9 +143,9 @@ def test_an_aid_that_is_never_there_changes_nothing(name: str, stop: tuple[Case,
 def test_estimators_with_fixed_gains_do_without_aids(still: System, level: FMU) -> None:
     t, u, y = samples(40)
     for name in ("open_loop", "parameter_estimator"):
-        kind = estimators(still)[name]
+        kind = estimators_of(still)[name]
         assert list(kind.fed(still).columns) == ["coarse"]
-    kind = estimators(still)["open_loop"]
+    kind = estimators_of(still)["open_loop"]
     found = kind(level, still, kind.reasoned(level, still)).run(t, u, y)
     assert_array_equal(found.values[:, 0], np.full(40, y[0, 0]))
 
@@ -233,7 +233,7 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop: tuple[Case, M
 
 def test_who_finds_a_condition_is_not_told(stop: tuple[Case, Made]) -> None:
     case, _ = stop
-    kind, part = estimators(TRAIN)["imm"], slice(0, 20)
+    kind, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
         bank = kind(model, TRAIN, kind.reasoned(model, TRAIN))
         found = []
@@ -350,6 +350,6 @@ def test_what_is_of_a_recording_is_not_watched_over_many() -> None:
 
 
 def test_a_constant_is_refused_by_who_could_not_find_it() -> None:
-    kind = estimators(TRAIN)["disturbance_observer"]
+    kind = estimators_of(TRAIN)["disturbance_observer"]
     with open_model(TRAIN) as model, pytest.raises(InputError, match="found 0: a constant"):
         kind.reasoned(model, TRAIN)

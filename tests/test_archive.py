@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from workbench.__main__ import main
-from workbench.archive import unpack
 from workbench.errors import FMUError, InputError
-from workbench.fmu import FMU
+from workbench.models.archive import unpack
+from workbench.models.fmu import FMU
 
 from .hostile_fmus import ROOT, rewritten
 

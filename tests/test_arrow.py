@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.observers.arrow import BlockKalmanFilter
-from workbench.observers.blocks import divide
+from workbench.models.fmu import FMU
 from workbench.observers.contract import Estimate
-from workbench.observers.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.block_filter.blocks import divide
+from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.operating import walks
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")

@@ -12,16 +12,17 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
+from workbench.arrays import Matrix
 from workbench.benchmark.calls import points
 from workbench.benchmark.horizon import HorizonTimes
 from workbench.benchmark.observers import ObserverTimes, ProcessTimes
 from workbench.benchmark.tuning import EvaluationTimes, TuningMemory, WorkerRates
-from workbench.compiler.benchmark import CallTimes, time_sources
-from workbench.description import read_description
+from workbench.cli.schemas import summaries
 from workbench.errors import InputError
-from workbench.fmu import FMU, Matrix
-from workbench.schemas import summaries
-from workbench.system import System
+from workbench.models.compiler.benchmark import CallTimes, time_sources
+from workbench.models.description import read_description
+from workbench.models.fmu import FMU
+from workbench.system.system import System
 
 STEP = 0.005  # [s]
 

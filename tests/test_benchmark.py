@@ -6,14 +6,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.benchmark.fmpy_loop import open_loop
 from workbench.benchmark.observers import plain_filters, resample
-from workbench.case import Case
-from workbench.fmu import FMU
+from workbench.machines.wheelset.benchmark import LOOPS, by_fmpy
+from workbench.models.fmu import FMU
 from workbench.observers import choose
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.open_loop import OpenLoop
-from workbench.system import System
-from workbench.systems import open_model
-from workbench.wheelset.benchmark import LOOPS, by_fmpy
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.recordings.case import Case
+from workbench.system.registry import open_model
+from workbench.system.system import System
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -58,7 +58,7 @@ def test_plain_c_gives_the_same_bits_as_the_compiled_law(
 ) -> None:
     """Same arithmetic in the same order, and neither compiler may contract or reorder it."""
     pytest.importorskip("ziglang")
-    from workbench.wheelset.benchmark.c_loop import CLoop
+    from workbench.machines.wheelset.benchmark.c_loop import CLoop
 
     gains = DisturbanceObserver.reasoned(minimal, system)
     observer = DisturbanceObserver(minimal, system, gains)

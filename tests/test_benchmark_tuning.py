@@ -23,11 +23,11 @@ from workbench.benchmark.tuning import (
     time_workers,
     tuning_job,
 )
-from workbench.case import Case
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.system import System
-from workbench.systems import open_model
-from workbench.wheelset.benchmark import by_fmpy
+from workbench.machines.wheelset.benchmark import by_fmpy
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.recordings.case import Case
+from workbench.system.registry import open_model
+from workbench.system.system import System
 
 SAMPLES = slice(700, 1300)  # 3 s: first pressure and the beginning of the stop
 MB = 1e6

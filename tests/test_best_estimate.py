@@ -11,12 +11,12 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.api import diagnose
-from workbench.case import read_cases
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.best_estimate import bands, best_estimate
-from workbench.simulation import CaseResult
-from workbench.system import System
-from workbench.wheelset.rig import Effects, select
+from workbench.diagnosis.inference.best_estimate import bands, best_estimate
+from workbench.machines.wheelset.rig import Effects, select
+from workbench.observers.simulation import CaseResult
+from workbench.recordings.case import read_cases
+from workbench.system.system import System
 
 from .recordings import record
 

@@ -9,9 +9,9 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
-from workbench.compiler import source_hash
-from workbench.installed import built_models
-from workbench.resources import fmus
+from workbench.models.compiler import source_hash
+from workbench.runtime.resources import fmus
+from workbench.system.registry import built_models
 
 
 def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from workbench.kernel import compiled
+from workbench.models.native import compiled
 
 
 class Part(NamedTuple):

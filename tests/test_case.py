@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.case import read_cases, sign
-from workbench.system import System
+from workbench.recordings.case import read_cases, sign
+from workbench.system.system import System
 
 from .case_folders import (
     LINES,

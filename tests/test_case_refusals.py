@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_array_equal
 
-from workbench.case import read_cases
 from workbench.errors import InputError
+from workbench.recordings.case import read_cases
 
 from .case_folders import (
     LINES,

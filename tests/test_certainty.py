@@ -19,13 +19,13 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
-from workbench.diagnosis.certainty import assess
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.search import Fitted
-from workbench.diagnosis.selection import anew
-from workbench.modelica import read_library
-from workbench.systems import load_system
+from workbench.diagnosis.inference.certainty import assess
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.models.modelica import read_library
+from workbench.system.registry import load_system
 
 LIBRARY = """within ;
 package Gauge "A gauge: reading by what is measured"

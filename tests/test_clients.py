@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 
 ROOT = Path(__file__).parent.parent
 STEP, DURATION, BRAKE, PRESSURE = 0.01, 1.5, 0.5, 2e5  # s, s, s, Pa
@@ -209,7 +209,7 @@ def test_openmodelica_builds_the_same_stop(model: str, interface: str, tmp_path:
     """The second compiler, from the same sources; only where it is installed."""
     if shutil.which("omc") is None:
         pytest.skip("needs OpenModelica's omc")
-    openmodelica = pytest.importorskip("workbench.compiler.openmodelica")
+    openmodelica = pytest.importorskip("workbench.models.compiler.openmodelica")
     package = ROOT / "modelica" / "WheelsetRig" / "package.mo"
     (path,) = openmodelica.build_with_omc(package, [f"WheelsetRig.{model}"], tmp_path)
     with FMU(path) as theirs, FMU(fmu_path(2, model)) as ours:

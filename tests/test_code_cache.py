@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench import code_cache
+from workbench.models import jit
 
 ROOT = Path(__file__).parents[1]
 
@@ -91,12 +91,12 @@ def test_code_is_made_again_when_what_makes_it_changes(
     """A law, what all laws call, and what compiles them."""
     package = tmp_path / "workbench"
     shutil.copytree(ROOT / "workbench", package)
-    monkeypatch.setattr(code_cache, "_PACKAGE", package)
-    before = code_cache._folder.__wrapped__()
-    assert code_cache._folder.__wrapped__() == before
+    monkeypatch.setattr(jit, "_PACKAGE", package)
+    before = jit._folder.__wrapped__()
+    assert jit._folder.__wrapped__() == before
     with (package / name).open("a") as source:
         source.write("# changed\n")
-    assert code_cache._folder.__wrapped__() != before
+    assert jit._folder.__wrapped__() != before
 
 
 def test_what_two_processes_need_at_once_is_compiled_by_one(home: Path) -> None:
@@ -132,9 +132,10 @@ def test_without_a_place_to_keep_it_code_is_compiled_in_each_process(home: str |
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="takes another user's part")
 def test_a_user_without_a_home_keeps_nothing() -> None:
     program = (
-        "import os, platformdirs, workbench.shelf\n"
+        "import os, platformdirs, workbench.models.fmu_cache\n"
         "os.setuid(54321)\n"  # of nobody
-        "print(workbench.shelf.is_known('name'), workbench.shelf.cache_folder().is_dir())"
+        "cache = workbench.models.fmu_cache\n"
+        "print(cache.is_known('name'), cache.cache_folder().is_dir())"
     )
     environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
     run = subprocess.run(
@@ -150,7 +151,7 @@ def test_a_user_without_a_home_keeps_nothing() -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="confines itself to reading by Landlock")
 def test_a_folder_that_can_only_be_read_is_used(home: Path) -> None:
-    reading = f"from workbench.confinement import confine; confine([]); exec({PROGRAM!r})"
+    reading = f"from workbench.runtime.supervision import confine; confine([]); exec({PROGRAM!r})"
     assert solved(home, reading) == "0 kept"
     assert solved(home) == "0 kept"
     assert solved(home, reading) == "1 kept"

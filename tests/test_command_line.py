@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from workbench.__main__ import main
-from workbench.commands.extras import PURPOSES
-from workbench.commands.options import command_line, parsers
+from workbench.cli.extras import PURPOSES
+from workbench.cli.parser import command_line, parsers
 
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 PARSERS = [one for one in parsers(command_line("")) if " " in one.prog]
@@ -201,7 +201,7 @@ def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from workbench.commands import doctor
+    from workbench.cli import doctor
 
     kept = tmp_path / "fmus"
     (kept / "fmi2").mkdir(parents=True)

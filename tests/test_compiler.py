@@ -12,15 +12,15 @@ from fmpy.validation import validate_fmu
 from numpy.testing import assert_allclose
 
 from workbench.errors import InputError
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 
 casadi = pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler  # noqa: E402  (needs the extra)
-from workbench.compiler.description import base_units  # noqa: E402
-from workbench.compiler.explicit import StateSpace, make_explicit  # noqa: E402
-from workbench.compiler.flat import flatten  # noqa: E402
+from workbench.models import compiler  # noqa: E402  (needs the extra)
+from workbench.models.compiler.description import base_units  # noqa: E402
+from workbench.models.compiler.explicit import StateSpace, make_explicit  # noqa: E402
+from workbench.models.compiler.flat import flatten  # noqa: E402
 
 
 def library(folder: Path, text: str) -> Path:

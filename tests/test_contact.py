@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 
 RW, RR, LOAD, K = 0.46, 0.70, 80e3, 9.68e6
 

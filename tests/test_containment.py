@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from workbench import proof, shelf
 from workbench.__main__ import main
-from workbench.description import Description, read_description
 from workbench.errors import InputError
-from workbench.fitness import check
-from workbench.fmu import FMU, CoSimulation
-from workbench.proof import ContainedError, Limits, NoAnswerError
+from workbench.models import fmu_cache, trial
+from workbench.models.checks import check
+from workbench.models.description import Description, read_description
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.trial import ContainedError, Limits, NoAnswerError
 
 from .hostile_fmus import needs_compiler, rewritten
 
@@ -27,8 +27,10 @@ pytestmark = needs_compiler
 @pytest.fixture(autouse=True)
 def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A memory, a cache, a folder of temporary files of its own; returns the last."""
-    monkeypatch.setattr(shelf.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache"))
-    shelf._remembered.cache_clear()
+    monkeypatch.setattr(
+        fmu_cache.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache")
+    )
+    fmu_cache._remembered.cache_clear()
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -124,13 +126,13 @@ def test_limits_that_cannot_be_read_are_refused(
 def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the FMUs that were tried."""
     names: list[str] = []
-    original = proof.attempt
+    original = trial.attempt
 
     def attempt(description: Description, *rest: Any) -> str:
         names.append(description.path.name)
         return original(description, *rest)
 
-    monkeypatch.setattr(proof, "attempt", attempt)
+    monkeypatch.setattr(trial, "attempt", attempt)
     return names
 
 
@@ -141,7 +143,7 @@ def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(
     shutil.copy(hostile_path, copy)
     other = rewritten(copy, tmp_path / "other.fmu", lambda folder: (folder / "new").touch())
     for path in (copy, copy, hostile_path, other, other):
-        shelf._remembered.cache_clear()  # as in another process
+        fmu_cache._remembered.cache_clear()  # as in another process
         FMU(path).close()
     assert tried == ["copy.fmu", "other.fmu"]
 
@@ -177,18 +179,18 @@ def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(
 ) -> None:
     """A refusal ends the trial, so that it must be none of the trial's own making."""
     description = read_description(root / "fmus" / version / "Reference.fmu")
-    with proof.unpacked(description, interface) as folder:
-        assert proof.attempt(description, interface, folder, proof.Limits()) == ""
+    with trial.unpacked(description, interface) as folder:
+        assert trial.attempt(description, interface, folder, trial.Limits()) == ""
 
 
 def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
     """The least of several, because other work on the machine only adds."""
     description = read_description(minimal_path)
     times = []
-    with proof.unpacked(description, "Model Exchange") as folder:
+    with trial.unpacked(description, "Model Exchange") as folder:
         for _ in range(5):
             begin = time.perf_counter()
-            proof.attempt(description, "Model Exchange", folder, proof.Limits())
+            trial.attempt(description, "Model Exchange", folder, trial.Limits())
             times.append(time.perf_counter() - begin)
     assert min(times) < 0.3
 

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case
 from workbench.errors import InputError
-from workbench.foreign import FileChannel, Group, RecordedFile
-from workbench.importing.cutting import cut
-from workbench.mapping import NamedChannel, merge, propose
-from workbench.system import System
+from workbench.recordings.case import Case
+from workbench.recordings.channels import NamedChannel, merge, propose
+from workbench.recordings.formats import FileChannel, Group, RecordedFile
+from workbench.recordings.importing import cut
+from workbench.system.system import System
 
 RATE = 100.0  # Hz
 

@@ -11,15 +11,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
-from workbench.case import read_cases
-from workbench.fmu import FMU
-from workbench.observers import Estimator, Gains, estimators
-from workbench.observers.disturbance import DisturbanceObserver
+from workbench.models.fmu import FMU
+from workbench.observers import Estimator, Gains, estimators_of
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.parameter import ParameterEstimator
 from workbench.observers.gains_file import read_gains, usual_gains
-from workbench.observers.parameter import ParameterEstimator
-from workbench.pool import Pool
-from workbench.system import System
-from workbench.systems import open_model
+from workbench.recordings.case import read_cases
+from workbench.runtime.pool import Pool
+from workbench.system.registry import open_model
+from workbench.system.system import System
 from workbench.tuning import Evaluator, Job, evaluate_gains, pose
 from workbench.tuning.settling import Settling
 
@@ -37,7 +37,7 @@ def models(system: System) -> Iterator[dict[str, FMU]]:
 def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
     root: Path, system: System, inline: Callable[[Job], Pool[Evaluator]], name: str
 ) -> None:
-    path = root / "workbench" / "wheelset" / "gains" / f"{name}.toml"
+    path = root / "workbench" / "machines" / "wheelset" / "gains" / f"{name}.toml"
     claimed = tomllib.loads(path.read_text())["provenance"]
     cases = read_cases([root / "cases"], system)
     job = pose(system, name, cases, claimed["scale_errors"]).job
@@ -53,7 +53,7 @@ def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
 def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(
     system: System, models: dict[str, FMU]
 ) -> None:
-    known = estimators(system)
+    known = estimators_of(system)
     minimal, full = models.values()
     gains = {
         name: (usual_gains(kind, minimal, system), usual_gains(kind, full, system))
@@ -124,7 +124,7 @@ def slow_disturbance_observer(fmu: FMU, system: System) -> tuple[Estimator, Gain
 
 
 def slow_parameter_estimator(fmu: FMU, system: System) -> tuple[Estimator, Gains]:
-    gains = estimators(system)["parameter_estimator"].reasoned(fmu, system)
+    gains = estimators_of(system)["parameter_estimator"].reasoned(fmu, system)
     slow = gains.with_values(0.2 * gains.values)
     return ParameterEstimator(fmu, system, slow), slow
 
@@ -147,7 +147,7 @@ def test_settling_predicts_how_much_of_a_friction_step_is_left(
     assert asked is not None
     assert asked.within == 0.5
     step, rate = 0.01, 1000
-    settling = Settling(fmu, system, estimators(system)[name])  # leaves the model in equilibrium
+    settling = Settling(fmu, system, estimators_of(system)[name])  # leaves the model in equilibrium
     speeds = fmu.variables(["omegaW", "omegaR"])
     fmu.start(dict(zip(("omegaW", "omegaR"), fmu.get(speeds).tolist(), strict=True)))
     inputs = fmu.variables(["pB", "tauR", "dmuDC"])

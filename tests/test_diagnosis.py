@@ -15,18 +15,18 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, read_cases
 from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.selection import anew
-from workbench.diagnosis.verdict import conclude
-from workbench.modelica import read_library
-from workbench.system import OBSERVER, System
-from workbench.system_file import with_model
-from workbench.systems import load_system
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, select
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, select
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case, read_cases
+from workbench.system.reader import with_model
+from workbench.system.registry import load_system
+from workbench.system.system import OBSERVER, System
 
 from .recordings import record
 

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 from numpy.testing import assert_allclose
 
-from workbench.case import Case
-from workbench.report.diagnosis_figures import FAST, lasting, lasting_blocks, recording_figure
-from workbench.system import System
+from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
+from workbench.recordings.case import Case
+from workbench.system.system import System
 
 from .diagnosis_pages import residuals
 

@@ -10,17 +10,17 @@ from scipy.optimize import lsq_linear
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, read_cases
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
-from workbench.diagnosis.cleaning import outliers
-from workbench.diagnosis.clocks import in_time
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, sizes_by_component, source, variables
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.linearised import Linearised, Point, slowness
-from workbench.diagnosis.motion import Opened, motion, opened
-from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.quadratic import (
+from workbench.diagnosis.data.cleaning import outliers
+from workbench.diagnosis.data.clocks import in_time
+from workbench.diagnosis.data.motion import Opened, motion, opened
+from workbench.diagnosis.data.samples import Samples, compared
+from workbench.diagnosis.data.samples import prepare as prepare_samples
+from workbench.diagnosis.effects.extension import build, sizes_by_component, source, variables
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Linearised, Point, slowness
+from workbench.diagnosis.inference.quadratic import (
     Joint,
     Quadratic,
     RecordingSystem,
@@ -29,18 +29,19 @@ from workbench.diagnosis.quadratic import (
     minimum,
     minimum_within,
 )
-from workbench.diagnosis.samples import Samples, compared
-from workbench.diagnosis.samples import prepare as prepare_samples
-from workbench.diagnosis.search import extended, joined
-from workbench.diagnosis.selection import anew
-from workbench.diagnosis.simulator import Evidence, Simulated, Variation, delay, simulating
-from workbench.diagnosis.thresholds import SOUND
-from workbench.diagnosis.trial import Prospect
+from workbench.diagnosis.inference.search import extended, joined
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.inference.thresholds import SOUND
+from workbench.diagnosis.inference.trial import Prospect
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.prediction import Predictor, Variation
+from workbench.diagnosis.simulation.simulator import Evidence, Simulated, delay, simulating
 from workbench.errors import FMUError, InputError
-from workbench.fmu import FMU, CoSimulation, Matrix, Vector
-from workbench.modelica import read_library
-from workbench.systems import load_system
-from workbench.template import write_system
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case, read_cases
+from workbench.system.registry import load_system
+from workbench.system.template import write_system
 
 ROOT = Path(__file__).parent.parent
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")

@@ -14,12 +14,12 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case
-from workbench.diagnosis.residuals import Balance
-from workbench.report.diagnosis_figures import lasting_blocks, recording_figure
-from workbench.report.diagnosis_page import write_diagnosis_page
-from workbench.report.figures import CaseFigure
-from workbench.system import System
+from workbench.diagnosis.inference.residuals import Balance
+from workbench.diagnosis.outcome import lasting_blocks, recording_figure
+from workbench.diagnosis.report import write_diagnosis_page
+from workbench.pages.figures import CaseFigure
+from workbench.recordings.case import Case
+from workbench.system.system import System
 
 from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
 from .page_rules import check_page

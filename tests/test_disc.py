@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.case import Case, read_case
-from workbench.cosim import Ending, Run, replay
-from workbench.fmu import FMU
-from workbench.objective import score
+from workbench.machines.wheelset.estimators.disc import DiscModel, DiscObserver
+from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.system import System
-from workbench.wheelset.estimators.disc import DiscModel, DiscObserver
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending, Run
+from workbench.observers.score import score
+from workbench.recordings.case import Case, read_case
+from workbench.system.system import System
 
 RR, RB, NOMINAL = 0.70, 0.30, 0.30
 

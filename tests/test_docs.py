@@ -109,8 +109,8 @@ def test_the_picture_of_the_readme_is_in_the_site(site: Path) -> None:
 
 def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -> None:
     import workbench as wb
-    from workbench.commands.options import command_line, parsers
-    from workbench.diagnosis.thresholds import Thresholds
+    from workbench.cli.parser import command_line, parsers
+    from workbench.diagnosis.inference.thresholds import Thresholds
 
     commands = (site / "commands.html").read_text()
     for one in parsers(command_line(""))[1:]:

@@ -9,13 +9,13 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
-from workbench.compiler.flat import flatten
 from workbench.diagnosis import Effect, read_effects
-from workbench.diagnosis.extension import build, source, variables
-from workbench.diagnosis.slots import read_slots
+from workbench.diagnosis.effects.extension import build, source, variables
+from workbench.diagnosis.effects.slots import read_slots
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.modelica import Library, read_library
+from workbench.models.compiler.flat import flatten
+from workbench.models.fmu import FMU
+from workbench.models.modelica import Library, read_library
 
 ROOT = Path(__file__).parent.parent
 WHEELSET = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")

@@ -17,18 +17,18 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 from fmpy.validation import validate_fmu
 
 from workbench.__main__ import main
-from workbench.case import Case, read_cases
 from workbench.errors import InputError
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.gains_file import format_gains
-from workbench.systems import load_system, open_model
+from workbench.recordings.case import Case, read_cases
+from workbench.system.registry import load_system, open_model
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.commands.options import command_line
-from workbench.compiler.archive import PLATFORMS
-from workbench.export import ObserverModel, build_observer, observer, write_package
+from workbench.cli.parser import command_line
+from workbench.models.compiler.archive import PLATFORMS
+from workbench.observers.export import ObserverModel, build_observer, observer, write_package
 
 SYSTEM = load_system("wheelset")
 KINDS = choose(SYSTEM, list(SYSTEM.export.classes))

@@ -20,22 +20,22 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 
-from workbench import shelf
 from workbench.__main__ import main
-from workbench.case import Case, read_case
 from workbench.errors import InputError
-from workbench.fmu import FMU
+from workbench.models import fmu_cache
+from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.gains_file import format_gains
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.compiler import native
-from workbench.export import EstimatorLaw, build_law
+from workbench.models.compiler import native
+from workbench.observers.export import EstimatorLaw, build_law
 
 from . import heater
 
@@ -58,17 +58,14 @@ class Exported:
 
 def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
     """Build, once for each state of estimators and compiler."""
-    folders = (ROOT / "workbench" / name for name in ("export", "observers"))
-    files = [
-        ROOT / "workbench" / "kernel.py",
-        *(f for folder in folders for f in folder.rglob("*.[pch]*")),
-    ]
+    package = ROOT / "workbench"
+    files = [package / "models" / "native.py", *(package / "observers").rglob("*.[pch]*")]
     texts = [file.read_text() for file in sorted(files) if file.suffix in (".py", ".c", ".h")]
     law = EstimatorLaw(estimator, "")
     parts = law.model, estimator.fmu.sha256, str(estimator.gains.summary()), str(fmi)
     texts.append(estimator.system.source.read_text())
-    shelf.fetch(
-        shelf.key(estimator.system.library, *texts, *parts),
+    fmu_cache.fetch(
+        fmu_cache.key(estimator.system.library, *texts, *parts),
         path,
         lambda path: build_law(law, path, fmi, lambda _: None, platforms=[native()]),
     )
@@ -400,8 +397,8 @@ def test_a_machine_whose_output_is_no_state_exports(tmp_path: Path) -> None:
 # --- what cannot be exported ---
 
 OWN = """
-from workbench.kernel import compiled
-from workbench.observers.kalman import ExtendedKalmanFilter, ekf_law
+from workbench.models.native import compiled
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter, ekf_law
 
 
 @compiled

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.errors import InputError
-from workbench.expression import Expression
+from workbench.system.expression import Expression
 
 
 def test_a_formula_is_ordinary_arithmetic_over_names_with_dots() -> None:

@@ -7,21 +7,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case, read_case
-from workbench.cosim import Ending, replay
-from workbench.fmu import FMU
-from workbench.objective import score
+from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.observers.unscented import UnscentedKalmanFilter
-from workbench.systems import load_system
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.unscented import UnscentedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending
+from workbench.observers.score import score
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.diagnosis.extension import build
-from workbench.modelica import read_library
+from workbench.diagnosis.effects.extension import build
+from workbench.models.modelica import read_library
 
 SYSTEM = load_system("wheelset")
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0

@@ -9,8 +9,8 @@ import figures
 import pytest
 from figure_machines import MACHINES, machines
 
-from workbench.power.following import summarise_following
-from workbench.power.left_out import summarise_left_out
+from workbench.studies.power.following import summarise_following
+from workbench.studies.power.left_out import summarise_left_out
 
 ROOT = Path(__file__).parents[1]
 WORST = {

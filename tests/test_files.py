@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from workbench.errors import InputError
-from workbench.files import replacing, write_json, write_whole
+from workbench.runtime.files import replacing, write_json, write_whole
 
 
 def test_text_bytes_and_json_are_written_in_folders_made_as_needed(tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.fitness import Finding, check, is_fit
-from workbench.fmu import FMU, CoSimulation
-from workbench.proof import Limits
+from workbench.models.checks import Finding, check, is_fit
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.trial import Limits
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")

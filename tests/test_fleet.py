@@ -9,8 +9,8 @@ import pytest
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.monitoring import STATE
-from workbench.systems import load_system
+from workbench.studies.monitoring import STATE
+from workbench.system.registry import load_system
 
 from .schemas import check
 from .train_stops import write_stop

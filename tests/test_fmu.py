@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from workbench.errors import FMUError, InputError
-from workbench.fmu import FMU, CoSimulation
-from workbench.kernel import OK, checked, do_step, read, set_inputs, stepping
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.native import OK, checked, do_step, read, set_inputs, stepping
 
 INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from workbench.__main__ import main
-from workbench.power.following import SHARES, summarise_following
-from workbench.report.power_checks import format_followed
+from workbench.studies.power.following import SHARES, summarise_following
+from workbench.studies.power.report import format_followed
 
 from .schemas import check
 

@@ -18,14 +18,15 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from workbench.__main__ import main
-from workbench.case import Case, read_case
-from workbench.cosim import Ending, Run, replay
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.objective import score
-from workbench.observers import Estimator, choose, estimators
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.models.fmu import FMU
+from workbench.observers import Estimator, choose, estimators_of
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending, Run
+from workbench.observers.score import score
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -150,17 +151,17 @@ def case(folder: Path, tanks: System) -> Case:
 
 
 def made(fmu: FMU, tanks: System, name: str) -> Estimator:
-    kind = estimators(tanks)[name]
+    kind = estimators_of(tanks)[name]
     return kind(fmu, tanks, kind.reasoned(fmu, tanks))
 
 
 @pytest.fixture(scope="module")
 def runs(fmu: FMU, tanks: System, case: Case) -> dict[str, Run]:
-    return {name: replay(case, made(fmu, tanks, name)) for name in estimators(tanks)}
+    return {name: replay(case, made(fmu, tanks, name)) for name in estimators_of(tanks)}
 
 
 def test_a_system_has_the_estimators_of_all_systems_and_no_others(tanks: System) -> None:
-    assert list(estimators(tanks)) == ["open_loop", *ESTIMATORS]
+    assert list(estimators_of(tanks)) == ["open_loop", *ESTIMATORS]
     with pytest.raises(InputError, match="direct_inversion"):
         choose(tanks, ["direct_inversion"])
 
@@ -213,7 +214,7 @@ def test_filters_are_the_kalman_filter_where_the_model_is_linear(
     fmu: FMU, tanks: System, case: Case, runs: dict[str, Run], name: str
 ) -> None:
     """Reference: textbook equations in matrices, with the same implicit step."""
-    gains = estimators(tanks)[name].reasoned(fmu, tanks)
+    gains = estimators_of(tanks)[name].reasoned(fmu, tanks)
     walk = np.array([1e-5, 1e-5, gains["leak"]])
     A = np.array([[-PIPE, PIPE, 0.0], [PIPE, -PIPE - DRAIN, -1.0], [0.0, 0.0, 0.0]])
     A[:2] /= AREA

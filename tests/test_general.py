@@ -1,15 +1,13 @@
 """The engine is of no machine: words of wheelset and train stand in their own folders alone."""
 
-import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from workbench.diagnosis import read_effects
-from workbench.modelica import read_library
-from workbench.system import OBSERVER, System
+from workbench.models.modelica import read_library
+from workbench.system.system import OBSERVER, System
 
 ROOT = Path(__file__).parent.parent
 KINDS = (".py", ".html", ".js", ".css", ".c", ".h")
@@ -40,7 +38,7 @@ def names(system: System) -> set[str]:
 
 def sources() -> list[Path]:
     package = ROOT / "workbench"
-    own = (package / "wheelset", package / "published" / "train")
+    own = (package / "machines" / "wheelset", package / "machines" / "train")
     return sorted(
         path
         for path in package.rglob("*")
@@ -53,19 +51,3 @@ def test_no_source_names_what_one_machine_has(source: Path, names: set[str]) -> 
     words = re.compile(rf"\b({'|'.join(map(re.escape, names))}|{PROSE})\b")
     lines = enumerate(source.read_text().splitlines(), 1)
     assert [(number, line.strip()) for number, line in lines if words.search(line)] == []
-
-
-def classes() -> Iterator[tuple[str, str]]:
-    """Public classes of the package: name and file."""
-    for path in sorted((ROOT / "workbench").rglob("*.py")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                yield node.name, str(path.relative_to(ROOT))
-
-
-def test_no_two_public_classes_share_a_name() -> None:
-    """Whoever reads of an Estimate knows which."""
-    files: dict[str, list[str]] = {}
-    for name, file in classes():
-        files.setdefault(name, []).append(file)
-    assert {name: places for name, places in files.items() if len(places) > 1} == {}

@@ -10,21 +10,21 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-from workbench.case import Case
+from workbench.arrays import Vector
 from workbench.diagnosis import given_values, read_effects
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.slots import read_slots
-from workbench.fmu import FMU
-from workbench.modelica import Library, read_library
-from workbench.proposing.forms import WrittenForm, candidates
-from workbench.proposing.places import CLOCK, Place, laws, places
-from workbench.proposing.scan import watching
-from workbench.proposing.splines import Knots
-from workbench.proposing.writing import extended_library
-from workbench.recording import Vector
-from workbench.system import OBSERVER, System
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.slots import read_slots
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.laws.forms import WrittenForm, candidates
+from workbench.diagnosis.laws.places import CLOCK, Place, laws, places
+from workbench.diagnosis.laws.scan import watching
+from workbench.diagnosis.laws.splines import Knots
+from workbench.diagnosis.laws.writing import extended_library
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.models.fmu import FMU
+from workbench.models.modelica import Library, read_library
+from workbench.recordings.case import Case
+from workbench.system.system import OBSERVER, System
 
 LONGEST = 40.0  # [s]
 

@@ -182,7 +182,7 @@ def test_a_system_that_no_person_wrote_is_refused(
 def test_gains_that_no_person_wrote_are_refused(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str
 ) -> None:
-    tuned = (root / "workbench/wheelset/gains/disturbance_observer.toml").read_text()
+    tuned = (root / "workbench/machines/wheelset/gains/disturbance_observer.toml").read_text()
     key = line.split(" = ")[0].split("\n")[-1]
     start = tuned.index("[gains]")
     head, rest = tuned[:start], tuned[start:]

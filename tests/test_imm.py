@@ -12,14 +12,15 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import inv
 
-from workbench.case import Case, read_case, read_cases
-from workbench.cosim import Run, replay
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.observers.imm import InteractingMultipleModel, changes, hypotheses
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.models.fmu import FMU
+from workbench.observers.estimators.imm import InteractingMultipleModel, changes, hypotheses
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.run import Run
+from workbench.recordings.case import Case, read_case, read_cases
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 ROOT = Path(__file__).parent.parent
 WHEELSET = load_system("wheelset")

@@ -17,13 +17,13 @@ from scipy.linalg import expm
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.diagnosis.cleaning import outliers
-from workbench.diagnosis.counting import BEYOND
-from workbench.diagnosis.thresholds import SOUND
+from workbench.diagnosis.data.cleaning import outliers
+from workbench.diagnosis.data.counting import BEYOND
+from workbench.diagnosis.inference.thresholds import SOUND
+from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
-from workbench.provenance import run_of
-from workbench.report.diagnosis import write_diagnosis
-from workbench.system import System
+from workbench.pages.provenance import run_of
+from workbench.system.system import System
 
 from .heater import NOISE, cases, diagnosed, system
 

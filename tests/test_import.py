@@ -13,12 +13,12 @@ from numpy.testing import assert_allclose
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case, read_cases
 from workbench.errors import InputError
-from workbench.foreign import read_foreign
-from workbench.plausibility import Origin, doubts
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.recordings.case import Case, read_cases
+from workbench.recordings.formats import read_foreign
+from workbench.recordings.plausibility import Origin, doubts
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 from .recorder_files import DIGITS, FORMATS, csv_of_a_german_rig, german, mdf_4, recorded
 from .train_stops import write_stop

@@ -12,14 +12,14 @@ from scipy.io import savemat
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.foreign import read_foreign
-from workbench.foreign.spelling import conversion, spelled
-from workbench.foreign.stamps import iso
-from workbench.mapping import NamedChannel, propose
-from workbench.mapping.clock import Clock
-from workbench.system import System
-from workbench.systems import load_system
-from workbench.template import write_system
+from workbench.recordings.channels import NamedChannel, propose
+from workbench.recordings.channels.clock import Clock
+from workbench.recordings.formats import read_foreign
+from workbench.recordings.formats.spelling import conversion, spelled
+from workbench.recordings.formats.stamps import iso
+from workbench.system.registry import load_system
+from workbench.system.system import System
+from workbench.system.template import write_system
 
 
 @pytest.fixture(scope="module")

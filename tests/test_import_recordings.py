@@ -15,11 +15,11 @@ from openpyxl.chart import LineChart
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case
 from workbench.errors import InputError
-from workbench.foreign import read_foreign
-from workbench.mapping import Told, propose_recordings
-from workbench.system import System
+from workbench.recordings.case import Case
+from workbench.recordings.channels import Told, propose_recordings
+from workbench.recordings.formats import read_foreign
+from workbench.system.system import System
 
 from .files_of_stops import FORMATS, Stops, add_sheet, workbook, workbook_of_stamps
 from .recorder_files import BEGAN, Columns, recorded

@@ -15,13 +15,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.thresholds import Thresholds
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.errors import InputError
-from workbench.power.diagnosing import build_everything, library_effects
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.studies.power.diagnosing import build_everything, library_effects
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 from .heater import LIBRARY, NOISE, SYSTEM, cases, diagnosed
 

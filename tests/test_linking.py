@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from workbench.kernel import compiled
+from workbench.models.native import compiled
 
 
 @compiled

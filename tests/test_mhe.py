@@ -13,15 +13,16 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Matrix, Vector
+from workbench.models.fmu import FMU
 from workbench.observers import Estimate
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.observers.mhe import MovingHorizonEstimator
-from workbench.observers.smoother import Smoother
-from workbench.observers.window_cost import cost
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.moving_horizon.estimator import MovingHorizonEstimator
+from workbench.observers.estimators.moving_horizon.window_cost import cost
+from workbench.observers.estimators.smoother import Smoother
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.errors import InputError
-from workbench.modelica import Library, read_library
+from workbench.models.modelica import Library, read_library
 
 ROOT = Path(__file__).parent.parent
 

@@ -18,16 +18,16 @@ from scipy.stats import kstest
 
 import workbench as wb
 from workbench.__main__ import main
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.fmu import Matrix, Vector
-from workbench.monitoring import STATE, Monitored
-from workbench.monitoring.cause import known_from_before, recordings_after
-from workbench.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
-from workbench.monitoring.watch import Track, watch
-from workbench.provenance import run_of
-from workbench.report.monitoring import write_monitored
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.pages.provenance import run_of
+from workbench.studies.monitoring import STATE, Monitored
+from workbench.studies.monitoring.cause import known_from_before, recordings_after
+from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
+from workbench.studies.monitoring.report import write_monitored
+from workbench.studies.monitoring.watch import Track, watch
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 from .page_rules import check_page
 from .schemas import check
@@ -271,7 +271,7 @@ def test_nothing_is_estimated_twice(
     for name in ("01", "02"):
         shutil.copytree(history / name, tmp_path / "in" / name)
     wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    monkeypatch.setattr("workbench.monitoring.estimate.replay", None)  # would fail
+    monkeypatch.setattr("workbench.studies.monitoring.estimate.replay", None)  # would fail
     found = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
     assert found.names == ("01", "02")
 

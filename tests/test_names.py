@@ -8,17 +8,18 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_array_equal
 
-from workbench.case import Case, read_case
-from workbench.commands.inputs import model_names
-from workbench.cosim import Ending, replay
-from workbench.description import read_description
+from workbench.cli.inputs import model_names
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.observers.open_loop import OpenLoop
-from workbench.system import System
-from workbench.system_check import check_model
+from workbench.models.description import read_description
+from workbench.models.fmu import FMU
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending
+from workbench.recordings.case import Case, read_case
+from workbench.system.check import check_model
+from workbench.system.system import System
 
 NAMES = {
     "omegaW": "speedWheelset",

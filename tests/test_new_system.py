@@ -8,11 +8,11 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.api import diagnose
-from workbench.case import read_cases
 from workbench.diagnosis import Outcome
 from workbench.errors import InputError
-from workbench.systems import load_system
-from workbench.template import SEEPAGE, write_system
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
+from workbench.system.template import SEEPAGE, write_system
 
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")

@@ -14,20 +14,14 @@ from scipy.stats import chi2
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.quadratic import Joint, Quadratic, RecordingSystem
-from workbench.diagnosis.rivals import read_rivals
-from workbench.diagnosis.thresholds import thresholds
+from workbench.diagnosis.inference.quadratic import Joint, Quadratic, RecordingSystem
+from workbench.diagnosis.inference.rivals import read_rivals
+from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.experiments import (
-    NextStop,
-    RankedExperiment,
-    candidates,
-    foreseen,
-    next_stop,
-)
-from workbench.experiments.candidates import (
+from workbench.recordings.case import Case
+from workbench.studies.design import NextStop, RankedExperiment, candidates, foreseen, next_stop
+from workbench.studies.design.candidates import (
     Profile,
     drawn,
     every_setting,
@@ -35,11 +29,9 @@ from workbench.experiments.candidates import (
     other_settings,
     some_settings,
 )
-from workbench.experiments.separation import precision, refitted, told_apart
-from workbench.expression import Expression
-from workbench.power.diagnosing import distance
-from workbench.system import System
-from workbench.system_experiments import (
+from workbench.studies.design.separation import precision, refitted, told_apart
+from workbench.studies.power.diagnosing import distance
+from workbench.system.experiments import (
     RELEASE,
     SINE,
     STAIRCASE,
@@ -49,7 +41,9 @@ from workbench.system_experiments import (
     Setting,
     VariedInput,
 )
-from workbench.systems import load_system
+from workbench.system.expression import Expression
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 from .distances import parted
 from .heater import NOISE, cases, diagnosed

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from workbench.case import read_cases
-from workbench.experiments import next_stop
-from workbench.power.diagnosing import (
+from workbench.recordings.case import read_cases
+from workbench.studies.design import next_stop
+from workbench.studies.power.diagnosing import (
     build_everything,
     diagnose_set,
     library_effects,
     rivals_of_set,
 )
-from workbench.system import System
+from workbench.system.system import System
 
 ROOT = Path(__file__).parents[1]
 RADIUS = ROOT.parent / "shared" / "recordings" / "labelled" / "radius"

@@ -9,15 +9,10 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from workbench.case import Case, read_case
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.rivals import Rivals
-from workbench.experiments import NextStop, RankedExperiment, foreseen, next_stop
-from workbench.experiments.candidates import Experiment, every_setting
-from workbench.system import System
-from workbench.system_experiments import Setting
-from workbench.wheelset.rig import (
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.rivals import Rivals
+from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
     Effects,
@@ -25,6 +20,11 @@ from workbench.wheelset.rig import (
     proposed_stop,
     stop_of,
 )
+from workbench.recordings.case import Case, read_case
+from workbench.studies.design import NextStop, RankedExperiment, foreseen, next_stop
+from workbench.studies.design.candidates import Experiment, every_setting
+from workbench.system.experiments import Setting
+from workbench.system.system import System
 
 from .distances import parted
 from .recordings import record

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case
-from workbench.cosim import Ending, Run
-from workbench.objective import judged_window, low_pass, score
-from workbench.system import System
+from workbench.observers.run import Ending, Run
+from workbench.observers.score import judged_window, low_pass, score
+from workbench.recordings.case import Case
+from workbench.system.system import System
 
 
 def stop(Fx: np.ndarray | None, step: float = 0.005) -> Case:

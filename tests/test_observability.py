@@ -10,13 +10,21 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from workbench.__main__ import main
-from workbench.expression import Expression
-from workbench.fmu import FMU, Vector
-from workbench.information import SampledModel, bounds, exponentials, gramians
-from workbench.observability import linear_test, linearise_along, prior
+from workbench.arrays import Vector
+from workbench.models.fmu import FMU
 from workbench.observers import operating
-from workbench.system import OperatingPoint
-from workbench.systems import load_system
+from workbench.observers.observability import (
+    SampledModel,
+    bounds,
+    exponentials,
+    gramians,
+    linear_test,
+    linearise_along,
+    prior,
+)
+from workbench.system.expression import Expression
+from workbench.system.registry import load_system
+from workbench.system.system import OperatingPoint
 
 from .page_rules import check_page
 from .schemas import check

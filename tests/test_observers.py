@@ -9,24 +9,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import solve_continuous_lyapunov
 
-from workbench.case import Case, read_cases
-from workbench.cosim import Ending, replay
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.kernel import solve
-from workbench.objective import judged_window, low_pass, score
-from workbench.observers import Estimator, Gains, estimators
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.kalman import ExtendedKalmanFilter, carry
-from workbench.observers.open_loop import OpenLoop
+from workbench.machines.wheelset.estimators import inversion
+from workbench.machines.wheelset.estimators.inversion import DirectInversion
+from workbench.machines.wheelset.estimators.parameter import WheelsetParameterEstimator
+from workbench.models.fmu import FMU
+from workbench.models.native import solve
+from workbench.observers import Estimator, Gains, estimators_of
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter, carry
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.estimators.parameter import ParameterEstimator
+from workbench.observers.estimators.unscented import UnscentedKalmanFilter
 from workbench.observers.operating import settle, walks
-from workbench.observers.parameter import ParameterEstimator
-from workbench.observers.unscented import UnscentedKalmanFilter
-from workbench.system import System
-from workbench.systems import load_system
-from workbench.wheelset.estimators import inversion
-from workbench.wheelset.estimators.inversion import DirectInversion
-from workbench.wheelset.estimators.parameter import WheelsetParameterEstimator
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending
+from workbench.observers.score import judged_window, low_pass, score
+from workbench.recordings.case import Case, read_cases
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 SECONDS, STEP = 24.0, 0.005
@@ -113,9 +114,9 @@ def stop(fmu: FMU) -> Stop:
 
 
 WHEELSET = load_system("wheelset")
-ESTIMATORS = list(estimators(WHEELSET))
+ESTIMATORS = list(estimators_of(WHEELSET))
 OBSERVERS = ESTIMATORS[2:]  # the others are baselines
-ONLINE = [name for name, kind in estimators(WHEELSET).items() if not kind.offline]
+ONLINE = [name for name, kind in estimators_of(WHEELSET).items() if not kind.offline]
 COLUMNS = list(WHEELSET.columns)
 
 
@@ -126,7 +127,7 @@ def made(fmu: FMU, root: Path, system: System) -> Iterator[dict[str, Estimator]]
         by_role = {"observer": fmu, "full": full}
         yield {
             name: kind(by_role[kind.role], system, kind.reasoned(by_role[kind.role], system))
-            for name, kind in estimators(system).items()
+            for name, kind in estimators_of(system).items()
         }
 
 
@@ -263,7 +264,7 @@ def test_observers_run_on_the_full_model_too(fmu: FMU, stop: Stop, root: Path, n
     """Whose suspension and rocker swing without being measured."""
     case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
-        kind = estimators(WHEELSET)[name]
+        kind = estimators_of(WHEELSET)[name]
         estimator = kind(full, WHEELSET, kind.reasoned(full, WHEELSET))
         judged = score(case, replay(case, estimator), WHEELSET)
         assert judged.nrmse is not None

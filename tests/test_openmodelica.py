@@ -13,8 +13,8 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
 from workbench.__main__ import main
-from workbench.compiler.openmodelica import Message, build_with_omc, errors_in
 from workbench.errors import InputError
+from workbench.models.compiler.openmodelica import Message, build_with_omc, errors_in
 
 CHECKED = (
     '"Check of Rig.M completed successfully.\nClass Rig.M has {} equation(s) and {} variable(s)."'

@@ -20,16 +20,16 @@ from scipy.integrate import solve_ivp
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, read_cases
 from workbench.diagnosis import Outcome, catalogue, diagnose
+from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.modelica import read_library
-from workbench.provenance import run_of
-from workbench.report.diagnosis import write_diagnosis
-from workbench.system import System
-from workbench.system_file import with_model
-from workbench.systems import load_system
+from workbench.models.fmu import FMU
+from workbench.models.modelica import read_library
+from workbench.pages.provenance import run_of
+from workbench.recordings.case import Case, read_cases
+from workbench.system.reader import with_model
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 LIBRARY = """within ;
 package Fan "A fan on an electric motor"

@@ -9,22 +9,22 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case, read_case
-from workbench.fmu import FMU
-from workbench.observability import case_observability, linear_test
+from workbench.models.fmu import FMU
 from workbench.observers import choose
-from workbench.provenance import run_of
-from workbench.report import case_figure, format_table, summarise_runs, write_estimates, write_page
-from workbench.report.observability import (
+from workbench.observers.observability import case_observability, linear_test
+from workbench.observers.observability_report import (
     draw_observability,
     format_observability,
     write_observability,
     write_windows,
 )
-from workbench.report.views import views
-from workbench.simulation import CaseResult, prepare, simulate
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.observers.report import format_table, summarise_runs, write_estimates, write_page
+from workbench.observers.simulation import CaseResult, case_figure, prepare, simulate
+from workbench.pages.provenance import run_of
+from workbench.pages.views import views
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from workbench import files
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.files import claimed, prove_writable, spared, write_whole
+from workbench.runtime import files
+from workbench.runtime.files import claimed, prove_writable, spared, write_whole
 
 COMMANDS = {
     "simulate": ["simulate", "cases/01_dry_80_1.5"],
@@ -82,7 +82,7 @@ def test_a_place_that_takes_no_results_is_refused_before_the_work(
 
 def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
     script = (
-        "from pathlib import Path; import os, sys; from workbench.files import claimed\n"
+        "from pathlib import Path; import os, sys; from workbench.runtime.files import claimed\n"
         "with claimed(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False)
@@ -92,7 +92,8 @@ def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
 
 def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) -> None:
     script = (
-        "from pathlib import Path; import os, sys, time; from workbench.files import claimed\n"
+        "from pathlib import Path; import os, sys, time\n"
+        "from workbench.runtime.files import claimed\n"
         "with claimed(Path(sys.argv[1])):\n"
         "    if os.fork(): time.sleep(60)\n"
         "    print(os.getpid(), flush=True); os.kill(os.getppid(), 9)\n"

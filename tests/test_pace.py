@@ -3,7 +3,7 @@
 import re
 from concurrent.futures import ThreadPoolExecutor
 
-from workbench.diagnosis.pace import Pace
+from workbench.runtime.progress import Pace
 
 
 def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:

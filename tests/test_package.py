@@ -11,8 +11,8 @@ import pytest
 
 import workbench
 from workbench.__main__ import main
-from workbench.commands import COMMANDS
-from workbench.installed import built_models
+from workbench.cli import COMMANDS
+from workbench.system.registry import built_models
 
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 OWN = ("modelica", "fmus", "cases")  # at the top level of a checkout, in the wheel as data
@@ -66,7 +66,7 @@ def test_a_name_that_is_not_public_is_refused() -> None:
 SOLVE = """
 import numba, numpy as np
 before = {key: getattr(numba.config, key) for key in dir(numba.config) if key.isupper()}
-from workbench.kernel import solve
+from workbench.models.native import solve
 a = np.array([[2.0, 6.0]])
 assert solve(a) == 0 and a[0, 1] == 3.0
 assert before == {key: getattr(numba.config, key) for key in before}

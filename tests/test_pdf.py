@@ -9,7 +9,7 @@ import lxml.html
 import pytest
 
 from workbench.__main__ import main
-from workbench.report.templates import number_of
+from workbench.pages.templates import number_of
 
 CASE = "01_dry_80_1.5"
 

@@ -7,11 +7,11 @@ import pytest
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
-from workbench.compiler.flat import flatten
 from workbench.diagnosis import choose, read_effects
-from workbench.diagnosis.extension import parameter_of, source, variables
+from workbench.diagnosis.effects.extension import parameter_of, source, variables
 from workbench.errors import InputError
-from workbench.modelica import Library, read_library
+from workbench.models.compiler.flat import flatten
+from workbench.models.modelica import Library, read_library
 
 ORCHARD = """package Orchard "Three trees that drink from one pipe"
   partial model PartialValves "Slot: from openings to flows"

@@ -20,21 +20,13 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from workbench.case import Case
-from workbench.objective import corner
 from workbench.observers import Gains, SearchSpace
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.pool import Pool
-from workbench.systems import load_system
-from workbench.tuning import (
-    Evaluator,
-    Job,
-    Plan,
-    Search,
-    evaluate_gains,
-    recording,
-    search,
-)
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.score import corner
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.system.registry import load_system
+from workbench.tuning import Evaluator, Job, Plan, Search, evaluate_gains, recording, search
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")

@@ -12,15 +12,15 @@ import pytest
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import read_case, read_cases
 from workbench.errors import InputError
-from workbench.plausibility import Origin, doubts
-from workbench.power import Repertoire
-from workbench.power.diagnosing import library_effects
-from workbench.prepare import read_recorded
-from workbench.systems import load_system
-from workbench.wheelset.planting import PLANTABLE, PlantedStops
-from workbench.wheelset.rig import SCENARIOS, Effects
+from workbench.machines.wheelset.planting import PLANTABLE, PlantedStops
+from workbench.machines.wheelset.rig import SCENARIOS, Effects
+from workbench.recordings.case import read_case, read_cases
+from workbench.recordings.datasets import read_recorded
+from workbench.recordings.plausibility import Origin, doubts
+from workbench.studies.power import Repertoire
+from workbench.studies.power.diagnosing import library_effects
+from workbench.system.registry import load_system
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings"
 REFERENCE = Path(__file__).parent.parent / "fmus" / "fmi2" / "Reference.fmu"

@@ -16,7 +16,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from workbench.errors import InputError, WorkerError
-from workbench.pool import Pool
+from workbench.runtime.pool import Pool
 
 from .processes import comes_true, ending, living
 
@@ -182,7 +182,7 @@ PLAIN = """
 import math, os, pickle, sys
 from contextlib import nullcontext
 from pathlib import Path
-from workbench.pool import Pool
+from workbench.runtime.pool import Pool
 
 print("program", flush=True)
 
@@ -200,7 +200,7 @@ assert sys.modules["__main__"].Mine is Mine
 WAITING = """
 import time
 from contextlib import nullcontext
-from workbench.pool import Pool
+from workbench.runtime.pool import Pool
 
 def worked(pool):
     for _ in pool.completed(time.sleep, []):

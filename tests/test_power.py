@@ -14,12 +14,22 @@ import pytest
 from scipy.stats import binom
 
 from workbench.__main__ import main
-from workbench.diagnosis.clocks import late_signals
-from workbench.diagnosis.extension import variables
-from workbench.diagnosis.thresholds import thresholds
+from workbench.diagnosis.data.clocks import late_signals
+from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.power import (
+from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
+from workbench.machines.wheelset.rig import (
+    CONSTANT_PADS,
+    SCENARIOS,
+    Effects,
+    Scenario,
+    plant,
+    simulate,
+)
+from workbench.models.fmu import FMU
+from workbench.pages.provenance import run_of
+from workbench.studies.power import (
     Diagnosed,
     Journal,
     NamedCause,
@@ -30,16 +40,12 @@ from workbench.power import (
     share,
     summarise,
 )
-from workbench.power.diagnosing import build_everything, library_effects
-from workbench.power.planned import SURE, clear, foresee
-from workbench.power.planting import Group, Kind
-from workbench.power.statistics import intervals_cover, named_all, named_right
-from workbench.provenance import run_of
-from workbench.report.power import format_power, write_power
-from workbench.report.power_checks import format_plan, write_plan
-from workbench.systems import load_system
-from workbench.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, Scenario, plant, simulate
+from workbench.studies.power.diagnosing import build_everything, library_effects
+from workbench.studies.power.planned import SURE, clear, foresee
+from workbench.studies.power.planting import Group, Kind
+from workbench.studies.power.report import format_plan, format_power, write_plan, write_power
+from workbench.studies.power.statistics import intervals_cover, named_all, named_right
+from workbench.system.registry import load_system
 
 from .page_rules import check_page
 from .processes import comes_true, living

@@ -10,14 +10,14 @@ import pytest
 import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.prepare import PREPARED, write_cases
+from workbench.recordings.datasets import PREPARED, write_cases
 
 TANKS = ("estimation/measured.csv", "test/measured.csv")
 PUMPS = """
 import hashlib
 from pathlib import Path
 import numpy as np
-from workbench.prepare import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
 
 def read(folder):
     names = (folder / "pumps.txt").read_text().split()

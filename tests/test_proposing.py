@@ -13,24 +13,23 @@ from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, multivariate_normal
 
 from workbench.__main__ import main
-from workbench.case import read_cases
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, given_values, read_effects
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import variables
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.prediction import Variation
-from workbench.diagnosis.slots import read_slots
-from workbench.fmu import Matrix
-from workbench.modelica import read_library
-from workbench.power.left_out import SHARES, summarise_left_out
-from workbench.proposing.periods import strongest_period
-from workbench.proposing.places import LawInfluence, places
-from workbench.proposing.splines import COEFFICIENTS, Knots, kernel, smoothest
-from workbench.recording import Vector
-from workbench.report.power_checks import format_left_out
-from workbench.system import OBSERVER
-from workbench.systems import load_system
-from workbench.template import AREA, OUTLET, write_system
+from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.effects.slots import read_slots
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.laws.periods import strongest_period
+from workbench.diagnosis.laws.places import LawInfluence, places
+from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.prediction import Variation
+from workbench.models.modelica import read_library
+from workbench.recordings.case import read_cases
+from workbench.studies.power.left_out import SHARES, summarise_left_out
+from workbench.studies.power.report import format_left_out
+from workbench.system.registry import load_system
+from workbench.system.system import OBSERVER
+from workbench.system.template import AREA, OUTLET, write_system
 
 from .page_rules import check_page
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 import workbench as wb
-from workbench.case import Case, read_case
 from workbench.diagnosis import choose, read_effects
-from workbench.modelica import read_library
-from workbench.power.function_error import function_error
-from workbench.system import OBSERVER, System
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case, read_case
+from workbench.studies.power.function_error import function_error
+from workbench.system.system import OBSERVER, System
 
 from .recordings import record
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.case import Case, read_cases
-from workbench.prepare import write_cases
-from workbench.systems import load_system
+from workbench.recordings.case import Case, read_cases
+from workbench.recordings.datasets import write_cases
+from workbench.system.registry import load_system
 
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")

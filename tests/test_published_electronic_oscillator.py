@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.api import diagnose
-from workbench.case import read_cases
-from workbench.published.electronic_oscillator import PUBLISHED, sharpened
-from workbench.systems import load_system
+from workbench.machines.published.electronic_oscillator import PUBLISHED, sharpened
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
 
 
 def test_lines_between_sharpened_samples_swing_as_the_signal_does() -> None:

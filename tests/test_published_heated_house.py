@@ -10,11 +10,11 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 
 from workbench.api import diagnose
-from workbench.case import Case, read_cases
+from workbench.arrays import Vector
 from workbench.diagnosis import Outcome
-from workbench.published.heated_house import PUBLISHED
-from workbench.recording import Vector
-from workbench.systems import load_system
+from workbench.machines.published.heated_house import PUBLISHED
+from workbench.recordings.case import Case, read_cases
+from workbench.system.registry import load_system
 
 SETTLED, FITTED = 144, 1152  # samples, 12 and 96 hours
 # Ci, Ce, Ch, Cs [kWh/K], Rie, Rea, Rih, Ris [K/kW], Aw, Ae [m2] of model TiTeThTsAe, as published.

@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.api import diagnose
-from workbench.case import read_cases
 from workbench.diagnosis import Outcome
-from workbench.prepare import PublishedRecording
-from workbench.published.leaking_chamber import PUBLISHED
-from workbench.systems import load_system
+from workbench.machines.published.leaking_chamber import PUBLISHED
+from workbench.recordings.case import read_cases
+from workbench.recordings.datasets import PublishedRecording
+from workbench.system.registry import load_system
 
 CHAMBERS = ("Aluminium", "Formlabs", "Prusa", "Ultimaker_015", "Ultimaker_020")
 

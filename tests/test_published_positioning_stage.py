@@ -9,9 +9,9 @@ from numpy.testing import assert_array_equal
 from scipy.io import savemat
 
 from workbench.api import diagnose
-from workbench.case import read_cases
-from workbench.published.positioning_stage import PUBLISHED
-from workbench.systems import load_system
+from workbench.machines.published.positioning_stage import PUBLISHED
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
 
 
 def test_the_record_with_pulses_is_held_out(tmp_path: Path) -> None:

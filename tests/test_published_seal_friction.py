@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench import published
-from workbench.published import seal_friction
+from workbench.machines import published
+from workbench.machines.published import seal_friction
 
 
 def test_rate_of_a_steady_stroke_is_exact_between_uneven_samples() -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import read_case
-from workbench.prepare import PREPARED
-from workbench.systems import load_system
+from workbench.recordings.case import read_case
+from workbench.recordings.datasets import PREPARED
+from workbench.system.registry import load_system
 
 SYSTEM = load_system("servo_pendulum")
 

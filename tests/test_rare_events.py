@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from scipy.special import stdtr
 from scipy.stats import chi2, norm, t
 
-from workbench.rare_events import Tail, descend, plain_runs
-from workbench.recording import Matrix, Vector
+from workbench.arrays import Matrix, Vector
+from workbench.studies.distance.rare_events import Tail, descend, plain_runs
 
 DECADES = range(1, 10)
 PROBABILITIES = 10.0 ** -np.arange(1.0, 10.0)

@@ -12,10 +12,10 @@ pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
 import casadi as ca
 
-from workbench.compiler.explicit import StateSpace, make_explicit
-from workbench.compiler.flat import flatten
 from workbench.errors import FMUError
-from workbench.fmu import FMU
+from workbench.models.compiler.explicit import StateSpace, make_explicit
+from workbench.models.compiler.flat import flatten
+from workbench.models.fmu import FMU
 
 LIBRARY = Path(__file__).parents[1] / "modelica" / "WheelsetRig" / "package.mo"
 RADIUS_WHEEL, RADIUS_ROLLER = 0.46, 0.70  # m

@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import read_case
 from workbench.diagnosis import read_effects
-from workbench.diagnosis.counting import count
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.thresholds import SOUND
-from workbench.experiments.candidates import Experiment, every_setting, other_profiles
-from workbench.experiments.recorded import recorded
-from workbench.fmu import FMU, CoSimulation
-from workbench.modelica import read_library
-from workbench.system_experiments import RELEASE
-from workbench.systems import load_system, model_path
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, stop_of
+from workbench.diagnosis.data.counting import count
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.inference.thresholds import SOUND
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, stop_of
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.modelica import read_library
+from workbench.recordings.case import read_case
+from workbench.studies.design.candidates import Experiment, every_setting, other_profiles
+from workbench.studies.design.recorded import recorded
+from workbench.system.experiments import RELEASE
+from workbench.system.registry import load_system, model_path
 
 from .recordings import REFERENCE, record
 

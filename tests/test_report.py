@@ -18,10 +18,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
+from workbench.observers import label
 from workbench.observers.gains import matrix_names
-from workbench.report.answers import standings, usual_error
-from workbench.report.views import label
-from workbench.system import System
+from workbench.observers.report import standings, usual_error
+from workbench.system.system import System
 
 from .page_rules import check_page
 
@@ -478,11 +478,11 @@ LIVE = """
 import sys
 from pathlib import Path
 import matplotlib.pyplot as plt
-from workbench.case import read_case
+from workbench.recordings.case import read_case
 from workbench.observers import choose
-from workbench.report import LiveWindow
-from workbench.simulation import prepare
-from workbench.systems import load_system
+from workbench.observers.report import LiveWindow
+from workbench.observers.simulation import prepare
+from workbench.system.registry import load_system
 
 system = load_system("wheelset")
 window = LiveWindow(system)

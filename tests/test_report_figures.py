@@ -16,17 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from workbench.case import Case
 from workbench.observers import choose
-from workbench.provenance import run_of
-from workbench.report import case_figure, summarise_runs, write_estimates, write_page
-from workbench.report.answers import standings
-from workbench.report.drawing import drawing, extremes
-from workbench.report.figures import DARK, LIGHT
-from workbench.report.packing import packed
-from workbench.simulation import CaseResult, prepare
-from workbench.system import System
-from workbench.systems import load_system
+from workbench.observers.report import standings, summarise_runs, write_estimates, write_page
+from workbench.observers.simulation import CaseResult, case_figure, prepare
+from workbench.pages.drawing import drawing, extremes, packed
+from workbench.pages.figures import DARK, LIGHT
+from workbench.pages.provenance import run_of
+from workbench.recordings.case import Case
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 PROVENANCE = {
     "run": run_of("simulate", load_system("wheelset"), {}),

@@ -11,7 +11,7 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.report.runs import compare_runs, differences, read_runs
+from workbench.pages.runs import compare_runs, differences, read_runs
 
 CASE = "01_dry_80_1.5"
 NAME = "worst error of Fx, ekf"

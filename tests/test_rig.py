@@ -15,11 +15,8 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
-from workbench.case import read_case, read_cases
 from workbench.errors import InputError
-from workbench.experiments import with_sensor
-from workbench.systems import load_system
-from workbench.wheelset.rig import (
+from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     ORDINARY_PADS,
     SCENARIOS,
@@ -32,7 +29,10 @@ from workbench.wheelset.rig import (
     simulate,
     stop_of,
 )
-from workbench.wheelset.rig.drive import Drive, Losses
+from workbench.machines.wheelset.rig.drive import Drive, Losses
+from workbench.recordings.case import read_case, read_cases
+from workbench.studies.design import with_sensor
+from workbench.system.registry import load_system
 
 from .processes import ending
 

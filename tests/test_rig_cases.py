@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from workbench.__main__ import main
-from workbench.case import read_cases
-from workbench.systems import load_system
-from workbench.wheelset.rig import STANDARD
+from workbench.machines.wheelset.rig import STANDARD
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"

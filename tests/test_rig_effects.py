@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.fmu import FMU
-from workbench.wheelset.rig import (
+from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
     Effects,
@@ -19,10 +18,11 @@ from workbench.wheelset.rig import (
     simulate,
     write_recording,
 )
-from workbench.wheelset.rig.brake import Brake, Valve
-from workbench.wheelset.rig.pads import Pads
-from workbench.wheelset.rig.run import MODE
-from workbench.wheelset.rig.wheel import OutOfRoundWheel
+from workbench.machines.wheelset.rig.brake import Brake, Valve
+from workbench.machines.wheelset.rig.pads import Pads
+from workbench.machines.wheelset.rig.run import MODE
+from workbench.machines.wheelset.rig.wheel import OutOfRoundWheel
+from workbench.models.fmu import FMU
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"

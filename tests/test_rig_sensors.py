@@ -8,9 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from workbench.case import read_case
-from workbench.systems import load_system
-from workbench.wheelset.rig import (
+from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
     StopTruth,
@@ -19,7 +17,9 @@ from workbench.wheelset.rig import (
     simulate,
     write_recording,
 )
-from workbench.wheelset.rig.sensors import FURTHER
+from workbench.machines.wheelset.rig.sensors import FURTHER
+from workbench.recordings.case import read_case
+from workbench.system.registry import load_system
 
 REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
 SEED = 1

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import lsq_linear
 
-from workbench.diagnosis.quadratic import Joint, Quadratic, RecordingSystem
-from workbench.diagnosis.rivals import Rival
-from workbench.fmu import Matrix, Vector
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.inference.quadratic import Joint, Quadratic, RecordingSystem
+from workbench.diagnosis.inference.rivals import Rival
 
 # Normal equations of numbers whose condition is some ten: rounding, and the solver's own tolerance.
 NEAR = {"rtol": 1e-6, "atol": 1e-7}

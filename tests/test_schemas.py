@@ -10,18 +10,17 @@ from typing import Any
 
 import pytest
 
-import workbench.template
+import workbench.system.template
 from workbench.__main__ import main
-from workbench.installed import system_files
-from workbench.schemas import gains_schema, summaries, system_schema
-from workbench.systems import load_system
+from workbench.cli.schemas import gains_schema, summaries, system_schema
+from workbench.system.registry import load_system, system_files
 
 from .schemas import check, validator
 
 PACKAGE = Path(workbench.__file__).parent
 SYSTEMS = {
     **system_files(),
-    "template": Path(workbench.template.__file__).with_name("system.toml"),
+    "template": Path(workbench.system.template.__file__).with_name("system.toml"),
 }
 READERS = (
     *("system_file", "system_tables", "recording_tables", "comparison_tables"),

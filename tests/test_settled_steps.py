@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import read_cases
-from workbench.diagnosis.evidence import Simulations
-from workbench.systems import load_system
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")

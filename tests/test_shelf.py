@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from workbench import shelf
+from workbench.models import fmu_cache
 
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(shelf.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
-    return shelf.folder()
+    monkeypatch.setattr(fmu_cache.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    return fmu_cache.folder()
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -
         path.write_bytes(b"an FMU")
 
     for target in (tmp_path / "one.fmu", tmp_path / "two.fmu"):
-        shelf.fetch("name", target, make)
+        fmu_cache.fetch("name", target, make)
         assert target.read_bytes() == b"an FMU"
     assert built == [tmp_path / "one.fmu"]
     assert [file.name for file in cache.iterdir()] == ["name.fmu"]
@@ -40,36 +40,36 @@ def test_what_was_damaged_is_built_again(cache: Path, tmp_path: Path, content: b
     def make(path: Path) -> None:
         path.write_bytes(b"an FMU")
 
-    shelf.fetch("name", tmp_path / "one.fmu", make)
+    fmu_cache.fetch("name", tmp_path / "one.fmu", make)
     (cache / "name.fmu").write_bytes(content)
-    shelf.fetch("name", tmp_path / "two.fmu", make)
+    fmu_cache.fetch("name", tmp_path / "two.fmu", make)
     assert (tmp_path / "two.fmu").read_bytes() == b"an FMU"
-    assert shelf.keep("name", make).read_bytes() == b"an FMU"
+    assert fmu_cache.keep("name", make).read_bytes() == b"an FMU"
     (cache / "name.fmu").write_bytes(content)
-    assert shelf.keep("name", make).read_bytes() == b"an FMU"
+    assert fmu_cache.keep("name", make).read_bytes() == b"an FMU"
 
 
 def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
     package = library / "package.mo"
-    before = shelf.key(package, "Model", "model Model end Model;")
-    assert before == shelf.key(package, "Model", "model Model end Model;")
-    assert before != shelf.key(package, "Model", "model Model Real x; end Model;")
+    before = fmu_cache.key(package, "Model", "model Model end Model;")
+    assert before == fmu_cache.key(package, "Model", "model Model end Model;")
+    assert before != fmu_cache.key(package, "Model", "model Model Real x; end Model;")
     package.write_text("package Library constant Real c = 1; end Library;")
-    assert before != shelf.key(package, "Model", "model Model end Model;")
+    assert before != fmu_cache.key(package, "Model", "model Model end Model;")
 
 
 def test_a_cache_that_cannot_be_written_costs_only_time(cache: Path, tmp_path: Path) -> None:
     cache.parent.write_text("a file where the folder should be")
-    shelf.fetch("name", tmp_path / "one.fmu", lambda path: path.write_bytes(b"an FMU"))
+    fmu_cache.fetch("name", tmp_path / "one.fmu", lambda path: path.write_bytes(b"an FMU"))
     assert (tmp_path / "one.fmu").read_bytes() == b"an FMU"
 
 
 def test_the_least_used_are_dropped(
     cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shelf, "_MOST", 8)
+    monkeypatch.setattr(fmu_cache, "_MOST", 8)
     for number in range(12):
-        shelf.fetch(f"{number}", tmp_path / "a.fmu", lambda path: path.write_bytes(b"an FMU"))
+        fmu_cache.fetch(f"{number}", tmp_path / "a.fmu", lambda path: path.write_bytes(b"an FMU"))
     assert len(list(cache.iterdir())) == 8
     assert (cache / "11.fmu").exists()
 
@@ -79,5 +79,5 @@ def test_a_build_that_fails_keeps_nothing(cache: Path, tmp_path: Path) -> None:
         raise ValueError("no such class")
 
     with pytest.raises(ValueError, match="no such class"):
-        shelf.fetch("name", tmp_path / "one.fmu", fail)
+        fmu_cache.fetch("name", tmp_path / "one.fmu", fail)
     assert not cache.exists()

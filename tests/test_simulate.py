@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
-from workbench.case import read_case
-from workbench.objective import low_pass
 from workbench.observers.gains import matrix_names
-from workbench.system import System
+from workbench.observers.score import low_pass
+from workbench.recordings.case import read_case
+from workbench.system.system import System
 
 from .test_figures import figures
 
@@ -207,7 +207,7 @@ def test_a_recording_without_force_is_estimated_but_not_judged(
 def test_an_estimator_that_fails_in_every_case_is_no_success(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tuned = (root / "workbench/wheelset/gains/disturbance_observer.toml").read_text()
+    tuned = (root / "workbench/machines/wheelset/gains/disturbance_observer.toml").read_text()
     gains = tmp_path / "gains.toml"
     gains.write_text(re.sub(r"^(L\w+ = ).*", r"\g<1>1e100", tuned, flags=re.MULTILINE))
     out = tmp_path / "out"

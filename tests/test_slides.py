@@ -9,22 +9,23 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.case import Case, read_cases
+from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, catalogue
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.fit import Fit
-from workbench.diagnosis.motion import motion
-from workbench.diagnosis.prediction import Predictor
-from workbench.diagnosis.samples import Samples, compared, prepare
-from workbench.diagnosis.simulator import Simulated, simulating
-from workbench.diagnosis.verdict import conclude
-from workbench.fmu import FMU, CoSimulation, Vector
-from workbench.modelica import read_library
-from workbench.system import System
-from workbench.systems import load_system
-from workbench.wheelset.rig import SCENARIOS, Effects, Scenario
-from workbench.wheelset.rig.scenarios import Patch
+from workbench.diagnosis.data.motion import motion
+from workbench.diagnosis.data.samples import Samples, compared, prepare
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.prediction import Predictor
+from workbench.diagnosis.simulation.simulator import Simulated, simulating
+from workbench.machines.wheelset.rig import SCENARIOS, Effects, Scenario
+from workbench.machines.wheelset.rig.scenarios import Patch
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case, read_cases
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 from .recordings import record
 

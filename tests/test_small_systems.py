@@ -12,18 +12,18 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.api import diagnose
-from workbench.case import check_recording, read_cases
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.best_estimate import bands, best_estimate
-from workbench.diagnosis.cleaning import deviation_of
-from workbench.diagnosis.motion import led_by, motion
+from workbench.diagnosis.data.cleaning import deviation_of
+from workbench.diagnosis.data.motion import led_by, motion
+from workbench.diagnosis.inference.best_estimate import bands, best_estimate
 from workbench.errors import InputError
-from workbench.fitness import check, is_fit
-from workbench.fmu import FMU, CoSimulation
+from workbench.models.checks import check, is_fit
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import corrected_states
-from workbench.system import System
-from workbench.systems import load_system, open_model
-from workbench.units import quantity
+from workbench.recordings.case import check_recording, read_cases
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+from workbench.system.units import quantity
 
 from .built import build_here
 

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from workbench.diagnosis.steps import step, steps
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import instance
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.simulation.steps import step, steps
+from workbench.models.fmu import FMU
+from workbench.models.native import instance
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler  # needs the extra
+from workbench.models import compiler  # needs the extra
 
 MODEL = """
 within ;

@@ -12,17 +12,17 @@ from numpy.testing import assert_allclose
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.case import Case
 from workbench.errors import InputError
-from workbench.fmu import CoSimulation
-from workbench.prepare import write_cases
-from workbench.rare_events import Tail
-from workbench.stopping import Distance, Effort
-from workbench.stopping.forecast import Forecaster, Question, dimension, forecasting
-from workbench.stopping.past import Known
-from workbench.stopping.plain import quantile
-from workbench.stopping.recorded import Stop, asked_stop, recorded
-from workbench.stopping.standard import (
+from workbench.models.fmu import CoSimulation
+from workbench.recordings.case import Case
+from workbench.recordings.datasets import write_cases
+from workbench.studies.distance import Distance, Effort
+from workbench.studies.distance.forecast import Forecaster, Question, dimension, forecasting
+from workbench.studies.distance.past import Known
+from workbench.studies.distance.plain import quantile
+from workbench.studies.distance.rare_events import Tail
+from workbench.studies.distance.recorded import Stop, asked_stop, recorded
+from workbench.studies.distance.standard import (
     StopConditions,
     equivalent_rate,
     nominal_rate,
@@ -30,10 +30,10 @@ from workbench.stopping.standard import (
     response_time,
     stopping_distance,
 )
-from workbench.system import OBSERVER, System
-from workbench.system_distance import Stopping
-from workbench.system_file import read_system
-from workbench.systems import load_system
+from workbench.system.reader import read_system
+from workbench.system.registry import load_system
+from workbench.system.stopping import Stopping
+from workbench.system.system import OBSERVER, System
 
 from .page_rules import check_page
 from .schemas import check

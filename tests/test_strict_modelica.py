@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.errors import InputError
-from workbench.modelica import check, read_library
+from workbench.models.modelica import check, read_library
 
 ROOT = Path(__file__).parent.parent
 LIBRARIES = sorted(path.parent for path in (ROOT / "modelica").glob("*/package.mo"))
@@ -249,7 +249,7 @@ def test_either_compiler_refuses_it_before_its_front_end_is_asked(
 ) -> None:
     pytest.importorskip("rumoca")
     pytest.importorskip("casadi")
-    from workbench.compiler import build, openmodelica  # needs the extra
+    from workbench.models.compiler import build, openmodelica  # needs the extra
 
     package = write(tmp_path, "model M Part part(slot(gain=2.0)); end M;")
     omc = tmp_path / "bin" / "omc"
@@ -269,7 +269,7 @@ def test_either_compiler_refuses_it_before_its_front_end_is_asked(
 def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
     """A component that the base inherits stays as it was, however right its redeclaration is."""
     pytest.importorskip("rumoca")
-    from workbench.compiler.flat import flatten  # needs the extra
+    from workbench.models.compiler.flat import flatten  # needs the extra
 
     text = "model N extends Part; end N; model M extends N(redeclare Named slot); end M;"
     message = r"redeclaration of 'slot', which Lib\.N inherits.*declare 'slot' in Lib\.N"
@@ -289,7 +289,7 @@ def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
 def test_a_value_that_the_front_end_would_lose_is_refused(text: str, tmp_path: Path) -> None:
     """It would go on with the default: a model with another number, and no word of it."""
     pytest.importorskip("rumoca")
-    from workbench.compiler.flat import flatten  # needs the extra
+    from workbench.models.compiler.flat import flatten  # needs the extra
 
     law = "model A parameter Real k(max=1.0) = 0.5; output Real y = k; end A; "
     with pytest.raises(

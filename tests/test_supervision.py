@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from workbench import scratch
-from workbench.fmu import FMU
-from workbench.scratch import Scratch
+from workbench.models.fmu import FMU
+from workbench.runtime import files
+from workbench.runtime.files import Scratch
 
 from .hostile_fmus import ROOT, needs_compiler, running, workbench
 from .processes import comes_true, living
@@ -79,7 +79,7 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 
 IN_A_CLASS = """\
 import os, signal, sys, time
-from workbench.supervision import supervised
+from workbench.runtime.supervision import supervised
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs in the background ignores it
 
@@ -120,10 +120,10 @@ def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(
 
 BESIDE_FILES = """\
 import os, signal, sys
-from workbench import scratch
-from workbench.supervision import supervised
+from workbench.runtime import files
+from workbench.runtime.supervision import supervised
 
-{which} = scratch.{which}
+{which} = files.{which}
 
 
 def asked_to_end(*given, **named):
@@ -131,7 +131,7 @@ def asked_to_end(*given, **named):
     return {which}(*given, **named)
 
 
-scratch.{which} = asked_to_end
+files.{which} = asked_to_end
 sys.exit(supervised(lambda: 0))
 """
 
@@ -229,7 +229,7 @@ def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    scratch.sweep.cache_clear()
+    files.sweep.cache_clear()
     return tmp_path
 
 
@@ -248,7 +248,7 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
     assert held.exists()
     assert (other / "file").exists()
     os.close(lock)
-    scratch.sweep.cache_clear()
+    files.sweep.cache_clear()
     Scratch().close()
     assert not held.exists()
     assert (named / "file").exists()
@@ -258,7 +258,7 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
 
 def test_folders_of_living_processes_stay(place: Path) -> None:
     with closing(Scratch()) as mine:
-        scratch.sweep.cache_clear()
+        files.sweep.cache_clear()
         with closing(Scratch()) as second:
             assert mine.path.exists()
             assert second.path != mine.path

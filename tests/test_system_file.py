@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from workbench.case import Case
 from workbench.errors import InputError
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 from workbench.observers import choose
-from workbench.system import System
-from workbench.system_file import read_system
-from workbench.systems import load_system, model_path, open_model
+from workbench.recordings.case import Case
+from workbench.system.reader import read_system
+from workbench.system.registry import load_system, model_path, open_model
+from workbench.system.system import System
 
 ROOT = Path(__file__).parent.parent
 OWN = ROOT / "modelica" / "WheelsetRig" / "system.toml"
@@ -343,8 +343,7 @@ def test_bands_of_no_estimator_are_refused(system: System) -> None:
 
 def test_every_key_that_is_read_stands_in_the_documentation() -> None:
     """Keys as the readers name them: refuse_unknown("..."), and the top level."""
-    readers = ("system_file", "system_tables", "comparison_tables", "experiment_tables")
-    sources = [ROOT / "workbench" / f"{name}.py" for name in readers]
+    sources = [ROOT / "workbench" / "system" / "reader.py"]
     read = set()
     for source in sources:
         for call in re.findall(r"refuse_unknown\(\s*((?:\"[^\"]*\"\s*)+)\)", source.read_text()):

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from workbench.diagnosis.steps import step, steps
-from workbench.diagnosis.tangent import advance, renew, tangent, tell
-from workbench.fmu import FMU
-from workbench.kernel import instance
-from workbench.recording import Matrix
+from workbench.arrays import Matrix
+from workbench.diagnosis.simulation.steps import step, steps
+from workbench.diagnosis.simulation.tangent import advance, renew, tangent, tell
+from workbench.models.fmu import FMU
+from workbench.models.native import instance
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler  # needs the extra
+from workbench.models import compiler  # needs the extra
 
 MODEL = """
 within ;

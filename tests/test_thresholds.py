@@ -13,18 +13,18 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
-from workbench.diagnosis.thresholds import thresholds
-from workbench.power import Diagnosed, NamedCause, Planting, diagnose_sets, open_virtual_rig
-from workbench.power.diagnosing import build_everything, diagnose_set, library_effects
-from workbench.power.planting import plan_sheet_errors, some
-from workbench.power.run import Setup
-from workbench.power.sensitivity import FACTORS, Varied, changed, values, vary
-from workbench.power.sheet import named_wrong, summarise_sheet
-from workbench.report.power_checks import format_sheet, format_thresholds
-from workbench.system_comparison import RATE
-from workbench.systems import load_system
-from workbench.wheelset.planting import SHEET_ERRORS, PlantedStops
-from workbench.wheelset.rig import SCENARIOS, Scenario
+from workbench.diagnosis.inference.thresholds import thresholds
+from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops
+from workbench.machines.wheelset.rig import SCENARIOS, Scenario
+from workbench.studies.power import Diagnosed, NamedCause, Planting, diagnose_sets, open_virtual_rig
+from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
+from workbench.studies.power.planting import plan_sheet_errors, some
+from workbench.studies.power.report import format_sheet, format_thresholds
+from workbench.studies.power.run import Setup
+from workbench.studies.power.sensitivity import FACTORS, Varied, changed, values, vary
+from workbench.studies.power.sheet import named_wrong, summarise_sheet
+from workbench.system.comparison import RATE
+from workbench.system.registry import load_system
 
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"

@@ -10,14 +10,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 import workbench as wb
-from workbench.case import Case, read_cases
 from workbench.diagnosis import read_effects
-from workbench.diagnosis.extension import source
+from workbench.diagnosis.effects.extension import source
 from workbench.errors import InputError
-from workbench.modelica import read_library
-from workbench.prepare import write_cases
-from workbench.system import OBSERVER, System
-from workbench.systems import load_system
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case, read_cases
+from workbench.recordings.datasets import write_cases
+from workbench.system.registry import load_system
+from workbench.system.system import OBSERVER, System
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
 TIME = np.arange(0.0, 20.0, 0.02)

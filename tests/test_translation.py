@@ -14,13 +14,13 @@ import pytest
 pytest.importorskip("casadi")
 
 from workbench.errors import InputError
-from workbench.export.translation import Array, Data, Number, Program
-from workbench.export.translation.data import contents
-from workbench.export.translation.values import DOUBLE
-from workbench.kernel import compiled
+from workbench.models.native import compiled
+from workbench.observers.export.translation import Array, Data, Number, Program
+from workbench.observers.export.translation.data import contents
+from workbench.observers.export.translation.values import DOUBLE
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
-HELPERS = Path(__file__).parent.parent / "workbench" / "export" / "law.c"
+HELPERS = Path(__file__).parent.parent / "workbench" / "observers" / "export" / "law.c"
 LENGTH, ROWS, COLUMNS = 5, 3, 4
 _SHARE = 0.25
 VECTOR = Array(DOUBLE, (LENGTH,), (1,), constant=False)

@@ -14,12 +14,12 @@ from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.files import write_whole
 from workbench.observers import Gains
 from workbench.observers.gains_file import format_gains, read_gains
-from workbench.simulation import prepare
-from workbench.system import System
-from workbench.systems import open_model
+from workbench.observers.simulation import prepare
+from workbench.runtime.files import write_whole
+from workbench.system.registry import open_model
+from workbench.system.system import System
 from workbench.tuning import tunable
 
 CASES = ("03_dry_120_3.6", "08_wet_120_3.6")

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.case import Case
-from workbench.cosim import replay
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.objective import score
-from workbench.observers import estimators
-from workbench.observers.disturbance import DisturbanceObserver
+from workbench.models.fmu import FMU
+from workbench.observers import estimators_of
+from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.gains_file import usual_gains
-from workbench.pool import Pool
-from workbench.system import System
-from workbench.systems import open_model
+from workbench.observers.replay import replay
+from workbench.observers.score import score
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.system.registry import open_model
+from workbench.system.system import System
 from workbench.tuning import (
     Candidate,
     Evaluator,
@@ -54,7 +54,7 @@ def test_planted_gains_are_found(
 ) -> None:
     """The force is replaced by what known gains estimate, so that these have z = 0."""
     name = "parameter_estimator"
-    kind = estimators(system)[name]
+    kind = estimators_of(system)[name]
     with open_model(system, kind.role) as fmu:
         reasoned = kind.reasoned(fmu, system)
         planted = reasoned.values * [1, 1, 0.5, 2, 1, 2, 1, 0.5]
@@ -248,7 +248,7 @@ def test_without_a_load_cell_gains_are_judged_as_with_one(
     blind = [case.without(["Fx"]) for case in stop_beginnings]
     estimated = pose(system, name, blind, {}, "smoother").job
     with open_model(system) as fmu:
-        tuned = usual_gains(estimators(system)[name], fmu, system).values
+        tuned = usual_gains(estimators_of(system)[name], fmu, system).values
     candidates = [measured.gains.values, tuned]
     z = [evaluate_gains(inline(job), job, candidates) for job in (measured, estimated)]
     by_cell, by_smoother = (after - before for before, after in z)

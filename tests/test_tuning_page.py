@@ -18,10 +18,10 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from workbench.observers import Gains, estimators
-from workbench.report.tuning import write_tuning_page
-from workbench.system import System
-from workbench.systems import load_system, open_model
+from workbench.observers import Gains, estimators_of
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+from workbench.tuning.report import write_tuning_page
 
 from .page_rules import check_page
 from .processes import ending
@@ -292,12 +292,12 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page: Any, summary: dict[
     assert table.at["L43", "what it does"] == "rate of dmuDC by ∫ omegaW"
 
 
-TUNABLE = [name for name, kind in estimators(load_system("wheelset")).items() if kind.tunable]
+TUNABLE = [name for name, kind in estimators_of(load_system("wheelset")).items() if kind.tunable]
 
 
 def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:
     """Reasoned gains of an estimator, and what it tells of them."""
-    kind = estimators(system)[estimator]
+    kind = estimators_of(system)[estimator]
     with open_model(system, kind.role) as fmu:
         gains = kind.reasoned(fmu, system)
         return gains, kind.meanings(fmu, system, gains)
@@ -317,7 +317,7 @@ def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
 ) -> None:
     gain, effect = changed["gains"]["L11"], changed["sensitivity"]["L11"]
     _, meanings = told(system, "ekf")
-    changed |= {"estimator": "ekf", "label": estimators(system)["ekf"].label}
+    changed |= {"estimator": "ekf", "label": estimators_of(system)["ekf"].label}
     changed["gains"] = {
         name: gain | {"meaning": meaning, "unit": unit}
         for name, (meaning, unit) in meanings.items()

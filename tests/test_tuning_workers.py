@@ -21,8 +21,8 @@ from numpy.testing import assert_array_equal
 
 import workbench
 from workbench.errors import InputError
-from workbench.files import before_last
-from workbench.pool import Pool
+from workbench.runtime.files import before_last
+from workbench.runtime.pool import Pool
 from workbench.tuning import (
     Candidate,
     Evaluation,
@@ -100,7 +100,7 @@ def test_a_cluster_finds_the_same_gains(
     problem: Problem, pool: Pool[Evaluator], tmp_path: Path
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
@@ -195,7 +195,7 @@ def scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 def test_a_cluster_without_workers_is_refused_in_words(
     scheduler: tuple[str, object], problem: Problem
 ) -> None:
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     with pytest.raises(InputError, match=r"found no workers; .* start workers with 'dask worker"):
         DaskPool(scheduler[0], Evaluator, problem.job, 60.0, patience=1.0)
@@ -206,14 +206,14 @@ def test_only_workers_with_the_same_code_get_work(
 ) -> None:
     """One lacks the project, one has a constant of its objective otherwise."""
     distributed = pytest.importorskip("distributed")
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     address, _ = scheduler
     lacking, other = tmp_path / "lacking", tmp_path / "other"
     lacking.mkdir()
     (lacking / "sitecustomize.py").write_text(BLOCK)
     shutil.copytree(Path(workbench.__file__).parent, other / "workbench")
-    changed = other / "workbench" / "objective.py"
+    changed = other / "workbench" / "observers" / "score.py"
     changed.write_text(changed.read_text() + "\nBETTER = 2.0\n")
     warnings: list[str] = []
     with worker(address, lacking), worker(address, other):
@@ -241,7 +241,7 @@ def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
     pool: Pool[Evaluator],
     tmp_path: Path,
 ) -> None:
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     address, process = scheduler
     warnings: list[str] = []
@@ -270,7 +270,7 @@ def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
 def test_a_cluster_whose_workers_are_gone_says_so(
     scheduler: tuple[str, object], problem: Problem, tmp_path: Path
 ) -> None:
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     address, _ = scheduler
     with worker(address) as process:
@@ -296,7 +296,7 @@ def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
     interpreter waits for; a client may wait for ever there for a result that it knows is made."""
     import distributed
 
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     async def never(client: object, futures: object) -> None:
         await asyncio.Event().wait()

@@ -9,14 +9,15 @@ import pytest
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench import compiler, resources, shelf
-from workbench.compiler.flat import flatten
 from workbench.diagnosis import read_effects
-from workbench.diagnosis.extension import build, source
-from workbench.diagnosis.slots import read_slots
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.slots import read_slots
 from workbench.errors import InputError
-from workbench.fmu import FMU
-from workbench.modelica import packages, read_library
+from workbench.models import compiler, fmu_cache
+from workbench.models.compiler.flat import flatten
+from workbench.models.fmu import FMU
+from workbench.models.modelica import packages, read_library
+from workbench.runtime import resources
 
 STAGE = """package Stage "A stage on rails"
   import Common = Effects;
@@ -103,17 +104,17 @@ def test_a_library_that_is_nowhere_is_refused_with_its_line(tmp_path: Path) -> N
     with pytest.raises(InputError, match=message):
         read_library(file)
     with pytest.raises(InputError, match=message):
-        shelf.key(file)
+        fmu_cache.key(file)
     with pytest.raises(InputError, match=message):
         compiler.build(file, "Stage.Base", tmp_path / "a.fmu", platforms=[compiler.native()])
 
 
 def test_a_change_of_a_used_library_is_another_fmu(tmp_path: Path) -> None:
     file, own = stage(tmp_path), own_effects(tmp_path)
-    before = shelf.key(file), compiler.source_hash(file)
+    before = fmu_cache.key(file), compiler.source_hash(file)
     law = own.parent / "Friction" / "Dry.mo"
     law.write_text(law.read_text().replace("tanh(v/v0)", "sin(v/v0)"))
-    after = shelf.key(file), compiler.source_hash(file)
+    after = fmu_cache.key(file), compiler.source_hash(file)
     assert before[0] != after[0]
     assert before[1] != after[1]
 

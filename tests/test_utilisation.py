@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import Case, read_case
-from workbench.cosim import Run, replay
-from workbench.fmu import FMU
+from workbench.machines.wheelset.claims import PeakForce
+from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.system import System
-from workbench.systems import load_system
-from workbench.wheelset.claims import PeakForce
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.replay import replay
+from workbench.observers.run import Run
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system
+from workbench.system.system import System
 
 COLUMNS = list(load_system("wheelset").columns)
 RR, NOMINAL = 0.70, 0.15

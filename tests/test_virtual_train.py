@@ -11,15 +11,15 @@ from numpy.testing import assert_allclose
 from tests import growth
 from workbench.__main__ import main
 from workbench.api import observe
-from workbench.case import Case, read_cases
-from workbench.diagnosis.verdict import Cause
+from workbench.arrays import Matrix
+from workbench.diagnosis.inference.verdict import Cause
 from workbench.errors import InputError
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.power import Planting, Repertoire, read_recorded_sets
-from workbench.power.diagnosing import build_everything, diagnose_set, library_effects
-from workbench.published.train.planting import PLANTABLE, PlantedTrain, virtual_rig
-from workbench.recording import Matrix
-from workbench.systems import load_system, open_model
+from workbench.machines.train.planting import PLANTABLE, PlantedTrain, virtual_rig
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.recordings.case import Case, read_cases
+from workbench.studies.power import Planting, Repertoire, read_recorded_sets
+from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
+from workbench.system.registry import load_system, open_model
 
 SYSTEM = load_system("train")
 TRUE_TO_SHEET = {"tolerances": -1.0, "noise": -1.0}

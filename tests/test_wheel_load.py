@@ -6,17 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.case import Case, read_case
-from workbench.cosim import Run, replay
-from workbench.diagnosis.counting import count
-from workbench.diagnosis.thresholds import SOUND
+from workbench.cli.schemas import case_schema
+from workbench.diagnosis.data.counting import count
+from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
-from workbench.expression import Expression
-from workbench.fmu import FMU
-from workbench.observers import estimators
-from workbench.schemas import case_schema
-from workbench.systems import load_system, model_path
-from workbench.wheelset.rig import CONSTANT_PADS, SCENARIOS, simulate
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, simulate
+from workbench.models.fmu import FMU
+from workbench.observers import estimators_of
+from workbench.observers.replay import replay
+from workbench.observers.run import Run
+from workbench.recordings.case import Case, read_case
+from workbench.system.expression import Expression
+from workbench.system.registry import load_system, model_path
 
 from .recordings import REFERENCE, record
 
@@ -43,7 +44,7 @@ def unsaid(light: Case) -> Case:
 
 def open_loop(case: Case, role: str) -> Run:
     """A model of the rig by itself."""
-    kind = estimators(SYSTEM)["open_loop"]
+    kind = estimators_of(SYSTEM)["open_loop"]
     with FMU(model_path(SYSTEM, role)) as fmu:
         return replay(case, kind(fmu, SYSTEM, kind.reasoned(fmu, SYSTEM)))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from workbench.systems import load_system, open_model
+from workbench.system.registry import load_system, open_model
 
 PADS = 0.30  # friction of sound ones, as in the library
 _STEP, _COAST, _SPEED = 0.1, 15.0, 20.0  # s, s, m/s

@@ -19,20 +19,20 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.api import propose as propose
     from workbench.api import read_cases as read_cases
     from workbench.api import tune as tune
-    from workbench.case import Case as Case
-    from workbench.cosim import Run as Run
     from workbench.diagnosis import Outcome as Outcome
+    from workbench.diagnosis.laws import Proposal as Proposal
     from workbench.errors import FMUError as FMUError
     from workbench.errors import InputError as InputError
-    from workbench.experiments import NextStop as NextStop
-    from workbench.fmu import FMU as FMU
-    from workbench.monitoring import Monitored as Monitored
+    from workbench.models.fmu import FMU as FMU
     from workbench.observers import Gains as Gains
-    from workbench.proposing import Proposal as Proposal
-    from workbench.stopping import Distance as Distance
-    from workbench.stopping import Effort as Effort
-    from workbench.system import System as System
-    from workbench.systems import load_system as load_system
+    from workbench.observers.run import Run as Run
+    from workbench.recordings.case import Case as Case
+    from workbench.studies.design import NextStop as NextStop
+    from workbench.studies.distance import Distance as Distance
+    from workbench.studies.distance import Effort as Effort
+    from workbench.studies.monitoring import Monitored as Monitored
+    from workbench.system.registry import load_system as load_system
+    from workbench.system.system import System as System
     from workbench.tuning import Tuned as Tuned
 
 _MODULES = {

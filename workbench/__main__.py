@@ -9,13 +9,12 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.commands.options import command_line
-from workbench.commands.output import Output
-from workbench.commands.pdf import browser, print_page
-from workbench.confinement import confine
+from workbench.cli.output import Output
+from workbench.cli.parser import command_line
+from workbench.cli.pdf import browser, print_page
 from workbench.errors import FMUError, InputError, WorkerError
-from workbench.pool import preload
-from workbench.supervision import run_program, supervised
+from workbench.runtime.pool import preload
+from workbench.runtime.supervision import confine, run_program, supervised
 
 _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(run_confined())"
 

@@ -16,35 +16,34 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.case import Case, check_recording, read_only
-from workbench.case import read_cases as read_folders
-from workbench.conditions import read_conditions
-from workbench.cosim import Run, observed
 from workbench.diagnosis import Effect, Outcome, catalogue, choose
 from workbench.diagnosis import diagnose as diagnose_system
+from workbench.diagnosis.laws import Proposal, needs_law
+from workbench.diagnosis.laws import propose as propose_law
 from workbench.errors import InputError
-from workbench.experiments import NextStop
-from workbench.experiments import next_stop as next_experiment
-from workbench.files import claimed
-from workbench.installed import usual_system
-from workbench.mapping import Told, parse_named
-from workbench.modelica import Library, read_library
-from workbench.monitoring import RATE, Monitored
-from workbench.monitoring import monitor as watch_machine
+from workbench.models.modelica import Library, read_library
 from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
-from workbench.plausibility import Origin, doubts
-from workbench.prepare import read_recorded, write_cases
-from workbench.proposing import Proposal, needs_law
-from workbench.proposing import propose as propose_law
-from workbench.recording import header
-from workbench.stopping import Distance, Effort, distance_of_stop
-from workbench.system import System
-from workbench.systems import load_system
-from workbench.tables import Table
+from workbench.observers.replay import observed
+from workbench.observers.run import Run
+from workbench.recordings.case import Case, check_recording, read_conditions, read_only
+from workbench.recordings.case import read_cases as read_folders
+from workbench.recordings.channels import Told, parse_named
+from workbench.recordings.csv import header
+from workbench.recordings.datasets import read_recorded, write_cases
+from workbench.recordings.plausibility import Origin, doubts
+from workbench.runtime.files import claimed
+from workbench.studies.design import NextStop
+from workbench.studies.design import next_stop as next_experiment
+from workbench.studies.distance import Distance, Effort, distance_of_stop
+from workbench.studies.monitoring import RATE, Monitored
+from workbench.studies.monitoring import monitor as watch_machine
+from workbench.system.registry import load_system, usual_system
+from workbench.system.system import System
+from workbench.system.tables import Table
+from workbench.system.units import quantity, si_factor
 from workbench.tuning import Lines, Plan, Tuned, evaluators, pose
 from workbench.tuning import tune as tune_problem
-from workbench.units import quantity, si_factor
 
 
 def read_cases(
@@ -283,7 +282,7 @@ def propose(
     workers: int | None = None,
     report: Callable[[str], None] = print,
 ) -> Proposal:
-    """Infer a law for what no effect explains; see `workbench.proposing.propose`.
+    """Infer a law for what no effect explains; see `workbench.diagnosis.laws.propose`.
 
     Parameters
     ----------
@@ -316,7 +315,7 @@ def monitor(
     false_alarms: float = RATE,
     workers: int | None = None,
 ) -> Monitored:
-    """Say what has changed on a machine over many recordings; see `workbench.monitoring.monitor`.
+    """Say what has changed on a machine over many recordings; see `studies.monitoring.monitor`.
 
     Parameters
     ----------
@@ -347,7 +346,7 @@ def next_stop(
 ) -> NextStop:
     """Find the recording that tells apart what a diagnosis could not.
 
-    See `workbench.experiments.next_stop`.
+    See `workbench.studies.design.next_stop`.
 
     Parameters
     ----------
@@ -379,7 +378,7 @@ def distance(
     workers: int | None = None,
     report: Callable[[str], None] = print,
 ) -> Distance:
-    """Predict the distance of a stop from past ones; see `workbench.stopping`.
+    """Predict the distance of a stop from past ones; see `workbench.studies.distance`.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from importlib import import_module
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.supervision import supervised
+from workbench.runtime.supervision import supervised
 
 
 def _work() -> int:

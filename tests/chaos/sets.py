@@ -3,12 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-from workbench import resources
-from workbench.power import Planting, diagnose_sets
-from workbench.power.diagnosing import library_effects
-from workbench.systems import load_system
-from workbench.wheelset.planting import PlantedStops
-from workbench.wheelset.rig import SCENARIOS, Scenario
+from workbench.machines.wheelset.planting import PlantedStops
+from workbench.machines.wheelset.rig import SCENARIOS, Scenario
+from workbench.runtime import resources
+from workbench.studies.power import Planting, diagnose_sets
+from workbench.studies.power.diagnosing import library_effects
+from workbench.system.registry import load_system
 
 GROUPS = [
     (Planting("clean", 11, 0.0, {}, ()),),

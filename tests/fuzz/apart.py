@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz.harness import LONGEST, Hang
-from workbench import foreign
 from workbench.errors import WorkerError
-from workbench.foreign.contents import Contents
-from workbench.pool import Pool
+from workbench.recordings import formats
+from workbench.recordings.formats.contents import Contents
+from workbench.runtime.pool import Pool
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def one_process() -> Iterator[None]:
                     raise Hang from None
                 raise
 
-        patch.setattr(foreign, "_apart", apart)
+        patch.setattr(formats, "_apart", apart)
         yield
 
 
@@ -39,4 +39,4 @@ def _quiet(_: None) -> Iterator[None]:
 
 
 def _read(_: None, module: str, path: Path, raw: bytes) -> Contents:
-    return foreign._here(module, path, raw)
+    return formats._here(module, path, raw)

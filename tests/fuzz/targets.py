@@ -15,20 +15,20 @@ from tests.case_folders import LINES, TOML
 from tests.fuzz.harness import Target
 from tests.fuzz.mutations import BYTES, SMALL, Files, change_one, mutate, zipped
 from tests.recorder_files import FORMATS, recorded
-from workbench import resources
-from workbench.case import Case, read_case, read_file
-from workbench.description import Description, read_description
-from workbench.fmu import FMU
-from workbench.mapping import NamedChannel, Told
-from workbench.modelica import check, read_library
+from workbench.models.description import Description, read_description
+from workbench.models.fmu import FMU
+from workbench.models.modelica import check, read_library
 from workbench.observers.gains import Gains
 from workbench.observers.gains_file import read_gains
-from workbench.power.journal import Diagnosed, Journal
-from workbench.power.planting import Planting
-from workbench.system import System
-from workbench.system_file import read_system
-from workbench.systems import load_system, open_model
-from workbench.template import write_system
+from workbench.recordings.case import Case, read_case, read_file
+from workbench.recordings.channels import NamedChannel, Told
+from workbench.runtime import resources
+from workbench.studies.power.journal import Diagnosed, Journal
+from workbench.studies.power.planting import Planting
+from workbench.system.reader import read_system
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+from workbench.system.template import write_system
 from workbench.tuning import tunable
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 
@@ -148,7 +148,9 @@ def _gains(system: System) -> Target:
     name = "disturbance_observer"
     with open_model(system) as model:
         reasoned = {name: tunable(system, name).reasoned(model, system)}
-    source = Path(__file__).parents[2] / "workbench" / "wheelset" / "gains" / f"{name}.toml"
+    source = (
+        Path(__file__).parents[2] / "workbench" / "machines" / "wheelset" / "gains" / f"{name}.toml"
+    )
 
     def impossible(gains: Gains) -> str:
         finite = np.isfinite(gains.values).all() and gains.names == reasoned[name].names

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from workbench.fmu import FMU, Matrix
+from workbench.arrays import Matrix
+from workbench.models.fmu import FMU
 from workbench.observers.operating import settle
-from workbench.system import System
+from workbench.system.system import System
 
 _POINTS = 64
 

@@ -6,9 +6,9 @@ import time
 from pathlib import Path
 
 from workbench.benchmark.observers import opened
-from workbench.case import Case, read_case
 from workbench.observers import Estimator
-from workbench.systems import load_system
+from workbench.recordings.case import Case, read_case
+from workbench.system.registry import load_system
 
 
 def first_call(estimator: Estimator, case: Case) -> float:

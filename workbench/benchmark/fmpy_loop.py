@@ -8,8 +8,9 @@ from ctypes import POINTER, c_double
 import numpy as np
 from fmpy import extract, instantiate_fmu, read_model_description
 
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.system import System
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.system.system import System
 
 
 @contextmanager

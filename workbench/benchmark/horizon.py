@@ -7,15 +7,16 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from workbench.case import Case
-from workbench.compiler.explicit import StateSpace, make_explicit
-from workbench.compiler.flat import flatten
-from workbench.fmu import FMU, Vector
-from workbench.observers.mhe import MovingHorizonEstimator
-from workbench.observers.window import Window
-from workbench.observers.window_cost import cost
-from workbench.system import OBSERVER, System
-from workbench.systems import open_model
+from workbench.arrays import Vector
+from workbench.models.compiler.explicit import StateSpace, make_explicit
+from workbench.models.compiler.flat import flatten
+from workbench.models.fmu import FMU
+from workbench.observers.estimators.moving_horizon.estimator import MovingHorizonEstimator
+from workbench.observers.estimators.moving_horizon.window import Window
+from workbench.observers.estimators.moving_horizon.window_cost import cost
+from workbench.recordings.case import Case
+from workbench.system.registry import open_model
+from workbench.system.system import OBSERVER, System
 
 _SAMPLES = 400  # timed, from the middle of the recording on
 _REPEATS = 7

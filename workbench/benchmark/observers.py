@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.arrays import Matrix, Vector
 from workbench.benchmark.memory import peak_memory
 from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
-from workbench.case import Case
-from workbench.fmu import Matrix, Vector
 from workbench.observers import Estimator, choose
-from workbench.observers.open_loop import OpenLoop
-from workbench.pool import Pool
-from workbench.system import FULL, OBSERVER, System
-from workbench.systems import open_model
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.system.registry import open_model
+from workbench.system.system import FULL, OBSERVER, System
 
 RATES = (200.0, 1000.0, 5000.0)  # Hz
 LENGTH = 4  # times the recording, for the growth with length

@@ -6,11 +6,11 @@ from types import ModuleType
 from typing import Any
 
 from workbench.benchmark.fmpy_loop import open_loop
-from workbench.companion import companion_part
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 from workbench.observers import Gains
-from workbench.observers.open_loop import OpenLoop
-from workbench.system import System
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.system.registry import companion_part
+from workbench.system.system import System
 
 Loop = Callable[..., object]  # of time, u and y, as Estimator.run
 

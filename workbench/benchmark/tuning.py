@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from workbench.benchmark.memory import watch_command
 from workbench.benchmark.other_ways import by_fmpy
-from workbench.case import Case
-from workbench.objective import samples
 from workbench.observers import Estimate, Estimator, choose
-from workbench.system import System
-from workbench.systems import open_model
+from workbench.observers.score import samples
+from workbench.recordings.case import Case
+from workbench.system.registry import open_model
+from workbench.system.system import System
 from workbench.tuning import (
     LIMIT,
     Candidate,
@@ -221,7 +221,7 @@ def _cluster(job: Job) -> Iterator[Workers]:
     """A pool on a Dask cluster of this machine."""
     from distributed import LocalCluster
 
-    from workbench.tuning.cluster import DaskPool
+    from workbench.runtime.cluster import DaskPool
 
     # Workers need a third of a gigabyte each, which nobody has to watch ten times a second.
     size = {"n_workers": WORKERS, "threads_per_worker": 1, "memory_limit": 0}

@@ -13,33 +13,33 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.case import Case
-from workbench.cosim import replay
-from workbench.diagnosis.catalogue import Effect, choose, read_effects
-from workbench.diagnosis.certainty import Certainty, assess
-from workbench.diagnosis.clocks import case_in_time, catalogue, late_signals
-from workbench.diagnosis.counting import refuse_too_few
-from workbench.diagnosis.evidence import Simulations
-from workbench.diagnosis.extension import build, parameter_of, source
-from workbench.diagnosis.fit import Fit
+from workbench.diagnosis.data.clocks import case_in_time, catalogue, late_signals
+from workbench.diagnosis.data.counting import refuse_too_few
+from workbench.diagnosis.effects.catalogue import Effect, choose, read_effects
+from workbench.diagnosis.effects.extension import build, parameter_of, source
+from workbench.diagnosis.inference.certainty import Certainty, assess
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.residuals import Dependence, Residuals, dependences, residuals
+from workbench.diagnosis.inference.rivals import gathered
+from workbench.diagnosis.inference.sample_errors import Errors, errors_of, held_out_errors
+from workbench.diagnosis.inference.search import Reporter
+from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, Interval, conclude
 from workbench.diagnosis.outcome import Extension, Outcome
-from workbench.diagnosis.pace import Pace
-from workbench.diagnosis.residuals import Dependence, Residuals, dependences, residuals
-from workbench.diagnosis.rivals import gathered
-from workbench.diagnosis.sample_errors import Errors, errors_of, held_out_errors
-from workbench.diagnosis.search import Reporter
-from workbench.diagnosis.simulator import delay, simulating
-from workbench.diagnosis.verdict import Cause, Diagnosis, Gain, Interval, conclude
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.simulator import delay, simulating
 from workbench.errors import InputError
-from workbench.files import write_whole
-from workbench.fmu import FMU
-from workbench.modelica import Library
-from workbench.objective import score
-from workbench.observers.disturbance import DisturbanceObserver
-from workbench.observers.kalman import ExtendedKalmanFilter
-from workbench.system import OBSERVER, System
-from workbench.system_file import with_model
-from workbench.systems import open_model
+from workbench.models.fmu import FMU
+from workbench.models.modelica import Library
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.score import score
+from workbench.recordings.case import Case
+from workbench.runtime.files import write_whole
+from workbench.runtime.progress import Pace
+from workbench.system.reader import with_model
+from workbench.system.registry import open_model
+from workbench.system.system import OBSERVER, System
 
 __all__ = [
     "Cause",

@@ -1,31 +1,35 @@
 """What a diagnosis found, as a value: a sentence, numbers, a table, a figure."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from html import escape
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from workbench.case import Case
-from workbench.diagnosis.certainty import Certainty
-from workbench.diagnosis.counting import FAULTY, MISSING
-from workbench.diagnosis.residuals import Dependence, Residuals
-from workbench.diagnosis.rivals import Rivals
-from workbench.diagnosis.sample_errors import Errors
-from workbench.diagnosis.search import Step
-from workbench.diagnosis.timing import Late
-from workbench.diagnosis.trial import Prospect
-from workbench.diagnosis.verdict import Cause, Diagnosis, Gain
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.counting import FAULTY, MISSING
+from workbench.diagnosis.inference.certainty import Certainty
+from workbench.diagnosis.inference.residuals import Dependence, Residuals
+from workbench.diagnosis.inference.rivals import Rivals
+from workbench.diagnosis.inference.sample_errors import Errors
+from workbench.diagnosis.inference.search import Step
+from workbench.diagnosis.inference.timing import Late
+from workbench.diagnosis.inference.trial import Prospect
+from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
-from workbench.lab import BAND, with_interval
-from workbench.system import Channel, Signal, System
-from workbench.units import si_factor
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from workbench.observers.simulation import CaseResult, case_figure
+from workbench.pages.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.pages.views import capital, named, per_shown, shown_unit
+from workbench.recordings.case import Case
+from workbench.system.system import Channel, Signal, System
+from workbench.system.units import BAND, si_factor, with_interval
 
 _MEASURE = (
     "root mean square of prediction errors, in means over {span}, on recordings that were held "
@@ -268,8 +272,7 @@ class Outcome:
         InputError
             If there is no such recording.
         """
-        from workbench.report.diagnosis_figures import recording_figures, shown_first
-        from workbench.report.figures import sheet
+        from workbench.pages.figures import sheet
 
         return sheet(shown_first(recording_figures(self), recording))
 
@@ -391,3 +394,313 @@ def _step(step: Step) -> dict[str, Any]:
             {"effect": rival.active[-1].name, "misfit": rival.misfit} for rival in step.rivals
         ],
     }
+
+
+NOMINAL, EXTENDED, NOISE = "0", "2", "raw"  # styles of curves
+
+
+FAST = 1  # block: what turns with a shaft does not last
+
+
+_BAND = 2.0  # standard deviations
+
+
+_ROOM = 1.1  # of a panel over its largest value
+
+
+@dataclass(frozen=True, eq=False)
+class Lasting:
+    """Prediction errors of a recording that last some blocks, at the middle of each.
+
+    Attributes
+    ----------
+    before, after : (b, c) running means, of the nominal and of the last model, by channel.
+    sigma : (b, c) their standard deviation by noise.
+    """
+
+    before: Matrix
+    after: Matrix
+    sigma: Matrix
+
+    def noises(self) -> tuple[Vector, Vector]:
+        """Root mean square before and after in units of the noise, (c,); noise leaves 1."""
+        before, after = (
+            np.sqrt(np.mean((errors / self.sigma) ** 2, axis=0))
+            for errors in (self.before, self.after)
+        )
+        return before, after
+
+
+def lasting_blocks(system: System) -> int:
+    """Blocks of half a lasting time: long enough for noise to fall, short enough to show a form."""
+    return max(1, round(0.5 * system.comparison.lasting / system.comparison.block))
+
+
+def lasting(one: Residuals, span: int) -> Lasting:
+    """Running means over a number of blocks, none across what was set aside."""
+    before, after, sigma = (np.empty_like(one.sigma) for _ in range(3))
+    for run in _runs(one.block_time):
+        before[run] = _sums(one.before[run], span) / _sums(np.ones_like(one.sigma[run]), span)
+        after[run] = _sums(one.after[run], span) / _sums(np.ones_like(one.sigma[run]), span)
+        sigma[run] = np.sqrt(_sums(one.sigma[run] ** 2, span)) / _sums(
+            np.ones_like(one.sigma[run]), span
+        )
+    return Lasting(before, after, sigma)
+
+
+def at_blocks(one: Residuals) -> dict[str, Vector]:
+    """Balances at the middle of each block, (b,), SI; they are smooth over more than a block."""
+    found = {}
+    for balance in one.balances:
+        known = np.isfinite(balance.values)
+        found[balance.name] = np.interp(one.block_time, one.time[known], balance.values[known])
+    return found
+
+
+def recording_figures(outcome: Outcome) -> list[CaseFigure]:
+    """Figures of all recordings, the one that shows best what was found first."""
+    system, found = outcome.system, outcome.diagnosis
+    added = [cause.effect.name for cause in found.causes] or found.partial
+    extension = f"with {', '.join(added)}" if added else ""
+    span = FAST if outcome.turns else lasting_blocks(system)
+    pairs = list(zip(outcome.residuals, outcome.cases, strict=True))
+    pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(found.causes)))
+    return [recording_figure(one, case, system, extension, span) for one, case in pairs]
+
+
+def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
+    """The figure of a recording by name, or the first one without a name.
+
+    Raises
+    ------
+    InputError
+        If there is no such recording.
+    """
+    known = {figure.name: figure for figure in figures}
+    if not recording:
+        return figures[0]
+    if recording not in known:
+        raise InputError(
+            where=f"recording '{recording}'",
+            found=f"no recording of this name{closest(recording, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    return known[recording]
+
+
+def _clearness(one: Residuals, span: int, found: bool) -> float:
+    """How clearly a recording shows what was found, or else how wrong the nominal model is."""
+    before, after = lasting(one, span).noises()
+    return float(np.max(before**2 - after**2 if found else before**2))
+
+
+def recording_figure(
+    one: Residuals, case: Case, system: System, extension: str, span: int
+) -> CaseFigure:
+    """Describe the figure of a recording: where and when the simulation is wrong, beyond noise.
+
+    Parameters
+    ----------
+    extension : what the last model is called; empty if nothing was added to the nominal one.
+    span : blocks over which errors are averaged, `lasting_blocks` or FAST.
+    """
+    errors = lasting(one, span)
+    gaps = [run.stop for run in _runs(one.block_time)[:-1]]
+
+    def parted(values: Vector) -> Vector:
+        return np.insert(values, gaps, np.nan)
+
+    middles = [0.5 * (one.block_time[gap - 1] + one.block_time[gap]) for gap in gaps]
+    panels = [_measured(system, name, one, case, parted) for name in _context(system)]
+    for c, channel in enumerate(one.channels):
+        panels.append(_errors(channel, errors, c, bool(extension), parted))
+    for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
+        factor = si_factor(balance.shown, balance.unit, balance.title)
+        curve = Curve("measured", parted(values / factor))
+        panels.append(_symmetric(balance.title, balance.shown, 0.8, [curve], curve.values))
+    legend = [
+        (NOMINAL, "error of the nominal model, levels calibrated"),
+        (NOISE, f"±{_BAND:g} standard deviations of the noise"),
+        ("measured", "measured" + "; residual of the nominal model" * bool(one.balances)),
+    ]
+    if extension:
+        legend.insert(1, (EXTENDED, f"error of the model {extension}"))
+    return CaseFigure(
+        name=case.name,
+        title=case.title,
+        finding=_finding(one.channels, errors, extension, span * system.comparison.block),
+        time=np.insert(one.block_time, gaps, middles),
+        window=None,
+        legend=tuple(legend),
+        panels=tuple(panels),
+    )
+
+
+def estimate_figure(result: CaseResult) -> CaseFigure:
+    """Describe the figure of the best estimates of a recording, by model."""
+    figure = case_figure(result, (NOMINAL, EXTENDED))
+    return replace(figure, name=f"{figure.name}, smoothed")
+
+
+def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[Path]) -> None:
+    """Draw what errors go with, before and after, to each path (PNG or SVG by suffix)."""
+    channels = list(dict.fromkeys(one["channel"] for one in dependences))
+    influences = list(dict.fromkeys(one["influence"] for one in dependences))
+    with mpl.rc_context(STYLE | {"axes.grid": False}):
+        sheet = Figure(figsize=(7.5, 4.0), layout="constrained")
+        plots = sheet.subplots(1, 2, sharey=True)
+        for axes, key in zip(plots, ("before", "after"), strict=True):
+            share = np.zeros((len(influences), len(channels)))
+            for one in dependences:
+                at = influences.index(one["influence"]), channels.index(one["channel"])
+                share[at] = 100.0 * one[key]
+            draw_heat(axes, share, 100.0)
+            axes.set_xticks(range(len(channels)), channels)
+            axes.set_yticks(range(len(influences)), influences)
+            axes.set_title({"before": "nominal model", "after": "with what was added"}[key])
+        sheet.suptitle("Share of an error's variance that follows an influence [%]")
+        save_figure(sheet, paths)
+
+
+def draw_confusability(
+    names: Sequence[str], cosines: Matrix, found: Sequence[str], paths: Iterable[Path]
+) -> None:
+    """Draw the similarity of the signatures of effects; those found are marked."""
+    with mpl.rc_context(STYLE | {"axes.grid": False, "font.size": 7}):
+        sheet = Figure(figsize=(9.0, 9.0), layout="constrained")
+        axes = sheet.subplots()
+        draw_heat(axes, 100.0 * cosines, 100.0, least=50.0)
+        marked = [f"▸ {name}" if name in found else name for name in names]
+        axes.set_xticks(range(len(names)), names, rotation=90)
+        axes.set_yticks(range(len(names)), marked)
+        axes.set_title("Similarity of signatures in these data: 100 cannot be told apart")
+        save_figure(sheet, paths)
+
+
+def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
+    """Draw the error of each recording, held out of the fit, before and after."""
+    recordings: Mapping[str, Mapping[str, float]] = gain["recordings"]
+    rows = [*recordings, "all recordings"]
+    before = [*(one["before"] for one in recordings.values()), gain["before"]]
+    after = [*(one["after"] for one in recordings.values()), gain["after"]]
+    with mpl.rc_context(STYLE):
+        sheet = Figure(figsize=(7.5, 1.5 + 0.3 * len(rows)), layout="constrained")
+        axes = sheet.subplots()
+        heights = range(len(rows))
+        axes.hlines(heights, after, before, color=LIGHT["raw"])
+        axes.plot(before, heights, "o", color=LIGHT[NOMINAL], label="nominal model")
+        axes.plot(after, heights, "D", color=LIGHT[EXTENDED], label="extended model")
+        interval = [gain["low"], gain["high"]]
+        axes.plot(
+            interval, [len(recordings)] * 2, "|-", color=LIGHT[EXTENDED], label="95 % interval"
+        )
+        axes.axvline(1.0, color=LIGHT["measured"], linewidth=0.8)
+        axes.set_xscale("log")
+        axes.set_yticks(heights, rows)
+        axes.invert_yaxis()
+        axes.set_xlabel("error on recordings held out, in units of the noise")
+        sheet.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+        save_figure(sheet, paths)
+
+
+def _runs(time: Vector) -> list[slice]:
+    """Blocks that follow each other."""
+    step = np.diff(time)
+    ends = np.flatnonzero(step > 1.5 * np.median(step)) + 1
+    edges = [0, *(int(end) for end in ends), time.size]
+    return [slice(begin, end) for begin, end in pairwise(edges)]
+
+
+def _sums(values: Matrix, span: int) -> Matrix:
+    """Running sums over `span` blocks along a run of them, (b, m)."""
+    window = np.ones(min(span, len(values)))
+    return np.column_stack([np.convolve(column, window, "same") for column in values.T])
+
+
+def _context(system: System) -> tuple[str, ...]:
+    """Signals that say what happens: the led one, and what begins a recording or all inputs."""
+    leading, begins = system.comparison.leading, system.comparison.begins
+    first = [leading.output] if leading is not None else []
+    driven = [one.name for one in system.inputs] if begins is None else [begins.signal]
+    return tuple(dict.fromkeys([*first, *driven]))
+
+
+def _measured(
+    system: System,
+    signal: str,
+    one: Residuals,
+    case: Case,
+    parted: Callable[[Vector], Vector],
+) -> Panel:
+    """A signal as measured, at the blocks."""
+    unit = shown_unit(system, signal)
+    factor = per_shown(system, signal, unit)
+    values = system.under(case.conditions).signal(signal, case.signals)
+    curve = Curve("measured", parted(np.interp(one.block_time, case.time, values / factor)))
+    low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
+    room = 0.08 * (high - low) or 1.0
+    title = f"{capital(named(system, signal))}, as measured [{unit}]"
+    return Panel(title, unit, low - room, high + room, 0.45, (curve,))
+
+
+def _errors(
+    channel: Channel,
+    errors: Lasting,
+    column: int,
+    extended: bool,
+    parted: Callable[[Vector], Vector],
+) -> Panel:
+    """Errors of a channel before and, if there is an extended model, after, against their noise."""
+    factor = _shown(channel)
+    sigma = errors.sigma[:, column] / factor
+    curves = [
+        Curve(NOISE, parted(np.zeros(sigma.size)), parted(_BAND * sigma)),
+        Curve(NOMINAL, parted(errors.before[:, column] / factor)),
+    ]
+    if extended:
+        curves.append(Curve(EXTENDED, parted(errors.after[:, column] / factor)))
+    shown = np.concatenate([curve.values for curve in curves] + [_BAND * sigma])
+    title = f"{capital(_called(channel))}: measured - predicted"
+    return _symmetric(title, channel.shown, 1.1, curves, shown)
+
+
+def _called(channel: Channel) -> str:
+    return channel.name if channel.label == channel.name else f"{channel.label} {channel.name}"
+
+
+def _shown(channel: Channel) -> float:
+    """SI value of a channel that is one of its shown unit."""
+    return si_factor(channel.shown, channel.unit, f"channel {channel.name}")
+
+
+def _symmetric(
+    title: str, unit: str, height: float, curves: Sequence[Curve], shown: Vector
+) -> Panel:
+    reach = _ROOM * float(np.nanmax(np.abs(shown))) or 1.0
+    return Panel(f"{title} [{unit}]", unit, -reach, reach, height, tuple(curves))
+
+
+def _finding(channels: Sequence[Channel], errors: Lasting, extension: str, seconds: float) -> str:
+    """Errors of each channel in units of their noise, and the largest in its own unit."""
+    before, after = errors.noises()
+    worst = int(np.argmax(before))
+    clearest = channels[worst]
+    rms = float(np.sqrt(np.mean(errors.before[:, worst] ** 2))) / _shown(clearest)
+    arrows = ", ".join(
+        f"{channel.name} {b:.1f}" + (f" to {a:.1f}" if extension else "")
+        for channel, b, a in zip(channels, before, after, strict=True)
+    )
+    change = f", from the nominal model to that {extension}" if extension else ""
+    return (
+        f"Errors in means over {duration(seconds)}, in units of their noise{change}: {arrows}. "
+        f"Clearest in {_called(clearest)}, {rms:.3g} {clearest.shown} rms with the nominal model."
+    )
+
+
+def draw_heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> None:
+    """A matrix of whole percents, written into their cells from `least` on."""
+    axes.imshow(percents, cmap="Blues", vmin=0.0, vmax=1.6 * most, aspect="auto")
+    for (row, column), value in np.ndenumerate(percents):
+        if value >= least:
+            axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7)

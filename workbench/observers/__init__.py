@@ -1,6 +1,6 @@
 """Estimators, stage 3: each turns measured inputs and outputs into an estimate, step by step.
 
-One file each; a new one is found by itself. A system's companion package may have more.
+One file each in `estimators`; a new one is found by itself. A system's plugin may have more.
 """
 
 import pkgutil
@@ -9,16 +9,16 @@ from functools import cache
 from importlib import import_module
 from types import ModuleType
 
-from workbench.companion import companion_part
 from workbench.errors import InputError, closest
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
-from workbench.system import System
+from workbench.system.registry import companion_part
+from workbench.system.system import System
 
-__all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators"]
+__all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators_of", "label"]
 
 
-def estimators(system: System) -> dict[str, type[Estimator]]:
+def estimators_of(system: System) -> dict[str, type[Estimator]]:
     """All estimators that run on a system, by name, in the order of tables.
 
     Raises
@@ -27,7 +27,7 @@ def estimators(system: System) -> dict[str, type[Estimator]]:
         If the system has bands of an estimator that there is not.
     """
     own = companion_part(system.companion, "estimators")
-    packages = [__name__] + ([own.__name__] if own else [])
+    packages = [f"{__name__}.estimators"] + ([own.__name__] if own else [])
     found = [kind for package in packages for kind in _estimators(package)]
     known = {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
     for name in system.bands:
@@ -43,12 +43,18 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
     InputError
         If there is none of a name.
     """
-    known = estimators(system)
+    known = estimators_of(system)
     for name in names:
         _refuse_unknown(name, known, f"estimator '{name}'")
     return {
         name: kind for name, kind in known.items() if (name in names if names else kind.standard)
     }
+
+
+def label(name: str, system: System) -> str:
+    """Name of an estimator for people."""
+    known = estimators_of(system)
+    return known[name].label if name in known else name.replace("_", " ")
 
 
 def _refuse_unknown(name: str, known: Mapping[str, type[Estimator]], where: str) -> None:
@@ -66,7 +72,8 @@ def _estimators(package: str) -> tuple[type[Estimator], ...]:
     """Estimators that the modules of a package define."""
     parent = import_module(package)
     modules = [
-        import_module(f"{package}.{one.name}") for one in pkgutil.iter_modules(parent.__path__)
+        import_module(module.name)
+        for module in pkgutil.walk_packages(parent.__path__, f"{package}.")
     ]
     return tuple(kind for module in modules for kind in _defined(module))
 

@@ -7,14 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from workbench.conditions import Value
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.kernel import Instance, checked, given, instance
+from workbench.models.fmu import FMU
+from workbench.models.native import Instance, checked, given, instance
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
-from workbench.system import OBSERVER, System
-from workbench.system_check import check_model
+from workbench.recordings.case import Value
+from workbench.system.check import check_model
+from workbench.system.system import OBSERVER, System
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.fmu import Matrix, Vector
-from workbench.units import quotient
+from workbench.arrays import Matrix, Vector
+from workbench.system.units import quotient
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from workbench.companion import companion_part
+from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Vector
+from workbench.models.fmu import FMU
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.system import System
-from workbench.tables import LARGEST, read_table, shown
+from workbench.system.registry import companion_part
+from workbench.system.system import System
+from workbench.system.tables import LARGEST, read_table, shown
 
 _AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
 

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.fmu import FMU, Vector
-from workbench.kernel import inlined, read, set_inputs, set_states
-from workbench.system import System
+from workbench.models.fmu import FMU
+from workbench.models.native import inlined, read, set_inputs, set_states
+from workbench.system.system import System
 
 
 class Layout(NamedTuple):

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.fmu import FMU, Matrix, Vector
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
 from workbench.observers.layout import layout
-from workbench.system import OperatingPoint, System
+from workbench.system.system import OperatingPoint, System
 
 _STEPS = 400  # of implicit Euler, which takes any model to rest
 

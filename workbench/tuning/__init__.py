@@ -3,12 +3,22 @@
 Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential evolution.
 """
 
+from workbench.runtime.pool import NoWorkersError
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
 from workbench.tuning.figures import draw_cases, draw_convergence
-from workbench.tuning.recipe import Lines, Problem, Progress, Tuned, pose, tunable, tune
+from workbench.tuning.recipe import (
+    Lines,
+    Problem,
+    Progress,
+    Tuned,
+    pose,
+    summarise_tuning,
+    tunable,
+    tune,
+    tuned_gains,
+)
 from workbench.tuning.search import Plan, Search, search
-from workbench.tuning.summary import summarise_tuning, tuned_gains
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
@@ -17,7 +27,7 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import LIMIT, NoWorkersError, Workers, evaluate_all, evaluators
+from workbench.tuning.workers import LIMIT, Workers, evaluate_all, evaluators
 
 __all__ = [
     "LIMIT",

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.files import before_last, sealed, unsealed, write_whole
-from workbench.fmu import Matrix, Vector
-from workbench.recording import read_text
+from workbench.runtime.files import before_last, read_text, sealed, unsealed, write_whole
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from workbench.case import Case
-from workbench.conditions import Value
+from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.fmu import FMU, Matrix, Vector
-from workbench.objective import corner, integrate, samples, weights
-from workbench.observers import Estimator, Gains, estimators
-from workbench.system import System
-from workbench.systems import open_file
+from workbench.models.fmu import FMU
+from workbench.observers import Estimator, Gains, estimators_of
+from workbench.observers.score import corner, integrate, samples, weights
+from workbench.recordings.case import Case, Value
+from workbench.system.registry import open_file
+from workbench.system.system import System
 from workbench.tuning.settling import Settling
 
 PIECES = 4  # of a recording; a call of a compiled loop costs as much as 200 of its samples
@@ -138,7 +138,7 @@ def load_model(job: Job) -> FMU:
 
 def job_estimator(job: Job, fmu: FMU, gains: Gains) -> Estimator:
     """The estimator of a job with some gains."""
-    return estimators(job.system)[job.estimator](fmu, job.system, gains)
+    return estimators_of(job.system)[job.estimator](fmu, job.system, gains)
 
 
 class Candidate(NamedTuple):
@@ -181,7 +181,7 @@ class Evaluator:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._fmu = load_model(job)
-        kind = estimators(job.system)[job.estimator]
+        kind = estimators_of(job.system)[job.estimator]
         names = list(kind.fed(job.system).columns)
         self._settling = Settling(self._fmu, job.system, kind) if job.follows else None
         self._judged = [names.index(name) for name in job.system.objective.weights]

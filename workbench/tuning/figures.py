@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from workbench.files import replacing, spared
+from workbench.runtime.files import replacing, spared
 from workbench.tuning.checkpoint import Generation
 
 

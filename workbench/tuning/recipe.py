@@ -3,7 +3,7 @@
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,17 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from workbench.case import Case
+from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, closest
-from workbench.fmu import Vector
-from workbench.observers import Estimator, Gains, SearchSpace, estimators
-from workbench.system import System
-from workbench.systems import open_model
+from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
+from workbench.observers.gains_file import format_gains
+from workbench.recordings.case import Case
+from workbench.runtime.pool import NoWorkersError
+from workbench.system.registry import open_model
+from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Job, recordings
 from workbench.tuning.reference import with_reference
 from workbench.tuning.search import Plan, Search, search
 from workbench.tuning.validation import (
+    NEGLIGIBLE,
     Fold,
     Sensitivity,
     cross_validate,
@@ -29,7 +32,7 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import NoWorkersError, Workers
+from workbench.tuning.workers import Workers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,13 +99,11 @@ class Tuned:
 
     def to_dict(self) -> dict[str, Any]:
         """All that is known of the tuning, as in summary.json."""
-        from workbench.tuning.summary import summarise_tuning
-
         return summarise_tuning(self, len(self.folds))
 
     def summary(self) -> str:
         """Table of cases, and what is to be said of gains and folds."""
-        from workbench.report.tuning import format_tuned
+        from workbench.tuning.report import format_tuned
 
         return format_tuned(self.to_dict())
 
@@ -208,7 +209,7 @@ def tunable(system: System, estimator: str) -> type[Estimator]:
     InputError
         If the system has none of this name.
     """
-    known = {name: kind for name, kind in estimators(system).items() if kind.tunable}
+    known = {name: kind for name, kind in estimators_of(system).items() if kind.tunable}
     if estimator not in known:
         raise InputError(
             where=f"estimator '{estimator}'",
@@ -311,3 +312,125 @@ class _Run:
             self.progress.warn(f"{error}; what the gains are worth is not known")
             return replace(tuned, interrupted=True)
         return tuned
+
+
+def tuned_gains(tuned: Tuned) -> str:
+    """The text of gains.toml, with what the gains come from."""
+    job, found = tuned.problem.job, tuned.search
+    at_bound = tuned.problem.space.at_bound(found.coordinates)
+    came_from = {
+        **_provenance(tuned),
+        "z": found.z,
+        "z_k": _by_case(tuned, found.z_k),
+        "generations": len(found.history) - 1,
+        "interrupted": found.interrupted,
+        "at_bound": [n for n, at in zip(job.gains.names, at_bound, strict=True) if at],
+    }
+    meaning = estimators_of(job.system)[job.estimator].meaning
+    return format_gains(job.gains.with_values(found.best), meaning, came_from)
+
+
+def summarise_tuning(tuned: Tuned, folds: int) -> dict[str, Any]:
+    """All that is known of a tuning, as it is written to summary.json.
+
+    Parameters
+    ----------
+    folds : asked for; an interruption may have left fewer.
+    """
+    found, history, job = tuned.search, tuned.search.history, tuned.problem.job
+    following = job.system.following if job.follows else None
+    before, after = (_by_case(tuned, z_k) for z_k in (tuned.before, found.z_k))
+    return {
+        "estimator": job.estimator,
+        "label": estimators_of(job.system)[job.estimator].label,
+        "judged": job.system.objective.judged,
+        "bandwidth": _finite(job.system.objective.bandwidth),
+        "follows": None if following is None else vars(following),
+        "z": found.z,
+        "z_reasoned": max(before.values()),
+        "cases": {
+            name: {
+                "z_k": after[name],
+                "z_k_reasoned": before[name],
+                "unstable": sum(g.unstable.get(name, 0) for g in history),
+            }
+            for name in after
+        },
+        "gains": _gains(tuned),
+        "sensitivity": {
+            e.gain: {
+                "less": _finite(e.less),
+                "more": _finite(e.more),
+                "without": _finite(e.without),
+                "matters": e.matters,
+            }
+            for e in tuned.sensitivities
+        },
+        "folds": [
+            {name: _finite(v) if isinstance(v, float) else v for name, v in asdict(fold).items()}
+            for fold in tuned.folds
+        ],
+        "beside": {
+            name: {
+                "label": estimators_of(job.system)[name].label,
+                "z": _finite(float(z_k.max())),
+                "worst": list(after)[int(z_k.argmax())],
+            }
+            for name, z_k in tuned.beside.items()
+        },
+        "work": {
+            "generations": len(history) - 1,
+            "candidates": sum(g.candidates for g in history),
+            "seconds": sum(g.seconds for g in history),
+            "saved": 1.0 - sum(g.samples for g in history) / sum(g.of for g in history),
+            "crashed": sum(g.crashed for g in history),
+            "interrupted": found.interrupted,
+            "converged": found.converged,
+            "as_good": len(_as_good(tuned)),
+            "last": len(found.last.z),
+            "folds": folds,
+        },
+        "convergence": [g.z for g in history],
+        "provenance": _provenance(tuned),
+    }
+
+
+def _provenance(tuned: Tuned) -> dict[str, Any]:
+    plan = tuned.plan
+    return {**tuned.problem.provenance, "seed": plan.seed, "population": plan.population}
+
+
+def _by_case(tuned: Tuned, z_k: Vector) -> dict[str, float]:
+    names = (recording.name for recording in tuned.problem.job.recordings)
+    return dict(zip(names, z_k.tolist(), strict=True))
+
+
+def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
+    job, space, found = tuned.problem.job, tuned.problem.space, tuned.search
+    names, reasoned = job.gains.names, job.gains.values
+    lower, upper = space.gains(np.array([np.zeros(len(names)), np.ones(len(names))]))
+    at_bound, as_good = space.at_bound(found.coordinates), _as_good(tuned)
+    return {
+        name: {
+            "meaning": tuned.problem.meanings[name][0],
+            "unit": tuned.problem.meanings[name][1],
+            "value": float(found.best[i]),
+            "reasoned": float(reasoned[i]),
+            "lower": float(lower[i]),
+            "upper": float(upper[i]),
+            "at_bound": bool(at_bound[i]),
+            "as_good": [float(as_good[:, i].min()), float(as_good[:, i].max())],
+        }
+        for i, name in enumerate(names)
+    }
+
+
+def _as_good(tuned: Tuned) -> Matrix:
+    """Gains of the last candidates whose z is the best but for what does not matter, (s, n)."""
+    last = tuned.search.last
+    return tuned.problem.space.gains(last.members[last.z <= (1.0 + NEGLIGIBLE) * last.z[0]])
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if np.isfinite(value) else None

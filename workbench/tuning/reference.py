@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
-from workbench.case import Case
-from workbench.cosim import Ending, observed
 from workbench.errors import InputError, closest
-from workbench.observers import estimators
-from workbench.system import System
+from workbench.observers import estimators_of
+from workbench.observers.replay import observed
+from workbench.observers.run import Ending
+from workbench.recordings.case import Case
+from workbench.system.system import System
 
 
 def with_reference(cases: Sequence[Case], system: System, estimator: str) -> list[Case]:
@@ -23,7 +24,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
     InputError
         If there is no such estimator, or it fails.
     """
-    known = {name: kind for name, kind in estimators(system).items() if kind.offline}
+    known = {name: kind for name, kind in estimators_of(system).items() if kind.offline}
     if estimator not in known:
         raise InputError(
             where=f"estimator '{estimator}' to judge by",

@@ -7,10 +7,10 @@ its quantities drift behind, and they are what it is asked for. Such candidates 
 import numpy as np
 from scipy.linalg import expm
 
-from workbench.fmu import FMU
+from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains
 from workbench.observers.operating import linearised
-from workbench.system import System
+from workbench.system.system import System
 
 LATER = 4  # times the time that is allowed, when what a leak takes shows
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.case import Case
-from workbench.cosim import replay
-from workbench.fmu import Matrix, Vector
-from workbench.objective import score
-from workbench.observers import SearchSpace, estimators
+from workbench.arrays import Matrix, Vector
+from workbench.observers import SearchSpace, estimators_of
+from workbench.observers.replay import replay
+from workbench.observers.score import score
+from workbench.recordings.case import Case
 from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, job_estimator, load_model
 from workbench.tuning.search import Search
 from workbench.tuning.workers import Workers, evaluate_all
@@ -76,7 +76,7 @@ def untuned_filters(job: Job) -> dict[str, Vector]:
 
     It is left out where such a method is what is tuned.
     """
-    known, system = estimators(job.system), job.system
+    known, system = estimators_of(job.system), job.system
     with load_model(job) as fmu:
         makes = {
             name: kind.reasoned(fmu, system)

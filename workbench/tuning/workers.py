@@ -7,18 +7,14 @@ from typing import Protocol
 import numpy as np
 
 from workbench.errors import WorkerError
-from workbench.pool import Pool
+from workbench.runtime.pool import Pool
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job
 
 LIMIT = 60.0  # [s] for one candidate, which takes about 0.1 s
 
 
-class NoWorkersError(RuntimeError):
-    """No worker is left, and none will come; the message says why."""
-
-
 class Workers(Protocol):
-    """Who evaluates candidates: a `workbench.pool.Pool`, or one like it."""
+    """Who evaluates candidates: a `workbench.runtime.pool.Pool`, or one like it."""
 
     def submit(
         self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate, /

@@ -1,0 +1,163 @@
+"""What files are taken for is shown, and one question asks for all of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from workbench.cli.inputs import read_condition
+from workbench.cli.output import Output
+from workbench.errors import InputError
+from workbench.recordings.channels import (
+    TIME,
+    NamedChannel,
+    ProposedRecording,
+    ProposedRecordings,
+    Told,
+    listed,
+    parse_named,
+    propose_recordings,
+)
+from workbench.recordings.formats import RecordedFile
+from workbench.system.system import System
+from workbench.system.units import si_factor
+
+_Row = tuple[tuple[str, ...], str, float, float]  # what is said, of which recording, and its range
+
+
+def confirmed(
+    files: Sequence[RecordedFile],
+    system: System,
+    stored: Mapping[str, NamedChannel],
+    known: Told,
+    output: Output,
+    yes: bool,
+) -> tuple[ProposedRecordings, dict[str, Any]]:
+    """Recordings with their channels, and conditions, after one question at most.
+
+    Parameters
+    ----------
+    stored : channels that were confirmed before.
+    yes : take what is proposed without a question.
+
+    Raises
+    ------
+    InputError
+        If they are not confirmed, or something is missing.
+    """
+    found = propose_recordings(files, system, stored, known)
+    output.result(_shown(files, found, system))
+    conditions = dict(known.conditions)
+    if found.certain:
+        return found, conditions
+    if yes or output.json:  # a program is asked nothing
+        return _complete(files, found, found.doubts), conditions
+    columns = dict(known.columns)
+    for answer in _answers(files, found):
+        if answer.partition("=")[0].strip() in (TIME, *system.signals):
+            signal, channel = parse_named(answer, "answer", system)
+            columns[signal] = channel
+        else:
+            name, value = read_condition(answer, system)
+            conditions[name] = value
+    found = propose_recordings(files, system, stored, replace(known, columns=columns))
+    return _complete(files, found, []), conditions
+
+
+def _answers(files: Sequence[RecordedFile], found: ProposedRecordings) -> list[str]:
+    """What the user answers to a proposal: nothing, or corrections."""
+    taken = "name what is missing" if found.problems else "Enter takes this"
+    print(f"{taken}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
+    try:
+        answer = input().strip()
+    except EOFError:
+        print()
+        answer = "n"
+    if answer.casefold() in ("n", "no"):
+        raise InputError(
+            where=", ".join(str(one.path) for one in files),
+            found="channels that nobody confirmed",
+            expected="an answer, or --yes",
+            remedy="answer, or name channels with --column, and take the rest with --yes",
+        )
+    return [part.strip() for part in answer.split(";") if part.strip()]
+
+
+def _complete(
+    files: Sequence[RecordedFile], found: ProposedRecordings, doubts: Sequence[str]
+) -> ProposedRecordings:
+    """The proposal, if all that is needed has a channel.
+
+    Raises
+    ------
+    InputError
+        If something has none.
+    """
+    if problems := [*found.problems, *doubts]:
+        raise InputError(
+            where=", ".join(str(one.path) for one in files),
+            found="; ".join(problems),
+            expected="a channel for each signal that the system needs",
+            remedy="name it, --column 'SIGNAL=CHANNEL [unit]'"
+            + (f", of {listed(found.left)}" if found.left else ""),
+        )
+    return found
+
+
+def _shown(files: Sequence[RecordedFile], found: ProposedRecordings, system: System) -> str:
+    """What files are and what their channels are taken for, a line each."""
+    lines = [f"{one.path}: {one.kind}" for one in files]
+    if len(found.held) > 1:
+        names = listed([f"'{one.name}'" for one in found.held])
+        lines.append(f"  {len(found.held)} recordings, with the same channels: {names}")
+    lines += [*_clocks(found.held), *_channels(found.held, system)]
+    lines += [f"  ? {one}" for one in (*found.problems, *found.unmatched)]
+    lines += [f"  left out   {one}" for one in found.beside]
+    if found.left:
+        lines.append(f"  left out   {listed(found.left)}")
+    return "\n".join(lines)
+
+
+def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
+    """Times of recordings; those that are alike are one line."""
+    rows: list[_Row] = []
+    for one in held:
+        for clock in one.proposal.clocks.values():
+            times = clock.times[np.isfinite(clock.times)]
+            channel = f"{clock.channel} [{clock.unit}]" if clock.channel else "-"
+            every = f"{float(np.median(np.diff(times))):.4g} s"
+            rows.append(((channel, every, clock.reason), one.name, times.size, times.size))
+    for (channel, every, reason), low, high, where in _alike(rows, len(held)):
+        counted = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
+        steps = f"{counted} samples, every {every}"
+        yield f"  {TIME:<10} {channel:<28} {steps} ({reason}){where}"
+
+
+def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str]:
+    """Channels of signals, with the range over all recordings that have them alike."""
+    for signal in system.signals.values():
+        scale = si_factor(signal.shown, signal.unit, signal.name)
+        rows: list[_Row] = []
+        having = [one for one in held if signal.name in one.proposal.assigned]
+        for one in having:
+            taken = one.proposal.assigned[signal.name]
+            via = f" = {taken.formula}" if taken.formula else ""
+            key = f"{taken.label} [{taken.unit}]{via}", taken.reason
+            low = float(np.nanmin(taken.values)) / scale
+            high = float(np.nanmax(taken.values)) / scale
+            rows.append((key, one.name, low, high))
+        for (channel, reason), low, high, where in _alike(rows, len(held)):
+            yield (
+                f"  {signal.name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} "
+                f"{signal.shown} ({reason}){where}"
+            )
+
+
+def _alike(rows: Sequence[_Row], count: int) -> Iterator[tuple[tuple[str, ...], float, float, str]]:
+    """What is said of recordings, its range over those of which it is, and which, if not all."""
+    for key in dict.fromkeys(key for key, *_ in rows):
+        own = [row for row in rows if row[0] == key]
+        names = list(dict.fromkeys(f"'{name}'" for _, name, *_ in own))
+        where = "" if len(names) == count else f", in {listed(names)}"
+        yield key, min(low for *_, low, _ in own), max(high for *_, high in own), where

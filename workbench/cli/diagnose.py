@@ -1,0 +1,119 @@
+"""`workbench diagnose`: what a simulation gets wrong, the cause, and a better model."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from importlib.metadata import version
+from typing import Any
+
+from workbench.cli.extras import require_compiler
+from workbench.cli.inputs import given_cases
+from workbench.cli.output import Done, Output, read_result
+from workbench.diagnosis import Effect, Outcome, catalogue, choose, diagnose
+from workbench.diagnosis.laws import needs_law
+from workbench.diagnosis.laws.report import PROPOSED, write_proposal
+from workbench.diagnosis.report import write_diagnosis
+from workbench.errors import InputError, closest
+from workbench.models.modelica import Library, read_library
+from workbench.pages.provenance import run_of, sources
+from workbench.recordings.case import Case
+from workbench.runtime.files import claimed
+from workbench.system.reader import with_model
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import OBSERVER, System
+
+
+def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
+    """Recordings that are fitted, and those that are held out."""
+    names = [case.name for case in cases]
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise InputError(
+                where=f"--held-out {pattern}",
+                found=f"no recording of this name{closest(pattern, names)}",
+                expected=f"some of {', '.join(names)}",
+                remedy="correct the name",
+            )
+    held_out = [
+        case for case in cases if any(fnmatchcase(case.name, pattern) for pattern in patterns)
+    ]
+    return [case for case in cases if case not in held_out], held_out
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Diagnose the recordings, or list the effects."""
+    system = load_system(options.system)
+    if options.library is not None:
+        system = replace(system, library=options.library)
+    if options.fmu is not None:
+        system = with_model(system, OBSERVER, options.fmu)
+    library = read_library(system.library)
+    effects = choose(options.effects, catalogue(system, library))
+    if options.list:
+        output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
+        return Done({"effects": [{"name": one.name, "text": one.text} for one in effects]})
+    require_compiler()
+    cases, held_out = _parted(given_cases(options, system), options.held_out)
+    with claimed(options.out):
+        return _run(options, output, system, library, effects, cases, held_out)
+
+
+def _propose(
+    options: argparse.Namespace,
+    output: Output,
+    outcome: Outcome,
+    held_out: Sequence[Case],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Propose a law, if no effect explains what is missing."""
+    from workbench.api import propose  # all of the workbench, which a diagnosis alone does not need
+
+    if not needs_law(outcome):
+        output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
+        return
+    found = propose(
+        outcome,
+        held_out=held_out,
+        effects=options.effects,
+        out=options.out / PROPOSED,
+        workers=options.workers,
+        report=output.stage,
+    )
+    told = write_proposal(found, outcome, provenance, options.out, options.workers)
+    output.result(f"\n{found.summary()}")
+    output.result(f"to read: {told}, data and figures beside it")
+
+
+def _run(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    library: Library,
+    effects: tuple[Effect, ...],
+    cases: Sequence[Case],
+    held_out: Sequence[Case],
+) -> Done:
+    output.stage(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
+    outcome = diagnose(
+        *(system, cases, library, effects, options.out, options.workers, output.stage),
+        held_out=held_out,
+        every_platform=options.platforms == "all",
+        certainty=options.certainty,
+    )
+    with open_model(system) as model:
+        provenance = {
+            "run": run_of("diagnose", system, sources([*cases, *held_out])),
+            "workbench": version("wheelset-workbench"),
+            "system": system.name,
+            "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
+            "effects": [effect.name for effect in effects],
+        }
+    output.result(outcome.summary())
+    page = write_diagnosis(outcome, provenance, options.out, options.workers)
+    if options.propose:
+        _propose(options, output, outcome, held_out, provenance)
+    output.stage("done")
+    output.result(f"to read: {page}, data and figures beside it")
+    status = 130 if outcome.diagnosis.interrupted else 0
+    return Done(read_result(options.out / "summary.json"), {}, status, page)

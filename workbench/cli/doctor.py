@@ -1,0 +1,149 @@
+"""`workbench doctor`: what is installed, what is missing, what does not work, what to do."""
+
+import argparse
+import hashlib
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+from workbench.cli.arguments import nearby
+from workbench.cli.extras import PURPOSES, missing_packages
+from workbench.cli.output import Done, Output
+from workbench.errors import FMUError, InputError
+from workbench.models.fmu import FMU
+from workbench.models.fmu_cache import cache_folder
+from workbench.runtime.files import prove_writable
+from workbench.runtime.resources import CHECKOUT, fmus, installing
+from workbench.system.registry import built_models
+
+# dx/dt = -x: the smallest model that needs every part of the compiler.
+_MODEL = """package Small
+  model Decay
+    Real x(start=1.0, fixed=true);
+  equation
+    der(x) = -x;
+  end Decay;
+end Small;
+"""
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    state : "missing" is an extra that is not installed; "wrong" does not work as it is.
+    remedy : what to do, empty where nothing is needed.
+    """
+
+    name: str
+    state: Literal["ok", "missing", "wrong"]
+    found: str
+    remedy: str = ""
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Look at everything."""
+    findings = []
+    for one in _findings():
+        findings.append(one)
+        output.result(f"{one.state:<8} {one.name:<20} {one.found}")
+        if one.remedy:
+            output.result(f"{'':<8} {'':<20} to do: {one.remedy}")
+    wrong = any(one.state == "wrong" for one in findings)
+    return Done({"findings": [asdict(one) for one in findings]}, status=1 if wrong else 0)
+
+
+def _findings() -> Iterator[Inspection]:
+    where = "a wheel" if CHECKOUT is None else f"the checkout {CHECKOUT}"
+    yield Inspection("workbench", "ok", f"{version('wheelset-workbench')} from {where}")
+    yield Inspection("Python", "ok", f"{platform.python_version()}, {sys.executable}")
+    yield Inspection("machine", "ok", f"{platform.platform()}, {os.cpu_count()} processors")
+    core = missing_packages("")
+    yield Inspection(
+        "core packages",
+        "wrong" if core else "ok",
+        f"without {', '.join(core)}" if core else "complete",
+        "pip install wheelset-workbench" if core else "",
+    )
+    for extra, purpose in PURPOSES.items():
+        lacking = missing_packages(extra)
+        yield Inspection(
+            f"extra [{extra}]",
+            "missing" if lacking else "ok",
+            f"for {purpose}" + (f"; without {', '.join(lacking)}" if lacking else ""),
+            installing(extra) if lacking else "",
+        )
+    yield from _manifest(json.loads((fmus() / "manifest.json").read_text(encoding="utf-8")))
+    if not missing_packages("compiler"):
+        yield _sources()
+        yield _compiled()
+    yield _kept()
+
+
+def _manifest(manifest: Mapping[str, Any]) -> Iterator[Inspection]:
+    """Whether the FMUs are those that were built."""
+    for name, one in manifest["fmus"].items():
+        path = fmus() / name
+        found = "as in the manifest"
+        if not path.is_file():
+            found = "no such file"
+        elif hashlib.sha256(path.read_bytes()).hexdigest() != one["sha256"]:
+            found = f"its SHA-256 is not that of {nearby(fmus() / 'manifest.json')}"
+        sound = found.startswith("as")
+        yield Inspection(
+            f"fmus/{name}", "ok" if sound else "wrong", found, "" if sound else _anew()
+        )
+
+
+def _anew() -> str:
+    """How FMUs are had again."""
+    return "install the wheel again" if CHECKOUT is None else "make fmus"
+
+
+def _sources() -> Inspection:
+    """Whether the Modelica sources are those that the FMUs were built from."""
+    from workbench.models.compiler import source_hash  # an extra
+
+    manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
+    same = manifest["source_sha256"] == source_hash(*built_models())
+    found = "those that the FMUs were built from" if same else "not those of the FMUs"
+    return Inspection("Modelica sources", "ok" if same else "wrong", found, "" if same else _anew())
+
+
+def _compiled() -> Inspection:
+    """Whether a model can be compiled here, and runs."""
+    from workbench.models.compiler import build, native  # an extra
+
+    with tempfile.TemporaryDirectory() as scratch:
+        package, path = Path(scratch) / "package.mo", Path(scratch) / "Decay.fmu"
+        package.write_text(_MODEL, encoding="utf-8")
+        try:
+            build(package, "Small.Decay", path, platforms=[native()])
+            with FMU(path) as fmu:
+                found = f"compiled and ran a model with the state {', '.join(fmu.states)}"
+        except (InputError, FMUError, OSError) as error:
+            remedy = f"{installing('compiler')}, in an environment of its own"
+            return Inspection("compiler", "wrong", str(error), remedy)
+    return Inspection("compiler", "ok", found)
+
+
+def _kept() -> Inspection:
+    """Whether what is compiled can be kept between runs; without that, commands begin slowly."""
+    folder = cache_folder()
+    try:
+        prove_writable(folder / "doctor")
+    except InputError as error:
+        remedy = "set XDG_CACHE_HOME to a folder that can be written"
+        return Inspection("cache", "wrong", f"{folder}: {error.found}", remedy)
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    size = sum(path.stat().st_size for path in files) / 1e6
+    return Inspection("cache", "ok", f"{folder}: {len(files)} files, {size:.0f} MB; may be deleted")

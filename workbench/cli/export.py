@@ -1,0 +1,144 @@
+"""`workbench export`: an observer with its gains as an FMU, and in an SSP package."""
+
+import argparse
+import hashlib
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from workbench.cli.extras import require_compiler
+from workbench.cli.output import Done, Output
+from workbench.observers import Estimator, Gains, choose, estimators_of
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
+from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.system.registry import load_system, model_path, open_model
+from workbench.system.system import REFERENCE, System
+
+if TYPE_CHECKING:
+    from workbench.models.compiler import BuiltFMU  # an extra, needed by this command alone
+
+# Writes the FMU to a file, of a version of FMI, and says which platform comes next.
+_Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Write the observer as an FMU, and the package."""
+    require_compiler()
+    from workbench.models.compiler import PLATFORMS, native
+    from workbench.observers.export import write_package
+
+    system = load_system(options.system)
+    chosen = _choose(system, options.estimator, options.gains)
+    reference: Path | None = options.reference
+    if reference is None and REFERENCE in system.models:
+        reference = model_path(system, REFERENCE)
+    with claimed(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
+        platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
+        model, make = _maker(stack, system, chosen, platforms)
+        name = model.rpartition(".")[2]
+
+        def build(fmi: int) -> "BuiltFMU":
+            path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"
+            return make(path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}"))
+
+        built = build(options.fmi)
+        summary = _summary(system, chosen, built)
+        files = [built.path]
+        if reference is not None:
+            packed = built if built.fmi == 2 else build(2)
+            ssp = Path(scratch) / f"{name}.ssp"
+            write_package(system, packed.path, reference, ssp)
+            files.append(ssp)
+            summary["package"] = {
+                "file": ssp.name,
+                "sha256": _sha256(ssp),
+                "observer": _identity(packed),
+                "reference": {"file": reference.name, "sha256": _sha256(reference)},
+            }
+        # Nothing is written before everything is made.
+        for file in files:
+            write_whole(options.out / file.name, file.read_bytes())
+        write_json(options.out / "summary.json", summary)
+    beside = " and ".join([*(file.name for file in files[1:]), "summary.json"])
+    output.result(f"written: {options.out / built.path.name}, {beside} beside it")
+    return Done(summary)
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """An estimator with its gains, the text of their file, and where they are from."""
+
+    kind: type[Estimator]
+    gains: Gains
+    text: str
+    source: str
+
+
+def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
+    """The estimator that is asked for, that of the gains, or the first that has a class."""
+    known = estimators_of(system)
+    if asked is None:
+        usual = next(iter(system.export.classes), ExtendedKalmanFilter.name)
+        asked = usual if path is None else estimator_of(path, known)
+    kind = choose(system, [asked])[asked]
+    name = kind.tuned_as or kind.name
+    with open_model(system, kind.role) as fmu:
+        gains = kind.reasoned(fmu, system)
+    path = path or tuned_file(system, name)
+    if path is None:
+        return _Choice(kind, gains, format_gains(gains, kind.meaning, {}), gains.source)
+    gains = read_gains(path, {name: gains})
+    return _Choice(kind, gains, path.read_text(encoding="utf-8"), path.name)
+
+
+def _maker(
+    stack: ExitStack, system: System, chosen: _Choice, platforms: Sequence[str]
+) -> tuple[str, "_Make"]:
+    """Dotted name of an estimator's FMU, and what builds it: of its Modelica class, or its law."""
+    from workbench.observers.export import EstimatorLaw, ObserverModel, build_law, build_observer
+
+    kind, gains = chosen.kind, chosen.gains
+    if kind.name in system.export.classes:
+        observer = ObserverModel(system, kind, gains, chosen.text)
+        return observer.model, partial(build_observer, observer, platforms=platforms)
+    fmu = stack.enter_context(open_model(system, kind.role))
+    law = EstimatorLaw(kind(fmu, system, gains), chosen.text)
+    return law.model, partial(build_law, law, platforms=platforms)
+
+
+def _summary(system: System, chosen: _Choice, built: "BuiltFMU") -> dict[str, Any]:
+    from workbench.models.compiler import source_hash
+
+    gains = chosen.gains
+    return {
+        "estimator": chosen.kind.name,
+        "gains": dict(zip(gains.names, gains.values.tolist(), strict=True)),
+        **{name: values.tolist() for name, values in gains.design.items()},
+        "fmu": _identity(built),
+        "provenance": {
+            "workbench": version("wheelset-workbench"),
+            "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
+            "source_sha256": source_hash(system.library),
+            "gains": chosen.source,
+        },
+    }
+
+
+def _identity(built: "BuiltFMU") -> dict[str, Any]:
+    return {
+        "file": built.path.name,
+        "model": built.model,
+        "fmi": f"{built.fmi}.0",
+        "token": built.token,
+        "sha256": built.sha256,
+    }
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,175 @@
+"""`workbench fmu`: build FMUs from Modelica, describe them, check whether they are fit."""
+
+import argparse
+import sys
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+
+from workbench.cli.arguments import nearby
+from workbench.cli.extras import require_compiler
+from workbench.cli.output import Done, Output
+from workbench.errors import InputError
+from workbench.models.checks import Finding, check, is_fit, uses
+from workbench.models.description import Description, read_description
+from workbench.models.trial import usual_limits
+from workbench.runtime.files import prove_writable
+from workbench.runtime.resources import CHECKOUT, fmus
+from workbench.system.registry import built_models
+
+_OMC = Path("build/omc")
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Build, describe or check FMUs."""
+    return {"build": _build, "info": _info, "check": _check}[options.job](options, output)
+
+
+def _build(options: argparse.Namespace, output: Output) -> Done:
+    require_compiler()
+    from workbench.models import compiler  # an extra: everything else runs without it
+
+    if options.all and options.package:
+        raise InputError(
+            where="command line, --all",
+            found=f"a package, {options.package}",
+            expected="none: all are those whose FMUs come with the package",
+            remedy="leave one of the two out",
+        )
+    if options.compiler == "omc":
+        return _build_with_omc(options, output)
+    if options.all and options.check:
+        found = compiler.differences(built_models(), fmus())
+        output.result("\n".join(found) or f"{nearby(fmus())} matches its sources")
+        return Done({"differences": found}, status=1 if found else 0)
+    if options.all:
+        _require_checkout()
+        all_built = compiler.build_all(built_models(), nearby(fmus()))
+        return Done({"fmus": [_built(output, built.path, built.sha256) for built in all_built]})
+    _require_model(options)
+    out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
+    prove_writable(out)
+    built = compiler.build(options.package, options.model, out, fmi=options.fmi)
+    return Done({"fmus": [_built(output, built.path, built.sha256)]})
+
+
+def _built(output: Output, path: Path, sha256: str) -> dict[str, str]:
+    """What is told of an FMU that was built."""
+    output.result(f"{path}  {sha256}")
+    return {"file": str(path), "sha256": sha256}
+
+
+def _build_with_omc(options: argparse.Namespace, output: Output) -> Done:
+    from workbench.models.compiler.openmodelica import build_with_omc
+
+    if options.fmi != 2 or options.check:
+        raise InputError(
+            where="--compiler omc",
+            found=f"--fmi {options.fmi}" if options.fmi != 2 else "--check",
+            expected="FMI 2.0, built, not compared: OpenModelica has no more",
+            remedy="leave the option out",
+        )
+    if not options.all:
+        _require_model(options)
+    jobs = built_models() if options.all else {options.package: [options.model]}
+    written = []
+    for package, models in jobs.items():
+        for path in build_with_omc(package, models, options.out or _OMC):
+            output.result(str(path))
+            written.append({"file": path})
+    return Done({"fmus": written})
+
+
+def _require_checkout() -> None:
+    if CHECKOUT is None:
+        raise InputError(
+            where="--all",
+            found="a package that was installed from a wheel",
+            expected="a checkout of the sources, whose fmus/ it writes",
+            remedy="compare them with --all --check, or build one model with --out",
+        )
+
+
+def _require_model(options: argparse.Namespace) -> None:
+    if options.model is None:
+        raise InputError(
+            where="command line",
+            found="no model",
+            expected="the dotted name of a model, or --all",
+            remedy="see 'python -m workbench fmu build --help'",
+        )
+
+
+def _info(options: argparse.Namespace, output: Output) -> Done:
+    description = read_description(options.fmu)
+    output.result(_format_description(description))
+    return Done(asdict(description) | {"path": description.path.name})
+
+
+def _check(options: argparse.Namespace, output: Output) -> Done:
+    description = read_description(options.fmu)
+    limits = usual_limits()
+    if options.limit is not None:
+        limits = replace(limits, processor=options.limit, answer=max(limits.answer, options.limit))
+    output.result(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit")
+    found = partial(_show_finding, output)
+    findings = check(
+        options.fmu, options.instantiations, limits, partial(_show_begin, output), found
+    )
+    unknown = any(finding.unknown for finding in findings)
+    fit = None if unknown and is_fit(findings) else is_fit(findings)
+    verdict = {True: "fit for observers", False: "not fit for observers", None: "not measured"}
+    output.result(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
+    if fit is False:
+        for use, failed in uses(findings).items():
+            reason = f"no, for {', '.join(failed)}" if failed else "it would do"
+            output.result(f"    {use}: {reason}")
+    identity = {
+        "file": description.path.name,
+        "model": description.name,
+        "fmi": description.version,
+        "sha256": description.sha256,
+    }
+    listed = [asdict(finding) for finding in findings]
+    told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
+    return Done(told, status={True: 0, False: 1, None: 3}[fit])
+
+
+def _show_begin(output: Output, name: str) -> None:
+    if sys.stderr.isatty() and not output.quiet:  # overwritten by what is found
+        print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
+
+
+def _format_description(description: Description) -> str:
+    lines = [
+        f"model        {description.name}: {description.text}",
+        f"FMI          {description.version}, made by {description.tool or 'an unnamed tool'}",
+        f"token        {description.token}",
+        f"sha256       {description.sha256}",
+        f"platforms    {', '.join(description.platforms) or 'none, sources only'}",
+        f"states       {', '.join(description.states) or 'none'}",
+    ]
+    for name, interface in description.interfaces.items():
+        capabilities = [
+            key.replace("_", " ") for key, value in asdict(interface).items() if value is True
+        ]
+        lines.append(f"{name}: {', '.join(capabilities) or 'no capabilities'}")
+    width = max((len(v.name) for v in description.variables), default=0)
+    lines.append(f"\n{'variable':<{width}}  {'causality':<11} {'start':>12}  {'unit':<14} meaning")
+    for v in description.variables:
+        start, unit = v.start if v.start is not None else "", v.unit or ""
+        lines.append(
+            f"{v.name:<{width}}  {v.causality:<11} {start:>12}  {unit:<14} {v.text}".rstrip()
+        )
+    return "\n".join(lines)
+
+
+def _show_finding(output: Output, finding: Finding) -> None:
+    value, limit = (f"{n:.4g}" if n is not None else "" for n in (finding.value, finding.limit))
+    if finding.passed is None:
+        output.result(f"{finding.name:<38} -       {finding.reason}")
+        return
+    result = "passed" if finding.passed else "FAILED"
+    output.result(f"{finding.name:<38} {result:<7} {value:>9} {limit:>9}  {finding.unit}")
+    if finding.reason:
+        output.result(f"    {finding.reason}")

@@ -1,0 +1,147 @@
+"""What the commands share: systems and recordings that are asked for."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from workbench.cli.arguments import nearby
+from workbench.errors import InputError, closest
+from workbench.recordings.case import UNKNOWN, Case, check_names, read_cases
+from workbench.recordings.channels import Told, parse_named
+from workbench.system.reader import with_model
+from workbench.system.registry import load_system
+from workbench.system.system import FULL, OBSERVER, System
+from workbench.system.units import quantity
+
+
+def told(options: argparse.Namespace, system: System) -> Told:
+    """What is said of recordings without a case.toml.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read.
+    """
+    conditions = dict(read_condition(one, system) for one in options.condition)
+    columns = dict(parse_named(one, "command line, --column", system) for one in options.column)
+    step = None
+    if options.sample_rate is not None:
+        rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
+        if not rate > 0.0:
+            raise InputError(
+                where="command line, --sample-rate",
+                found=options.sample_rate,
+                expected="samples per second, above 0",
+                remedy="write for instance --sample-rate '200 Hz'",
+            )
+        step = 1.0 / rate
+    return Told(conditions, columns, step)
+
+
+def read_condition(text: str, system: System) -> tuple[str, Any]:
+    """One condition as people type it, NAME=VALUE, as case.toml has it.
+
+    Raises
+    ------
+    InputError
+        If it is none of the system's.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    kind = next((one for one in system.conditions if one.name == name), None)
+    if not equals or kind is None:
+        raise InputError(
+            where=f"condition {text}",
+            found=f"'{name}'{closest(name, [one.name for one in system.conditions])}",
+            expected="NAME=VALUE of a condition: "
+            + (", ".join(one.name for one in system.conditions) or "this system has none"),
+            remedy="correct the name",
+        )
+    words = {str(choice): choice for choice in kind.choices}
+    entries = [words.get(part.strip(), part.strip()) for part in value.split(",")]
+    whole = value == UNKNOWN or not kind.count
+    return name, words.get(value, value) if whole else entries
+
+
+def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
+    """The cases that are asked for, or those that come with the system.
+
+    Raises
+    ------
+    InputError
+        If there are none, or one cannot be read.
+    """
+    paths: list[Path] = options.cases
+    if not paths and system.cases is None:
+        raise InputError(
+            where="command line",
+            found="no CASE, and a system that comes without",
+            expected="folders of recordings",
+            remedy=f"name them, or write cases = 'FOLDER' in {nearby(system.source)}",
+        )
+    folders = paths or [path for path in [system.cases] if path is not None]
+    cases = read_cases(folders, system, told(options, system))
+    for case in cases:
+        for doubt in case.doubts:
+            print(f"warning: {doubt}", file=sys.stderr, flush=True)
+    return cases
+
+
+def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
+    """The system that is asked for, with the models and names that are given, and the cases.
+
+    Raises
+    ------
+    InputError
+        If system, models or cases cannot be read, or do not fit each other.
+    """
+    system = load_system(options.system)
+    cases = given_cases(options, system)
+    names = model_names(options.map, system, cases)
+    if options.fmu is not None or names:
+        path = options.fmu or system.model(OBSERVER).path
+        system = with_model(system.with_names(names), OBSERVER, path)
+    if options.full_fmu is not None:
+        system = with_model(system, FULL, options.full_fmu)
+    return system, cases
+
+
+def model_names(
+    mapped: Sequence[str], system: System, cases: Sequence[Case] = ()
+) -> dict[str, str]:
+    """Names of variables in the FMU, from the command line and from the cases.
+
+    Parameters
+    ----------
+    mapped : the values of --map, "p=pressure"; they win over the cases.
+    cases : their names must agree, because one FMU runs on all of them.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read, names no variable of ours, or cases contradict each other.
+    """
+    given: dict[str, str] = {}
+    for entry in mapped:
+        ours, equals, theirs = entry.partition("=")
+        if not equals or ours in given:
+            raise InputError(
+                where=f"command line, --map {entry}",
+                found=f"a second name for '{ours}'" if equals else "no '='",
+                expected="OURS=THEIRS, once for each variable",
+                remedy="write for instance --map p=pressure",
+            )
+        given[ours] = theirs
+    given = check_names(given, "command line, --map", system)
+    names: dict[str, str] = {}
+    for case in cases:
+        for ours, theirs in case.names.items():
+            if names.setdefault(ours, theirs) != theirs and ours not in given:
+                raise InputError(
+                    where=f"{case.source.parent / 'case.toml'}, [model.names] {ours}",
+                    found=f"'{theirs}', in a case before it '{names[ours]}'",
+                    expected="the same name in all cases, because one FMU runs on all",
+                    remedy=f"run these cases apart, or decide with --map {ours}=NAME",
+                )
+    return check_names(names | given, "--map and [model.names]", system)

@@ -1,0 +1,112 @@
+"""`workbench monitor --fleet`: many machines, one task for each, here or on a cluster."""
+
+import argparse
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from workbench.cli.cluster import open_cluster
+from workbench.cli.extras import require
+from workbench.cli.output import Done, Output
+from workbench.errors import InputError
+from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.provenance import models, run_of, software
+from workbench.recordings.datasets import read_recorded
+from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.runtime.pool import Pool
+from workbench.studies.monitoring import Monitored
+from workbench.studies.monitoring.fleet import Fleet, Watched, serving, watch_fleet
+from workbench.studies.monitoring.report import write_monitored
+from workbench.system.registry import load_system
+from workbench.system.system import OBSERVER, System
+
+if TYPE_CHECKING:
+    from workbench.runtime.cluster import DaskPool
+
+_LIMIT = 3600.0  # [s] for one machine, whose recordings take hundredths of a second each
+
+
+def provenance_of(system: System, history: Path) -> dict[str, Any]:
+    """What was run, as every summary says it."""
+    return {
+        "run": run_of("monitor", system, {"history": history}),
+        **software(("fmpy", "numpy", "scipy", "numba")),
+        "system": system.name,
+        "fmu": models(system, [OBSERVER])[OBSERVER],
+    }
+
+
+def run_fleet(options: argparse.Namespace, output: Output) -> Done:
+    """Watch all machines."""
+    if options.diagnose:
+        raise InputError(
+            where="command line, --diagnose",
+            found="a fleet",
+            expected="one machine, whose cause takes minutes",
+            remedy="leave it out, and give it for the machine that raised an alarm",
+        )
+    system = load_system(options.system)
+    if "://" in options.history:
+        require("fsspec", "cluster", "which reads URLs", f"command line, {options.history}")
+    provenance = provenance_of(system, Path(options.history))
+    write = partial(_written, provenance)
+    fleet = Fleet(system, options.history, options.false_alarms, read_recorded, write)
+    count = len(fleet.machines())  # wrong places are refused before workers start
+    with claimed(options.out):
+        begin = time.perf_counter()
+        pool = _pool(options, fleet, count)
+        try:
+            step = partial(output.step, begin=begin)
+            found, interrupted = watch_fleet(fleet, options.out, pool, step)
+        finally:
+            pool.close()
+        summary = _summary(found, provenance, time.perf_counter() - begin, interrupted)
+        write_json(options.out / "fleet.json", summary)
+        table = pd.DataFrame(summary["machines"])
+        write_whole(options.out / "fleet.csv", table.to_csv(index=False))
+    output.result(summary["answer"]["sentence"])
+    for one in found:
+        if one.alarms or one.refusal:
+            told = f"{one.alarms} alarms" if not one.refusal else f"no result: {one.refusal}"
+            output.result(f"  {one.machine}: {told}")
+    output.result(f"to read: {options.out / 'fleet.csv'}, a folder for each machine beside it")
+    return Done(summary, {"seconds": "s"}, 130 * interrupted)
+
+
+def _written(provenance: dict[str, Any], found: Monitored, out: Path) -> None:
+    """Write what was found of a machine, in a worker."""
+    write_monitored(found, provenance, out)
+
+
+def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet] | DaskPool[Fleet]":
+    if options.cluster is None:
+        return Pool(min(options.workers, count), serving, fleet)
+    return open_cluster(options.cluster, serving, fleet, _LIMIT, fleet.system)
+
+
+def _summary(
+    found: list[Watched], provenance: dict[str, Any], seconds: float, interrupted: bool
+) -> dict[str, Any]:
+    raised = [one for one in found if one.alarms]
+    refused = [one for one in found if one.refusal]
+    recordings = sum(one.recordings for one in found)
+    said = f"{len(found)} machines, {recordings} recordings: alarms of {len(raised)} machines"
+    said += f", no result of {len(refused)}" * bool(refused)
+    headline = {
+        "machines with alarms": Measure(len(raised), "1", "lower"),
+        "machines without a result": Measure(len(refused), "1", "lower"),
+    }
+    entries = {
+        "provenance": provenance,
+        "recordings": recordings,
+        "seconds": seconds,
+        "machines": [
+            {name: getattr(one, name) for name in ("machine", "recordings", "alarms", "refusal")}
+            for one in found
+        ],
+        "interrupted": interrupted,
+    }
+    return with_answer(Answer(f"{said}.", headline), entries)

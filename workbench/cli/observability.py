@@ -1,0 +1,91 @@
+"""`workbench observability`: what measured outputs can tell about states and quantities."""
+
+import argparse
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from workbench.arrays import Vector
+from workbench.cli.inputs import chosen_system
+from workbench.cli.output import Done, Output, read_result
+from workbench.observers.observability import CaseObservability, case_observability, linear_test
+from workbench.observers.observability_report import (
+    draw_observability,
+    format_observability,
+    write_observability,
+    write_observability_page,
+    write_windows,
+)
+from workbench.pages.provenance import models, run_of, software, sources
+from workbench.recordings.case import Case
+from workbench.runtime.files import claimed
+from workbench.runtime.pool import Pool
+from workbench.system.registry import open_model
+from workbench.system.system import FULL, OBSERVER, System
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Show what the outputs of the recordings tell."""
+    system, cases = chosen_system(options)
+    with claimed(options.out):
+        return _run(options, output, system, cases)
+
+
+def _run(
+    options: argparse.Namespace, output: Output, system: System, cases: Sequence[Case]
+) -> Done:
+    linear = {}
+    for role in (role for role in (OBSERVER, FULL) if role in system.models):
+        with open_model(system, role) as fmu:
+            linear[role] = linear_test(fmu, system)
+    provenance = {
+        "run": run_of("observability", system, sources(cases)),
+        **software(("fmpy", "numpy", "scipy")),
+        "fmus": list(models(system, list(linear)).values()),
+    }
+    scales = {role: test.scale for role, test in linear.items()}
+    done: list[CaseObservability] = []
+    begin = time.perf_counter()
+    interrupted = False
+    setup = (system, scales, options.out)
+    with Pool(min(options.workers, len(cases)), nullcontext, setup) as pool:
+        try:
+            for _, one in pool.completed(_test_case, cases):
+                done.append(one)
+                output.step(len(done), len(cases), one.case.name, begin)
+        except KeyboardInterrupt:
+            interrupted = True
+            pool.finish()
+    summary: dict[str, Any] = {}
+    page: Path | None = None
+    if done:
+        done.sort(key=lambda one: one.case.name)
+        tests = list(linear.values())
+        output.result(format_observability(system, tests, done))
+        path = options.out / "observability.json"
+        write_observability(system, tests, done, provenance, path)
+        summary = read_result(path)
+        page = write_observability_page(summary, done, len(cases), options.out)
+        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(told)
+    return Done(summary, _units(system), 130 if interrupted else 0, page)
+
+
+def _units(system: System) -> dict[str, str]:
+    """Of windows and signals; quantities and corrections have that of the quantity."""
+    signals = {one.name: one.unit for one in (*system.inputs, *system.outputs)}
+    quantities = {
+        key: one.unit for one in system.estimated for key in (one.correction, f"median_{one.name}")
+    }
+    return {"window_s": "s", "stride_s": "s", **signals, **quantities}
+
+
+def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:
+    """Test all models on one case; writes its CSV and figure."""
+    system, scales, out = setup
+    one = case_observability(system, scales, case)
+    write_windows(one, out / f"{case.name}.csv")
+    draw_observability(one, out / f"{case.name}.png")
+    return one

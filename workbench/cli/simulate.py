@@ -1,0 +1,145 @@
+"""`workbench simulate`: all estimators on recordings."""
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from workbench.cli.inputs import chosen_system
+from workbench.cli.output import Done, Output
+from workbench.errors import InputError
+from workbench.observers import choose
+from workbench.observers.live import LiveWindow
+from workbench.observers.report import format_table, summarise_runs, write_estimates, write_page
+from workbench.observers.run import Ending
+from workbench.observers.simulation import CaseResult, Simulation, case_figure, prepare, simulate
+from workbench.pages.figures import draw_case
+from workbench.pages.provenance import models, run_of, software, sources
+from workbench.recordings.case import Case
+from workbench.runtime.files import claimed, write_json
+from workbench.system.system import OBSERVER, System
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Run all estimators on the recordings."""
+    system, cases = chosen_system(options)
+    window = LiveWindow(system) if options.live else None
+    with claimed(options.out):
+        return _run(options, output, system, cases, window)
+
+
+def _run(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    cases: Sequence[Case],
+    window: LiveWindow | None,
+) -> Done:
+    chosen = choose(system, options.estimator)
+    simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
+    output.stage("preparing the observers' loops (compiled once, up to a minute)")
+    run = run_of("simulate", system, sources(cases))
+    settings = _settings(simulation, cases[0])
+    provenance = {"run": run, **_models(simulation), **settings}
+    provenance["meanings"] = {
+        name: {gain: {"text": text, "unit": unit} for gain, (text, unit) in one.items()}
+        for name, one in simulation.meanings().items()
+        if name in settings
+    }
+    if window is None:
+        runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
+    else:
+        runs = _shown(simulation, cases, window, options.out)
+    done: list[CaseResult] = []
+    begin = time.perf_counter()
+    interrupted = False
+    failure: InputError | None = None
+    try:
+        for result in runs:
+            done.append(result)
+            output.step(len(done), len(cases), result.case.name, begin)
+    except KeyboardInterrupt:
+        interrupted = True
+        output.progress("interrupted")
+    except InputError as error:  # such as a full disk: what was estimated is told all the same
+        failure = error
+    summary: dict[str, Any] = {}
+    page: Path | None = None
+    if done:
+        done.sort(key=lambda result: result.case.name)
+        output.result(format_table(system, done))
+        summary = summarise_runs(system, done, provenance)
+        write_json(options.out / "summary.json", summary)
+        page = options.out / "index.html"
+        write_page(system, summary, [case_figure(result) for result in done], len(cases), page)
+        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(told)
+    if window is not None and not interrupted:
+        window.wait()
+    if failure is not None:
+        raise failure
+    units = _units(system)
+    if interrupted:
+        return Done(summary, units, 130, page)
+    idle = _idle(done)
+    for name in idle:
+        print(
+            f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
+        )
+    return Done(summary, units, 1 if idle else 0, page)
+
+
+def _units(system: System) -> dict[str, str]:
+    """Of the numbers in a summary that are not plain; gains have those of their file."""
+    judged = system.objective.judged
+    unit = system.signals[judged].unit
+    return {f"{judged}_rms_{unit}": unit, "seconds": "s"}
+
+
+def _idle(results: Sequence[CaseResult]) -> list[str]:
+    """Estimators that failed in every case."""
+    return [
+        name
+        for name in results[0].runs
+        if all(one.runs[name].ending is not Ending.OK for one in results)
+    ]
+
+
+def _shown(
+    simulation: Simulation, cases: Sequence[Case], window: LiveWindow, out: Path
+) -> Iterator[CaseResult]:
+    """All cases one after the other, each shown before."""
+    for case in cases:
+        with simulation.estimators() as running:
+            window.show(case, list(running.values()))
+        yield from simulate(simulation, [case], 1, partial(_write, out))
+
+
+def _models(simulation: Simulation) -> dict[str, Any]:
+    """Software and models that run; the observer's is always named."""
+    roles = dict.fromkeys([OBSERVER, *(kind.role for kind in simulation.kinds.values())])
+    named = models(simulation.system, [role for role in roles if role in simulation.system.models])
+    return {
+        **software(("fmpy", "numpy", "scipy", "numba")),
+        **{"fmu" if role == OBSERVER else f"{role}_fmu": one for role, one in named.items()},
+    }
+
+
+def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
+    """What each estimator runs with; their loops are compiled on the way."""
+    settings = {}
+    with simulation.estimators() as running:
+        for name, estimator in running.items():
+            estimator.run(case.time[:2], case.u[:2], case.y[:2])
+            settings[name] = estimator.settings()
+    return {name: one for name, one in settings.items() if one}
+
+
+def _write(out: Path, result: CaseResult) -> None:
+    """Write CSV and figures of a case."""
+    write_estimates(result, out / f"{result.case.name}.csv")
+    paths = [out / f"{result.case.name}.{kind}" for kind in ("png", "svg")]
+    draw_case(case_figure(result), paths)

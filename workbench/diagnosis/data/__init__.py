@@ -1,0 +1,1 @@
+"""Samples that a diagnosis compares, and what whitens them."""

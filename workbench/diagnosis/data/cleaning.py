@@ -1,0 +1,146 @@
+"""One channel of a recording made clean: faulty samples, noise, and where a signal starts."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
+from scipy.signal import savgol_filter
+
+from workbench.arrays import Vector
+from workbench.diagnosis.inference.thresholds import Soundness
+from workbench.system.system import Signal
+
+ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
+_ABREAST = 11  # samples of the running median
+_FEW = 6  # samples; three fourth differences have no median to speak of
+_MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
+
+Mask = NDArray[np.bool_]
+
+
+def saturated(values: Vector, signal: Signal) -> Mask:
+    """Where a sensor reads no further."""
+    low, high = signal.limits
+    mask: Mask = (values <= low) | (values >= high)
+    return mask
+
+
+def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+    """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
+
+    A command is what it is, and what is read in steps repeats itself. Samples at the limit of a
+    sensor say nothing of the noise of others.
+    """
+    within = ~saturated(values, signal)
+    wrong = np.zeros(values.size, np.bool_)
+    if not signal.exact and within.any():
+        wrong[within] = _outliers(values[within], signal, sound)
+    return wrong
+
+
+def _outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+    # Odd at the ends: there too, the median of what rises or falls is the middle sample.
+    beside = _ABREAST // 2
+    extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
+    away = np.abs(values - median_filter(extended, _ABREAST)[beside:-beside])
+    # The wide window knows the noise, the narrow one that a structure rings.
+    noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
+    scale = np.maximum(1.4826 * noise, deviation_of(values))
+    wrong = _out_and_back(values, away > sound.spike * scale, sound.spike * scale)
+    same = np.diff(values) == 0.0
+    if same.mean() < 0.2 and not signal.resolution:
+        for first, end in runs(same):
+            if end - first >= sound.stuck - 1:
+                wrong[first : end + 1] = True
+        for extreme in (values.min(), values.max()):
+            at = values == extreme
+            if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
+                wrong |= at
+    return wrong
+
+
+def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
+    """Of samples off a running median, those that leave the lines on both sides of them.
+
+    A signal that turns fast is off the median too, but comes or goes along a line.
+    """
+    padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
+    before = (values - (2.0 * padded[1:-3] - padded[:-4])) / jump
+    after = (values - (2.0 * padded[3:-1] - padded[4:])) / jump
+    kept = np.zeros_like(mask)
+    for first, end in runs(mask):
+        sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
+        kept[first:end] = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
+    return kept
+
+
+def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
+    """Put a line across what is wrong."""
+    return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
+
+
+def smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
+    """An input without most of its sensor's noise, and without lag.
+
+    The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
+    by keeping it from the rest. Where the input holds, the mean is taken over longer.
+    """
+    best, noise = values, deviation_of(values)
+    for seconds, order in zip(windows, (2, 1), strict=False):
+        window = 2 * (round(seconds / h) // 2) + 1
+        if order < window <= values.size:
+            smooth = savgol_filter(values, window, order)
+            moves = maximum_filter1d(np.abs(best - smooth) > held * noise, window)
+            weight = uniform_filter1d(moves.astype(np.float64), window)
+            best = weight * best + (1.0 - weight) * smooth
+            # Of a parabola over n samples, the variance is 9/4 of that of a mean.
+            noise *= 1.5 / np.sqrt(window)
+    return best
+
+
+def noise_in(values: Vector, signal: Signal) -> float:
+    """Standard deviation of the noise of a signal's samples; see `deviation_of`."""
+    if signal.exact:
+        return 0.0
+    return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
+
+
+def deviation_of(values: Vector) -> float:
+    """Standard deviation of white noise on a slow signal, from its second differences.
+
+    Where the signal is sampled slowly they show its motion too, and fourth differences far less: of
+    noise alone, both tell the same. It is no less than that of rounding to the least step that the
+    signal makes. Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz (1986), Biometrika 73, 625-633:
+    variance by differences.
+    """
+    moved = np.abs(np.diff(values))
+    quantum = moved[moved > 0.0].min(initial=np.inf)
+    rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
+    spread = _scatter(np.diff(values, 2)) / math.sqrt(6.0)
+    finer = _scatter(np.diff(values, 4)) / math.sqrt(70.0) if values.size > _FEW else spread
+    spread = finer if finer < _MOVED * spread else spread
+    return max(spread, float(rounding))
+
+
+def _scatter(values: Vector) -> float:
+    """Standard deviation of what scatters around zero, whatever a few of them are."""
+    return float(1.4826 * np.median(np.abs(values)))
+
+
+def first_value(time: Vector, values: Vector, noise: float) -> float:
+    """Value at the start of a signal: by a line through as many samples as lie along one."""
+    count = time.size
+    while count > 2:
+        line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
+        if np.std(values[:count] - line(time[:count])) < ALONG * noise:
+            return float(line(time[0]))
+        count //= 2
+    return float(values[0])
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First and end of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

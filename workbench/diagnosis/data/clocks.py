@@ -1,0 +1,145 @@
+"""Clocks of loggers: signals that one logger records are late together, against all others.
+
+A clock is no matter of the model. Inputs drive it as of the time when they acted, what it says of
+an output is read as late as its logger reads it, and a motion that is led follows what was measured
+at that time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.effects.catalogue import Effect, read_effects
+from workbench.diagnosis.effects.extension import variables
+from workbench.models.modelica import Library
+from workbench.recordings.case import Case
+from workbench.system.system import OBSERVER, System
+
+KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
+# Of a sample time: a logger that scans five channels one after another has them as far apart.
+_MATTERS = 0.2
+
+
+def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
+    """All that a diagnosis may find: effects of the library, then clocks of the system's loggers.
+
+    Raises
+    ------
+    InputError
+        See `read_effects`.
+    """
+    return (*read_effects(library, system.models[OBSERVER].name), *clocks(system))
+
+
+def clocks(system: System) -> tuple[Effect, ...]:
+    """Clocks of loggers that may be late against that of the other signals."""
+    return tuple(_clock(system, KIND, *one) for one in system.clocks.items())
+
+
+def reference(system: System) -> str:
+    """The signal by whose clock a model runs: that which leads its motion, if one does."""
+    leading = system.comparison.leading
+    return system.outputs[0].name if leading is None else leading.output
+
+
+def own_clocks(system: System) -> tuple[Effect, ...]:
+    """A clock of each signal, against that of the reference, whatever the loggers."""
+    first = reference(system)
+    return tuple(_clock(system, OWN, one, (one,)) for one in system.signals if one != first)
+
+
+def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
+    return Effect(
+        name=f"{kind}[{name}]",
+        model=kind,
+        slots=(),
+        size=SKEW,
+        matters=_MATTERS * system.sample_time,
+        text=f"a logger of {' and '.join(signals)} whose clock is late",
+        separation="one signal that both loggers record",
+        late=signals,
+    )
+
+
+def late_signals(system: System) -> dict[str, dict[str, float]]:
+    """By the name of what says how late a clock is [s]: signals it moves, 1 later or -1 earlier.
+
+    A motion follows what leads it with the noise of each sample, which would be another if that
+    were moved: where the clock of the reference is late, all others are early.
+    """
+    first, found = reference(system), {}
+    for one in (*clocks(system), *own_clocks(system)):
+        others = [name for name in system.signals if name not in one.late]
+        moving = dict.fromkeys(others, -1.0) if first in one.late else dict.fromkeys(one.late, 1.0)
+        found[variables(one, SKEW)[0]] = moving
+    return found
+
+
+def lateness(
+    signals_of: Mapping[str, Mapping[str, float]], values: Mapping[str, float]
+) -> dict[str, float]:
+    """By how much signals are late [s], of those that are.
+
+    Parameters
+    ----------
+    signals_of : see `late_signals`.
+    values : by the same names; others are zero.
+    """
+    late: dict[str, float] = {}
+    for name, signals in signals_of.items():
+        for signal, way in signals.items() if values.get(name, 0.0) != 0.0 else ():
+            late[signal] = late.get(signal, 0.0) + way * values[name]
+    return late
+
+
+def moved(time: Vector, values: Matrix, late: float) -> Matrix:
+    """Values (n, ...) of a time `late` [s] before each sample; before the first they rest."""
+    at = np.clip(time - late, time[0], time[-1])
+    right = np.clip(np.searchsorted(time, at), 1, time.size - 1)
+    share = (at - time[right - 1]) / (time[right] - time[right - 1])
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    found: Matrix = values[right - 1] + share * (values[right] - values[right - 1])
+    return found
+
+
+def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:
+    """A recording whose late signals are moved to when they were measured.
+
+    Each sample of an output keeps its noise: that of what a restart reads is known, and a line
+    between two samples would have half of its variance, so that half a sample were favoured. Means
+    over a block move instead, in which nothing else happens. Inputs have no noise left.
+
+    Parameters
+    ----------
+    late : by signal [s].
+    """
+    if not late:
+        return samples
+    time, u, y = samples.time, samples.u.copy(), samples.y.copy()
+    for j, name in enumerate(samples.inputs):
+        if name in late:
+            u[:, j] = moved(time, u[:, j], -late[name])
+    window = int(np.median(np.diff(samples.blocks)))
+    for j, name in enumerate(samples.signals):
+        if name in late:
+            slow = uniform_filter1d(y[:, j], window, mode="nearest")
+            y[:, j] += moved(time, slow, -late[name]) - slow
+    return replace(samples, u=u, y=y)
+
+
+def case_in_time(case: Case, system: System, sizes: Mapping[tuple[str, str], float]) -> Case:
+    """As `in_time`, of all that was recorded.
+
+    Parameters
+    ----------
+    sizes : by effect and parameter, those of clocks among them.
+    """
+    named = {f"{name}.{of}": size for (name, of), size in sizes.items()}
+    late = lateness(late_signals(system), named)
+    return case.with_signals(
+        {n: moved(case.time, case[n], -by) for n, by in late.items() if n in case}
+    )

@@ -1,0 +1,173 @@
+"""What the noise of inputs does to a model's motion, and how outputs lead it back.
+
+A simulation from measured inputs adds up their noise where the machine adds up forces. The outputs
+lead the simulation by the Kalman gain for that noise and no other, so that prediction errors are
+white where the model is right and last where it is not.
+Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, expm, solve_discrete_are
+
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.observers.layout import rolling_ratio
+from workbench.observers.operating import corrected_states, linearised
+from workbench.system.system import System
+
+# Share of a state's size by which it is uncertain from sample to sample at least: what makes the
+# Riccati equation solvable, and no more.
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A model about its design point.
+
+    Attributes
+    ----------
+    states : that outputs lead; a model may have none.
+    A, B, C, D : by states, measured inputs and measured outputs.
+    nominal : (p,) typical size of the states.
+    ratio : of a state that rolls along over the one that leads it, 0 where none does.
+    """
+
+    states: tuple[str, ...]
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    nominal: Vector
+    ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """An FMU that is open in this process, for one set of recordings after the other.
+
+    Attributes
+    ----------
+    motion : of the model at its design point.
+    """
+
+    fmu: FMU
+    motion: Motion
+
+
+@contextmanager
+def opened(path: Path, system: System, given: Mapping[str, float]) -> Iterator[Opened]:
+    """Open an FMU, with values that it has instead of its defaults."""
+    with FMU(path, None, given) as fmu:
+        yield Opened(fmu, motion(fmu, system))
+
+
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """How prediction errors of the outputs correct the states, sample by sample.
+
+    Attributes
+    ----------
+    states : that are corrected.
+    gain : (p, l) constant gain.
+    ahead : (l, l) covariance of predicted outputs, by what led the states and by inputs that
+        outputs show at once.
+    """
+
+    states: tuple[str, ...]
+    gain: Matrix
+    ahead: Matrix
+
+
+def motion(fmu: FMU, system: System) -> Motion:
+    """Linearise a model at the design point; the FMU is started anew."""
+    states = corrected_states(fmu, system)
+    model = linearised(fmu, system).of(states)
+    at = [fmu.states.index(name) for name in states]
+    inputs = fmu.variables([one.name for one in system.inputs])
+    B = fmu.input_jacobian(inputs)[at]
+    outputs = [one.name for one in system.outputs]
+    # A state shows no input at once; not every FMU differentiates it.
+    shown = [name not in fmu.states for name in outputs]
+    D = np.zeros((len(outputs), len(system.inputs)))
+    seen = fmu.variables([name for name, one in zip(outputs, shown, strict=True) if one])
+    D[shown] = fmu.jacobian(seen.references, inputs)
+    ratio = rolling_ratio(fmu, system) if system.rolling else 0.0
+    return Motion(states, model.A, B, model.C, D, model.nominal, ratio)
+
+
+def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
+    """Stationary Kalman gain for the noise of the inputs alone.
+
+    Parameters
+    ----------
+    inputs, outputs : (m,) and (l,) standard deviation of a sample.
+    h : from sample to sample [s].
+    """
+    p, m = motion.B.shape
+    whole = expm(h * np.block([[motion.A, motion.B], [np.zeros((m, p + m))]]))
+    transition, driven = whole[:p, :p], whole[:p, p:] * inputs
+    least = _LEAST * motion.nominal
+    process = driven @ driven.T + np.diag(least**2)
+    # In units of noise and nominal sizes, so that the equation is well scaled.
+    scale = motion.nominal
+    Phi = transition * scale / scale[:, None]
+    C = motion.C * scale / outputs[:, None]
+    Q = process / np.outer(scale, scale)
+    D = motion.D * inputs / outputs[:, None]
+    R = np.eye(len(C)) + D @ D.T
+    try:
+        P = solve_discrete_are(Phi.T, C.T, Q, R) if p else np.zeros((0, 0))
+    except (LinAlgError, ValueError):
+        # Nothing leads.
+        P, C = np.zeros((p, p)), np.zeros_like(C)
+    innovation = C @ P @ C.T + R
+    gain = np.linalg.solve(innovation, C @ P).T * scale[:, None] / outputs
+    ahead: Matrix = (innovation - np.eye(len(C))) * np.outer(outputs, outputs)
+    return Lead(motion.states, gain, ahead)
+
+
+def effects_on_led(motion: Motion, output: str) -> Vector:
+    """Effect of each input on the rate of an output that is a state, (m,).
+
+    Along the slow motion that it is part of, by the eigenvectors of the slowest mode.
+    """
+    values, right = np.linalg.eig(motion.A)
+    rates, left = np.linalg.eig(motion.A.T)
+    v = right[:, np.argmax(values.real)].real
+    w = left[:, np.argmax(rates.real)].real
+    v = v / v[motion.states.index(output)]
+    return np.asarray(w @ motion.B / (w @ v))
+
+
+def random_walk(
+    process: Vector, measurement: float, missing: NDArray[np.bool_]
+) -> tuple[Vector, Vector]:
+    """Variance of a predicted output, and gain, where it walks at random, (n,).
+
+    Parameters
+    ----------
+    process : (n,) standard deviation of what is added up to the next sample.
+    measurement : standard deviation of a sample.
+    missing : (n,) where there is none.
+    """
+    r = max(measurement, 1e-9) ** 2
+    q = float(np.median(process)) ** 2
+    predicted, gains = np.empty_like(process), np.zeros_like(process)
+    p = 0.5 * (q + np.sqrt(q * q + 4.0 * q * r))
+    for k in range(process.size):
+        predicted[k] = p
+        if not missing[k]:
+            gains[k] = p / (p + r)
+        p = (1.0 - gains[k]) * p + process[k] ** 2
+    return predicted, gains
+
+
+def noise_of(names: tuple[str, ...], deviation: Mapping[str, float]) -> Vector:
+    """Standard deviations of samples of some signals, (k,)."""
+    return np.array([deviation[name] for name in names])

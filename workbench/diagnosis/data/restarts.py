@@ -1,0 +1,60 @@
+"""Where a simulation is begun anew from what is measured, so that an error is that of one block.
+
+A motion that runs away, as a wheel that slides, is predicted from one restart to the next only.
+Source: H. G. Bock (1983), Recent advances in parameter identification techniques for O.D.E.:
+multiple shooting, with all nodes at what is measured.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis.data.cleaning import Mask, runs
+from workbench.diagnosis.data.counting import Counted
+from workbench.diagnosis.data.whitening import parts_of_noise
+from workbench.system.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Restarts:
+    """Of one recording.
+
+    Attributes
+    ----------
+    at : (n,) whether states are set before a sample, by what the one before it reads.
+    noise : (n,) standard deviation of a reading, by output; these are states.
+    uncertain : relative standard deviation of parameters, by name.
+    """
+
+    at: Mask
+    noise: Mapping[str, Vector]
+    uncertain: Mapping[str, float]
+
+
+def restarts_of(system: System, counted: Counted) -> Restarts | None:
+    """Restarts before each block that would not count otherwise, or None if all would.
+
+    Where such a span goes on without blocks, there are as many.
+    """
+    if not counted.spans.any():
+        return None
+    at = np.zeros(counted.spans.size, np.bool_)
+    size = int(counted.blocks[0, 1] - counted.blocks[0, 0])
+    for first, end in runs(~counted.usable):
+        at[first:end:size] = counted.spans[first:end].any()
+    for first, end in counted.blocks:
+        at[first] = counted.spans[first:end].any()
+    declared = [one for one in system.comparison.exclusions if one.restarted]
+    noise = {}
+    for name in (name for one in declared for name in one.restarted):
+        values, fixed, share = counted.clean[name], counted.deviation[name] ** 2, 0.0
+        if system.signals[name].relative_noise > 0.0:
+            fixed, share = parts_of_noise(values, values, counted.usable)
+        noise[name] = np.sqrt(fixed + share * values**2)
+    return Restarts(
+        at=at,
+        noise=noise,
+        uncertain={name: share for one in declared for name, share in one.uncertain.items()},
+    )

@@ -1,0 +1,316 @@
+"""A recording made ready for statistics: what counts, what is set aside, how large noise is.
+
+Blocks are the unit of all statistics: short against everything that the machine does, long enough
+to average most of the ringing of its structure.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter, lfiltic
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.cleaning import Mask, first_value, smooth
+from workbench.diagnosis.data.counting import count
+from workbench.diagnosis.data.motion import (
+    Lead,
+    Motion,
+    effects_on_led,
+    led_by,
+    noise_of,
+    random_walk,
+)
+from workbench.diagnosis.data.restarts import Restarts, restarts_of
+from workbench.diagnosis.data.whitening import whitening
+from workbench.diagnosis.inference.thresholds import SOUND, Soundness
+from workbench.errors import InputError
+from workbench.recordings.case import Case
+from workbench.system.system import Channel, Comparison, Mode, System
+
+_STARTING = 40  # samples at usual rates, of a first value
+_RELEASED = 0.1  # share of the greatest value
+_WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-12 of chi-squared
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """One recording, sampled.
+
+    Attributes
+    ----------
+    name : of the case.
+    time : (n,) [s].
+    inputs : names of the columns of u.
+    u : (n, m) measured inputs, without noise that the model would not feel.
+    signals : names of the columns of y: outputs, and what is judged if some recording has it.
+    y, read : (n, c) measured, without and with what is wrong; zero of what this one has not.
+    silent : (c,) channels of signals that this one has not: their errors have no weight.
+    told : (n,) samples whose errors are told: those that are not wrong and that no reason excludes.
+    limits : (2, c) of what the sensors read.
+    gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
+    lead : how all outputs correct the states, or None where one leads alone.
+    restarts : where states are set as measured, or None if nowhere.
+    held : (m,) whether an input is held from a sample to the next; else it goes there.
+    begin : outputs, and what rolls along, at the start.
+    rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
+    blocks : (b, 2) first sample and end of each block that counts.
+    slopes : (c, c) of the channels by the signals.
+    whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
+    modes : by column of y, of the structure before its sensor.
+    set_aside : number of samples by reason.
+    """
+
+    name: str
+    time: Vector
+    inputs: tuple[str, ...]
+    u: Matrix
+    signals: tuple[str, ...]
+    y: Matrix
+    read: Matrix
+    silent: Mask
+    told: Mask
+    limits: Matrix
+    gain: Vector
+    lead: Lead | None
+    restarts: Restarts | None
+    held: NDArray[np.bool_]
+    begin: Mapping[str, float]
+    rest: float
+    rest_noise: float
+    blocks: NDArray[np.int64]
+    slopes: Matrix
+    whitening: NDArray[np.float64]
+    modes: Mapping[int, Mode]
+    set_aside: dict[str, int]
+
+    def falls(self, signal: str) -> bool:
+        """Whether an input falls, by more than its sensor's noise and a valve's overshoot.
+
+        Raises
+        ------
+        InputError
+            If it is none of the recorded inputs.
+        """
+        if signal not in self.inputs:
+            raise InputError(
+                where=f"recording {self.name}",
+                found=f"no recorded input '{signal}', which an effect of the library asks for",
+                expected=f"one of {', '.join(self.inputs)}",
+                remedy="correct the annotation of the effect",
+            )
+        column = self.inputs.index(signal)
+        u = np.concatenate([self.u[first:end, column] for first, end in self.blocks])
+        return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
+
+    @cached_property
+    def _filters(self) -> dict[int, tuple[Vector, Vector]]:
+        """Numerator and denominator of the modes, as digital filters; of those that show."""
+        h = float(np.median(np.diff(self.time)))
+        found = {}
+        for column, mode in self.modes.items():
+            omega = 2.0 * np.pi * mode.frequency
+            if omega * h > 2.0:
+                continue  # sampled too slowly to show the mode
+            damped = -mode.damping + 1j * np.sqrt(1.0 - mode.damping**2)
+            z = np.exp(h * omega * np.array([damped, np.conj(damped)]))
+            denominator = np.real(np.poly(z))
+            # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below
+            # three quarters of the mode's frequency.
+            found[column] = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+        return found
+
+    def behind_structure(self, column: int, values: Vector) -> Vector:
+        """What a sensor reads of quantities, (n, ...): a mode of second order in between."""
+        if column not in self._filters:
+            return values
+        numerator, denominator = self._filters[column]
+        rest = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
+        begin = np.multiply.outer(rest, values[0])
+        read: Vector = lfilter(numerator, denominator, values, axis=0, zi=begin)[0]
+        return read
+
+    def sizes(self, errors: Matrix) -> Matrix:
+        """Root mean square and mean absolute error of samples that are told, by channel, (2, c).
+
+        Where a sensor saturates, so does what the model says that it reads; NaN of what is silent.
+        """
+        said = np.clip(self.y - errors, *self.limits)
+        by_channel = (self.read - said)[self.told] @ self.slopes.T
+        by_channel[:, self.silent] = np.nan
+        return np.array(
+            [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
+        )
+
+    @property
+    def restarted(self) -> Mask:
+        """(b,) blocks that begin with states as measured."""
+        if self.restarts is None:
+            return np.zeros(len(self.blocks), np.bool_)
+        return self.restarts.at[self.blocks[:, 0]]
+
+    def loosened(self, moved: Sequence[Matrix], apart: Sequence[Matrix]) -> "Samples":
+        """The same with errors that are uncertain by more, apart from each other.
+
+        Parameters
+        ----------
+        moved : by how much one standard deviation of each cause moves block means, (b, c).
+        apart : the same of causes that each channel has by itself.
+        """
+        inverse = np.linalg.inv(self.whitening)
+        covariance = np.einsum("bij,bkj->bik", inverse, inverse)
+        for one in moved:
+            covariance += one[:, :, None] * one[:, None, :]
+        for one in apart:
+            covariance += one[:, :, None] ** 2 * np.eye(one.shape[1])
+        return replace(self, whitening=np.linalg.inv(np.linalg.cholesky(covariance)))
+
+    def channels(self, errors: Matrix) -> Matrix:
+        """Means of prediction errors (n, c, ...) over each block, by channel, (b, c, ...)."""
+        total = np.zeros((len(errors) + 1, len(self.slopes), *errors.shape[2:]))
+        for c, slopes in enumerate(self.slopes):
+            sum_ = sum(slope * errors[:, j] for j, slope in enumerate(slopes) if slope)
+            np.cumsum(sum_, axis=0, out=total[1:, c])
+        first, end = self.blocks.T
+        means: Matrix = ((total[end] - total[first]).T / (end - first)).T
+        return means
+
+
+def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
+    """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
+    judged = [one.name for one in system.judged if any(one.name in case for case in cases)]
+    return (*(one.name for one in system.outputs), *judged)
+
+
+def channels(system: System, signals: Sequence[str]) -> tuple[Channel, ...]:
+    """Channels that can be formed from some signals."""
+    missing = set(system.signals) - set(signals)
+    return tuple(one for one in system.comparison.channels if not one.formula.names & missing)
+
+
+def prepare(
+    case: Case,
+    system: System,
+    signals: tuple[str, ...],
+    values: Mapping[str, float],
+    motion: Motion,
+    sound: Soundness = SOUND,
+    *,
+    restarting: bool = True,
+) -> Samples:
+    """Make a recording ready.
+
+    Parameters
+    ----------
+    signals : that are compared, see `compared`.
+    values : parameters of the model.
+    motion : of the model at its design point.
+    sound : which samples count.
+    restarting : whether samples count where states can be restarted.
+
+    Raises
+    ------
+    InputError
+        If the recording has too little that counts.
+    """
+    time, h = case.time, float(np.median(np.diff(case.time)))
+    own = tuple(name for name in signals if name in case)
+    counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
+    clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
+    formed, told = channels(system, signals), channels(system, own)
+    slopes = np.array([one.formula.slopes(signals, values) for one in formed])
+    own_slopes = np.array([one.formula.slopes(own, values) for one in told])
+    gain, lead, ahead = _led(case, system, own, clean, deviation, counted.wrong, motion)
+    silent = np.array([one not in told for one in formed])
+    scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
+    white = whitening(system, counted, own, own_slopes, ahead)
+    nothing = np.zeros(time.size)
+    driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
+    rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
+    start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
+    first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
+    modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
+    return Samples(
+        name=case.name,
+        time=time,
+        inputs=case.inputs,
+        u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
+        signals=signals,
+        y=np.ascontiguousarray(np.column_stack([clean.get(name, nothing) for name in signals])),
+        read=np.column_stack([case[name] if name in own else nothing for name in signals]),
+        silent=silent,
+        told=counted.told,
+        limits=np.array([system.signals[name].limits for name in signals]).T,
+        gain=gain,
+        lead=lead,
+        restarts=restarts_of(system, counted),
+        held=np.array([one.held for one in system.inputs]),
+        begin=_begin(system, first, motion),
+        rest=rest,
+        rest_noise=rest_noise,
+        blocks=blocks,
+        slopes=slopes,
+        whitening=_beside_silent(white, silent, scales),
+        modes=modes,
+        set_aside=counted.set_aside,
+    )
+
+
+def _beside_silent(white: NDArray[np.float64], silent: Mask, scales: Vector) -> NDArray[np.float64]:
+    """Whitening (b, c, c) of channels that are told, and of silent ones, which have no weight."""
+    if not silent.any():
+        return white
+    beside = np.tile(np.diag(1.0 / (_WEIGHTLESS * scales)), (len(white), 1, 1))
+    told = np.flatnonzero(~silent)
+    beside[:, told[:, None], told] = white
+    return beside
+
+
+def _led(
+    case: Case,
+    system: System,
+    signals: tuple[str, ...],
+    clean: Mapping[str, Vector],
+    deviation: Mapping[str, float],
+    wrong: Mapping[str, Mask],
+    motion: Motion,
+) -> tuple[Vector, Lead | None, NDArray[np.float64]]:
+    """Gain of the led output (n,), or how all lead; covariance of what they led, (n, c, c)."""
+    time = case.time
+    h, steps = float(np.median(np.diff(time))), np.diff(time)
+    leading = system.comparison.leading
+    if leading is None:
+        ahead = np.zeros((time.size, len(signals), len(signals)))
+        inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
+        lead = led_by(motion, inputs, outputs, h)
+        count = len(case.outputs)
+        ahead[:, :count, :count] = lead.ahead
+        return np.zeros(time.size), lead, ahead
+    effects = effects_on_led(motion, leading.output)
+    moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))
+    # Noise of an input's sample acts until half way to its neighbours.
+    acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
+    led = clean[leading.output]
+    walked, gain = random_walk(moved * acting, deviation[leading.output], wrong[leading.output])
+    # What moves together is wrong together: its ratio is as sure as before.
+    moves = [n in leading.together for n in signals]
+    along = np.array([clean[n] @ led for n in signals]) / (led @ led) * moves
+    return gain, None, walked[:, None, None] * np.outer(along, along)
+
+
+def _at_rest(compare: Comparison, clean: Mapping[str, Vector], applied: int) -> tuple[float, float]:
+    """Mean of the input before it is applied, and its standard deviation."""
+    if compare.rest is None:
+        return 0.0, 1.0
+    rest = clean[compare.rest.signal][:applied]
+    spread = float(np.std(rest)) / np.sqrt(rest.size)
+    return float(np.mean(rest)), float(np.hypot(spread, compare.rest.zero))
+
+
+def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
+    """What is known of states at the start: as measured, but a follower rolls along."""
+    if system.rolling is None or system.rolling.leader not in measured:
+        return measured
+    return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}

@@ -1,0 +1,1 @@
+"""Effects that a library offers, and models extended by them."""

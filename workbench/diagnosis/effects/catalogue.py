@@ -1,0 +1,382 @@
+"""The physical effects that a Modelica library holds, each a class that describes itself.
+
+An effect is a class with `annotation(__Workbench(effect(...)))`. It says there what neither its
+code nor its description does: how large it must be to matter, and where stops can show it. Units,
+bounds and defaults are those of its parameters; which slots it fills follows from the partial class
+that it extends.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.arrays import Matrix
+from workbench.diagnosis.effects.annotation import Said
+from workbench.diagnosis.effects.slots import Slot, read_slots
+from workbench.errors import InputError, closest
+from workbench.models.modelica import Class, Library
+
+_TURNING = ("cosine", "sine")
+_ARRAY = re.compile(r"zeros\((\w+)\)")
+
+
+@dataclass(frozen=True)
+class Where:
+    """An effect is only in stops whose conditions say so, if those of any stop do.
+
+    Attributes
+    ----------
+    condition : of the stops: a state, or several.
+    state : that the effect needs.
+    share : parameter that is the share of those which have this state; empty if there is none.
+    """
+
+    condition: str
+    state: str
+    share: str
+
+
+@dataclass(frozen=True)
+class Unless:
+    """An effect is not looked for if the conditions of any stop say something.
+
+    Attributes
+    ----------
+    condition, state : as of `Where`.
+    because : why, for people.
+    """
+
+    condition: str
+    state: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Falling:
+    """An effect shows only where an input falls, by more than a tenth of its greatest value.
+
+    Attributes
+    ----------
+    signal : input of the base model.
+    because : why the effect cannot be seen where it does not, for people.
+    """
+
+    signal: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect of the library.
+
+    Attributes
+    ----------
+    name : of the Modelica class, also used in results; with its place where there are several.
+    model : dotted name of the class.
+    slots : of the base model that the class is plugged into.
+    size : parameter that is zero in the nominal model; of an order-locked effect, which has the
+        pair `cosine` and `sine`, "cosine".
+    matters : least size worth a finding, in its SI unit: what tolerances, or differences between
+        an observer model and a real machine, may fake.
+    shapes : other parameters that are fitted once the effect is found, each with values to try.
+    hidden : why recorded stops cannot show the effect; empty if they can.
+    text : what it is, for people.
+    separation : the experiment that tells it from its likely twins.
+    where, unless, falling : which stops can show it; None if all can.
+    restarted : why stops in which no state is restarted cannot show it; empty if they can.
+    place, places : which of how many elements of `size`, from 1; 0 where it is no array.
+    late : measured signals of the logger that is late; the effect is then none of a model.
+    """
+
+    name: str
+    model: str
+    slots: tuple[str, ...]
+    size: str
+    matters: float
+    text: str
+    separation: str
+    shapes: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    hidden: str = ""
+    where: Where | None = None
+    unless: Unless | None = None
+    falling: Falling | None = None
+    restarted: str = ""
+    place: int = 0
+    places: int = 0
+    late: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Name of the Modelica class, without a place."""
+        return self.model.rpartition(".")[2]
+
+    @property
+    def order_locked(self) -> bool:
+        """Whether the effect turns with a shaft, with a phase of its own in each stop."""
+        return self.size == _TURNING[0]
+
+    @property
+    def precision(self) -> Matrix:
+        """Inverse covariance of its sizes as known beforehand; empty where nothing is."""
+        return np.zeros((0, 0))
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Parameters that are zero in the nominal model."""
+        return _TURNING if self.order_locked else (self.size,)
+
+    @property
+    def label(self) -> str:
+        """Name of the size in results."""
+        return "amplitude" if self.order_locked else self.size
+
+
+def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
+    """Effects of a library, in its order; those of libraries that it uses are not among them.
+
+    Of effects that nothing in the data tells apart the usual one stands first. Where the order of
+    `package.order` does not serve that, `after="Other"` puts an effect right behind the other one.
+
+    Parameters
+    ----------
+    base : name of the model whose slots they fill.
+
+    Raises
+    ------
+    InputError
+        If an effect fills no slot of the base model, lacks what it must say or says something else,
+        or is not nominal by default.
+    """
+    slots = read_slots(library, base)
+    effects: dict[str, Effect] = {}
+    after: dict[str, str] = {}
+    for one in library.classes.values():
+        if not one.name.startswith(f"{library.name}."):
+            continue
+        said = Said(f"{one.where}, __Workbench", one.vendor)
+        said.only("effect")
+        if "effect" not in one.vendor:
+            continue
+        entry = said.part("effect")
+        effect = _read(library, slots, one, entry)
+        if effect.name in effects:
+            raise InputError(
+                where=one.where,
+                found=f"a second effect {effect.name}",
+                expected=f"one, which is {effects[effect.name].model}",
+                remedy="rename one of the two",
+            )
+        effects[effect.name] = effect
+        if other := entry.text("after", ""):
+            after[effect.name] = other
+    ordered = [effects[name] for name in _ordered(library, list(effects), after)]
+    return tuple(placed for one in ordered for placed in _placed(library, one))
+
+
+def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects by name, in their order; all of them if none is named.
+
+    Raises
+    ------
+    InputError
+        If there is no effect of a name.
+    """
+    known = dict.fromkeys(name for effect in effects for name in (effect.kind, effect.name))
+    for name in names:
+        if name not in known:
+            raise InputError(
+                where=f"--effects {name}",
+                found=f"no effect of this name{closest(name, known)}",
+                expected=f"some of {', '.join(known)}",
+                remedy="correct the name",
+            )
+    return tuple(one for one in effects if not names or {one.name, one.kind} & set(names))
+
+
+def _placed(library: Library, effect: Effect) -> list[Effect]:
+    """An effect whose size is an array, `zeros(n)`, in each of its places."""
+    components = library.components(effect.model)
+    array = _ARRAY.fullmatch(components[effect.size].modifier.value)
+    if array is None:
+        return [effect]
+    if effect.shapes:
+        raise InputError(
+            where=components[effect.size].where,
+            found=f"shapes of {effect.name}, which has a size for each place",
+            expected="none: one shape would have to serve all places",
+            remedy="remove them, or make each place an effect of its own",
+        )
+    count = components[array[1]].modifier.value if array[1] in components else array[1]
+    if not count.isdigit():
+        raise InputError(
+            where=components[effect.size].where,
+            found=f"{effect.size} = zeros({array[1]})",
+            expected=f"'parameter Integer {array[1]} = 8', a number of places",
+            remedy="give the class that number",
+        )
+    names = [(place, f"{effect.name}[{place}]") for place in range(1, int(count) + 1)]
+    return [replace(effect, name=name, place=k, places=int(count)) for k, name in names]
+
+
+def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Effect:
+    said.only(
+        *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
+        *("where", "unless", "falling", "restarted"),
+    )
+    size = said.content.get("size")
+    if isinstance(size, tuple) and sorted(size) == sorted(_TURNING):
+        size = _TURNING[0]
+    else:
+        size = said.text("size")
+    shapes = said.part("shapes") if "shapes" in said.content else Said(said.where, {})
+    effect = Effect(
+        name=one.name.rpartition(".")[2],
+        model=one.name,
+        slots=_slots(library, slots, one, said),
+        size=size,
+        matters=said.number("matters"),
+        text=_within_sentence(one.description),
+        separation=said.text("separation"),
+        shapes=tuple((name, shapes.numbers(name)) for name in shapes.content),
+        hidden=said.text("hidden", ""),
+        where=_where(said),
+        unless=_unless(said),
+        falling=_falling(said),
+        restarted=_restarted(said),
+    )
+    _check_parameters(library, one, effect)
+    _check_extends(library, one)
+    return effect
+
+
+def _slots(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> tuple[str, ...]:
+    extended = library.ancestors(one.name)
+    # A class that adds inputs to the partial class of a slot is for one that has them.
+    parts = library.components(one.name).items()
+    asked = {name for name, part in parts if "input" in part.prefixes and not part.modifier.value}
+    fitting = tuple(
+        slot.name for slot in slots if slot.partial in extended and asked <= set(slot.inputs)
+    )
+    if not fitting:
+        partials = dict.fromkeys(slot.partial for slot in slots)
+        raise InputError(
+            where=one.where,
+            found=f"effect {one.name}, which extends no slot of the base model",
+            expected=f"one that extends {' or '.join(partials) or 'a slot, but there is none'}",
+            remedy="let it extend the partial class of its slot, or remove its annotation",
+        )
+    chosen = said.texts("slots") if "slots" in said.content else fitting
+    for name in chosen:
+        if name not in fitting:
+            raise InputError(
+                where=said.where,
+                found=f"slot '{name}'{closest(name, fitting)}",
+                expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
+                remedy="correct the name",
+            )
+    return tuple(name for name in fitting if name in chosen)
+
+
+def _where(said: Said) -> Where | None:
+    if "where" not in said.content:
+        return None
+    part = said.part("where")
+    part.only("condition", "is", "share")
+    return Where(part.text("condition"), part.text("is"), part.text("share", ""))
+
+
+def _unless(said: Said) -> Unless | None:
+    if "unless" not in said.content:
+        return None
+    part = said.part("unless")
+    part.only("condition", "is", "because")
+    return Unless(part.text("condition"), part.text("is"), part.text("because"))
+
+
+def _falling(said: Said) -> Falling | None:
+    if "falling" not in said.content:
+        return None
+    part = said.part("falling")
+    part.only("signal", "because")
+    return Falling(part.text("signal"), part.text("because"))
+
+
+def _restarted(said: Said) -> str:
+    if "restarted" not in said.content:
+        return ""
+    part = said.part("restarted")
+    part.only("because")
+    return part.text("because")
+
+
+def _check_extends(library: Library, one: Class) -> None:
+    """Refuse `extends Law(p(max=1) = 0.5)`, of which the compiler takes the value alone."""
+    for name in (one.name, *library.ancestors(one.name)):
+        for base in library.classes[name].extends:
+            for key, modifier in base.modifier.inner.items():
+                if modifier.value and modifier.inner:
+                    raise InputError(
+                        where=library.classes[name].where,
+                        found=f"{key}(...) = {modifier.value} where it extends {base.name}",
+                        expected="a value or attributes, not both",
+                        remedy="give the attributes in a class between the two",
+                    )
+
+
+def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
+    """All that the annotation names is a parameter, and a size is zero by default."""
+    components = library.components(one.name)
+    parameters = {name: c for name, c in components.items() if "parameter" in c.prefixes}
+    shared = (effect.where.share,) if effect.where and effect.where.share else ()
+    for name in (*effect.sizes, *(name for name, _ in effect.shapes), *shared):
+        if name not in parameters:
+            raise InputError(
+                where=one.where,
+                found=f"effect {one.name} without a parameter '{name}'{closest(name, parameters)}",
+                expected=f"one of {', '.join(parameters) or 'its parameters, but it has none'}",
+                remedy="correct the annotation, or declare the parameter",
+            )
+    for name in effect.sizes:
+        value = parameters[name].modifier.value
+        if value not in ("0", "0.0") and not _ARRAY.fullmatch(value):
+            raise InputError(
+                where=parameters[name].where,
+                found=f"{name} = {value}" if value else f"{name} without a value",
+                expected=f"'= 0.0': by default, {one.name} is the nominal model exactly",
+                remedy="let the size of the effect be zero by default",
+            )
+
+
+def _ordered(library: Library, names: list[str], after: Mapping[str, str]) -> list[str]:
+    ordered = [name for name in names if name not in after]
+    waiting = [name for name in names if name in after]
+    while waiting:
+        ready = [name for name in waiting if after[name] in ordered]
+        if not ready:
+            raise InputError(
+                where=f"{library.file}, effect {waiting[0]}",
+                found=f'after="{after[waiting[0]]}"{closest(after[waiting[0]], ordered)}',
+                expected="another effect, which does not stand after this one",
+                remedy="correct the name",
+            )
+        ordered.insert(ordered.index(after[ready[0]]) + 1, ready[0])
+        waiting.remove(ready[0])
+    return ordered
+
+
+def _within_sentence(description: str) -> str:
+    """A description as it is read within a sentence.
+
+    >>> _within_sentence("Pads that lag"), _within_sentence("CO2 in the air")
+    ('pads that lag', 'CO2 in the air')
+    """
+    if description[1:2].isupper():
+        return description
+    return description[:1].lower() + description[1:]
+
+
+def variant(effect: Effect, shape: Mapping[str, float]) -> str:
+    """Name of a candidate with a shape, such as 'Hysteresis tau=1.4'."""
+    return " ".join([effect.name, *(f"{name}={value:g}" for name, value in shape.items())])

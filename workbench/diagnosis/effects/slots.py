@@ -1,0 +1,105 @@
+"""Slots of a base model: its replaceable components, and how effects in one of them stand together.
+
+All follows from the partial class that constrains a slot. Where each of its outputs is of the same
+kind as the input of its place, values go in and come out, and effects form a chain: the k-th output
+of one is the k-th input of the next. Where it is not, as where a speed goes in and a torque comes
+out, each effect sees the same inputs, and what they change adds up. An output whose value in the
+partial class is one of the inputs is handed on, by effects that say nothing of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from workbench.errors import InputError
+from workbench.models.modelica import Library
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place that effects fill.
+
+    Attributes
+    ----------
+    name : of the base model's component.
+    partial : dotted name of the class that each effect in it extends.
+    counts : numbers of places, Integer parameters of the partial class.
+    inputs, outputs : of the partial class, in its order; outputs that it has an equation for are
+        left out.
+    chained : whether outputs continue inputs; else changes add up.
+    nominal : dotted name of the class in the base model.
+    settled : whether the base model gives that class its inputs and counts and nothing else.
+    handed : outputs that are handed on, and the input that each is.
+    """
+
+    name: str
+    partial: str
+    counts: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    chained: bool
+    nominal: str
+    settled: bool
+    handed: Mapping[str, str]
+
+
+def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
+    """Slots of a base model, in its order: replaceable components with a constraining class.
+
+    Raises
+    ------
+    InputError
+        If there is no such model, or a constraining class is none of the library.
+    """
+    model = library.find(base).name
+    slots = []
+    for component in library.components(model).values():
+        if "replaceable" not in component.prefixes or not component.constraint:
+            continue
+        partial = library.resolve(component.constraint, component.owner)
+        if partial not in library.classes:
+            raise InputError(
+                where=component.where,
+                found=f"slot '{component.name}' constrained by {partial}",
+                expected=f"a class of {library.name}",
+                remedy="constrain it by a partial class of the library",
+            )
+        declared = library.components(partial)
+        inputs = [one for one in declared.values() if "input" in one.prefixes]
+        computed = {
+            name
+            for one in (partial, *library.ancestors(partial))
+            for name in library.classes[one].equations
+        }
+        outputs = [
+            one
+            for one in declared.values()
+            if "output" in one.prefixes and one.name not in computed and not one.modifier.value
+        ]
+        counts = tuple(
+            one.name
+            for one in declared.values()
+            if one.type == "Integer" and "parameter" in one.prefixes
+        )
+        names = {*counts, *(one.name for one in inputs)}
+        slots.append(
+            Slot(
+                name=component.name,
+                partial=partial,
+                counts=counts,
+                inputs=tuple(one.name for one in inputs),
+                outputs=tuple(one.name for one in outputs),
+                chained=len(outputs) <= len(inputs)
+                and all(
+                    library.unit(inlet) == library.unit(outlet)
+                    for inlet, outlet in zip(inputs, outputs, strict=False)
+                ),
+                nominal=library.resolve(component.type, component.owner),
+                settled=component.modifier.inner.keys() <= names,
+                handed={
+                    one.name: one.modifier.value
+                    for one in declared.values()
+                    if "output" in one.prefixes and one.modifier.value in names
+                },
+            )
+        )
+    return tuple(slots)

@@ -1,0 +1,1 @@
+"""From whitened residuals to a verdict: fit, search, selection."""

@@ -1,0 +1,75 @@
+"""How well a model predicts what it was not fitted to.
+
+Each recording is left out in turn; of a single recording, each of its parts. Source: M. Stone
+(1974), J. R. Stat. Soc. B 36, 111-147.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.cleaning import Mask
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import lasting
+from workbench.diagnosis.inference.quadratic import Quadratic, add, minimum
+from workbench.diagnosis.inference.search import Fitted
+
+_ROUNDS = 3  # of a fit without one part, which begins where all parts were fitted
+
+
+class CrossValidation:
+    """Of fits to one set of recordings."""
+
+    def __init__(self, fit: Fit) -> None:
+        self._fit = fit
+        self._known: dict[int, tuple[Fitted, list[Matrix]]] = {}
+
+    def squares(self, one: Fitted, *, fast: bool) -> Vector:
+        """Mean square of errors of each recording, fitted to the others, (K,); noise leaves 1.
+
+        Parameters
+        ----------
+        fast : of blocks instead of means over a lasting time.
+        """
+        if id(one) not in self._known:
+            self._known[id(one)] = one, self._errors(one)
+        span = one.linearised.lasting
+        return np.array(
+            [
+                (errors[:, told] ** 2 if fast else lasting(errors[:, told], span)).mean()
+                for errors, told in zip(self._known[id(one)][1], self._told(one), strict=True)
+            ]
+        )
+
+    def explained(self, less: Fitted, best: Fitted, *, fast: bool) -> tuple[float, float]:
+        """Share of the explainable by which two fits differ; mean square error of the first."""
+        before, after = (float(self.squares(one, fast=fast).mean()) for one in (less, best))
+        return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
+
+    def _told(self, one: Fitted) -> list[Mask]:
+        """Channels that are told, of each recording or part."""
+        told = [evidence.blocks > 0 for evidence in one.linearised.evidence]
+        return told * self._fit.parts if self._fit.unknowns.count == 1 else told
+
+    def _errors(self, one: Fitted) -> list[Matrix]:
+        if self._fit.unknowns.count == 1:
+            return self._fit.together(partial(self._refitted, one), range(self._fit.parts))
+        return self._extrapolated(one)
+
+    def _refitted(self, one: Fitted, part: int) -> Matrix:
+        """Whitened errors of one part, after a fit without it: laws may bend much within one."""
+        hidden = self._fit.without(part)
+        lin = hidden.refine(hidden.hide(one.linearised), one.active, _ROUNDS)
+        return self._fit.at(lin.point).evidence[0].errors[self._fit.blocks_of(part)]
+
+    def _extrapolated(self, one: Fitted) -> list[Matrix]:
+        """Whitened errors of each recording, by one step from the fit to all of them."""
+        joint = self._fit.quadratics(self._fit.linearise(one.linearised, one.active))
+        stops = joint.stops()
+        total = add([*stops, joint.prior])
+        found = []
+        for stop, system in zip(stops, joint.systems, strict=True):
+            z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
+            found.append(system.errors(z) * np.sqrt(one.linearised.inflation))
+        return found

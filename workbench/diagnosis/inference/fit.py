@@ -1,0 +1,406 @@
+"""Fit of effects to all recordings at once, with what differs between them by nature.
+
+What differs between recordings has priors, and is eliminated one recording after the other. What is
+left of a recording is a small quadratic form in the common unknowns, which sums and
+leaves-one-out are made of.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis.data.clocks import own_clocks, reference
+from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.effects.extension import sizes_by_component, variables
+from workbench.diagnosis.inference.linearised import Linearised, Point, between, lasting, slowness
+from workbench.diagnosis.inference.quadratic import (
+    Joint,
+    Key,
+    Quadratic,
+    RecordingSystem,
+    part_edges,
+)
+from workbench.diagnosis.inference.thresholds import Thresholds, of_system
+from workbench.diagnosis.inference.unknowns import SENSOR, Unknowns
+from workbench.diagnosis.simulation.evidence import Item, Result, Simulations
+from workbench.diagnosis.simulation.prediction import Variation
+from workbench.diagnosis.simulation.simulator import Evidence
+from workbench.errors import FMUError, InputError
+from workbench.recordings.case import Case
+
+# A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
+_PARTS = 10
+_HALVED = 4  # times: after that a step is given up
+_ROUNDS = 8  # evaluations of a least chi-squared, at most
+_WORTH = 1.0  # of chi-squared: what noise moves it by
+_TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
+
+_LOCAL = ""  # in place of an effect, of what differs between recordings
+
+
+class Fit:
+    """Evidence and least squares of one set of recordings.
+
+    Parameters
+    ----------
+    simulations : that give the evidence.
+    effects : that may be asked for.
+    decides : thresholds, those of the usual rate of false alarms if none are given.
+    beside : other recordings of the machine, whose conditions say what it has too.
+
+    Raises
+    ------
+    InputError
+        If a single recording is too short for two parts, of which one is held out.
+    """
+
+    def __init__(
+        self,
+        simulations: Simulations,
+        effects: Sequence[Effect],
+        decides: Thresholds | None = None,
+        beside: Sequence[Case] = (),
+    ) -> None:
+        self._simulations = simulations
+        self._compare = simulations.system.comparison
+        self.decides = decides or of_system(self._compare, len(effects))
+        self.unknowns = Unknowns(simulations, effects, beside)
+        self._hidden = slice(0)  # blocks that do not count
+        if self.unknowns.count == 1 and not beside and self.parts < 2:
+            one, compare = simulations.recordings[0], self._compare
+            raise InputError(
+                where=one.name,
+                found=f"one recording, {compare.block * len(one.blocks):.3g} s that count",
+                expected=f"{2 * compare.lasting:g} s or more of one alone, because a cause is "
+                "judged on a part it was not fitted to",
+                remedy="give more recordings of this machine, or a longer one",
+            )
+
+    def without(self, part: int) -> "Fit":
+        """The same without one part of a single recording."""
+        other = copy(self)
+        other._hidden = self.blocks_of(part)
+        return other
+
+    @property
+    def reference(self) -> str:
+        """The signal against which clocks of others are late."""
+        return reference(self._simulations.system)
+
+    @property
+    def own_clocks(self) -> tuple[Effect, ...]:
+        """A clock of each recorded signal but the reference, whatever the loggers."""
+        one, system = self._simulations.recordings[0], self._simulations.system
+        return tuple(c for c in own_clocks(system) if {*c.late} <= {*one.inputs, *one.signals})
+
+    def beside(self, effects: Sequence[Effect]) -> "Fit":
+        """The same with more effects that may be asked for."""
+        other = copy(self)
+        other.unknowns = copy(self.unknowns)
+        other.unknowns.effects = {**self.unknowns.effects, **{one.name: one for one in effects}}
+        return other
+
+    def blocks_of(self, part: int) -> slice:
+        """Blocks of a part of a single recording."""
+        edges = part_edges(len(self._simulations.recordings[0].blocks), self.parts)
+        return slice(edges[part], edges[part + 1])
+
+    def hide(self, lin: Linearised) -> Linearised:
+        """The same, as if what is hidden from this fit had neither errors nor derivatives."""
+        return replace(lin, evidence=tuple(self._shown(lin.evidence)))
+
+    def _shown(self, evidence: Sequence[Evidence]) -> Sequence[Evidence]:
+        if self._hidden == slice(0):
+            return evidence
+        (one,) = evidence
+        errors, jacobian = one.errors.copy(), one.jacobian.copy()
+        errors[self._hidden] = 0.0
+        jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
+        return (replace(one, errors=errors, jacobian=jacobian),)
+
+    @property
+    def delays(self) -> tuple[Key, ...]:
+        """Keys of the derivatives that cost no simulation."""
+        return tuple((_LOCAL, name) for name in self.unknowns.modes)
+
+    @property
+    def lasting(self) -> int:
+        """Blocks from which on an error is no noise."""
+        return max(1, round(self._compare.lasting / self._compare.block))
+
+    def at(self, point: Point) -> Linearised:
+        """Gather errors at a point; of derivatives, only what costs no simulation."""
+        evidence = self._shown(self._simulations.at(self.unknowns.values(point)))
+        known = self._prior(point, [*point.sizes, *point.levels])
+        away = float(np.square(point.deviations).sum()) + known.c
+        slow, excess = slowness(evidence, self.lasting), self.decides.excess
+        return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
+
+    @property
+    def restarted(self) -> list[int]:
+        """Recordings of which samples count where states are restarted, and a law is simplified."""
+        found = self._simulations.recordings
+        return [k for k, one in enumerate(found) if one.restarted.any()]
+
+    def astray(self, lin: Linearised) -> list[int]:
+        """Recordings in which errors last where states are restarted: another law holds there."""
+        found = []
+        for k, (one, evidence) in enumerate(
+            zip(self._simulations.recordings, lin.evidence, strict=True)
+        ):
+            errors = evidence.errors[one.restarted]
+            if not len(errors):
+                continue
+            squares = lasting(errors, min(self.lasting, len(errors)))
+            # Few means may be larger by chance than what is wrong of many.
+            count = len(squares)
+            if squares.mean(axis=0).max() > max(
+                self.decides.wrong, self.decides.fall_of(count) / count
+            ):
+                found.append(k)
+        return found
+
+    def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
+        """See `Simulations.count_restarted`; what was fitted before has to be fitted anew."""
+        self._simulations.count_restarted(numbers, counting=counting)
+
+    def tried(self, point: Point) -> Linearised | None:
+        """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""
+        try:
+            return self.at(point)
+        except FMUError:
+            return None
+
+    def linearise(
+        self,
+        lin: Linearised,
+        active: Sequence[Effect],
+        candidates: Sequence[tuple[Effect, Mapping[str, float]]] = (),
+    ) -> Linearised:
+        """Add the derivatives that are not there yet.
+
+        Parameters
+        ----------
+        active : effects that the point has.
+        candidates : others, each with the shape it is tried with.
+        """
+        names = dict.fromkeys([*self._compare.levels, *self.unknowns.local])
+        columns = {(_LOCAL, name): Variation((name,)) for name in names}
+        for effect in active:
+            for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
+                columns[effect.name, parameter] = Variation(variables(effect, parameter))
+        for effect, shape in candidates:
+            setting = {
+                name: value
+                for parameter, value in shape.items()
+                for name in variables(effect, parameter)
+            }
+            for parameter in effect.sizes:
+                column = Variation(variables(effect, parameter), setting)
+                columns[variant(effect, shape), parameter] = column
+        missing = {key: column for key, column in columns.items() if key not in lin.keys}
+        if not missing:
+            return lin
+        values = self.unknowns.values(lin.point)
+        sizes = sizes_by_component(self.unknowns.effects.values())
+        more = self._simulations.derivatives(values, list(missing.values()), sizes)
+        return self.hide(lin.extended(missing, more))
+
+    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """Every stop over the common unknowns, local ones eliminated.
+
+        Parameters
+        ----------
+        extra : columns of candidates that join the common unknowns as they are.
+        """
+        shared = [*lin.point.sizes, *lin.point.levels, *extra]
+        systems = [self._system(lin, k, shared) for k in range(self.unknowns.count)]
+        known = tuple(shared[: len(shared) - len(extra)])
+        levels = tuple(lin.point.levels)
+        return Joint(tuple(shared), known, levels, tuple(systems), self._prior(lin.point, shared))
+
+    @property
+    def tests(self) -> list[str]:
+        """Names of what is held out in turn: recordings, or parts of a single one."""
+        if self.unknowns.count > 1:
+            return self.unknowns.names
+        return [f"part {k} of {self.parts}" for k in range(1, self.parts + 1)]
+
+    @property
+    def parts(self) -> int:
+        """Of a single recording, each long enough for an error that lasts."""
+        return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
+
+    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+        """As `quadratics`, in what is held out in turn."""
+        return self.quadratics(lin, extra).apart(self.parts)
+
+    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
+        point, case = lin.point, self._simulations.cases[k]
+        evidence = lin.evidence[k]
+        b, m = evidence.errors.shape
+        weight = np.append(np.tile(1.0 / np.sqrt(lin.inflation), b), 1.0)
+        at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
+        J, P = np.zeros((b * m + 1, len(shared))), []
+        for j, key in enumerate(shared):
+            if key in point.levels and key[1] == SENSOR:
+                J[:, j] = at[_LOCAL, key[0]]
+            elif key in point.levels:
+                if key[1] == self.unknowns.choice(key[0], case):
+                    J[:, j] = at[_LOCAL, key[0]] * self.unknowns.shared(point, key[0], k)
+            elif key[1] == "amplitude":
+                cosine, sine, phase = (
+                    at[key[0], "cosine"],
+                    at[key[0], "sine"],
+                    point.phases[key[0]][k],
+                )
+                J[:, j] = np.cos(phase) * cosine + np.sin(phase) * sine
+                P.append(point.sizes[key] * (np.cos(phase) * sine - np.sin(phase) * cosine))
+            else:
+                effect = self.unknowns.effects[key[0].partition(" ")[0]]
+                J[:, j] = at[key] * float(self.unknowns.presence.at(effect, k))
+        tolerances = [
+            at[_LOCAL, name] * self.unknowns.spread(point, name, k, spread)
+            for name, spread in self.unknowns.local.items()
+        ]
+        free = np.zeros((b * m + 1, 0))
+        local = np.column_stack([free, *tolerances, *P])
+        furthest = np.repeat([self.decides.furthest, _TURN], [len(tolerances), len(P)])
+        r, deviations = evidence.residual * weight, point.deviations[k]
+        return RecordingSystem(r, J, local, deviations, furthest, m)
+
+    def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
+        """What is known of the common unknowns beforehand."""
+        N, g, c = np.zeros((len(shared),) * 2), np.zeros(len(shared)), 0.0
+        for effect in {name: self.unknowns.effects.get(name) for name, _ in point.sizes}.values():
+            if effect is None or not len(effect.precision):
+                continue
+            at = [shared.index((effect.name, parameter)) for parameter in effect.sizes]
+            z = np.array([point.sizes[effect.name, parameter] for parameter in effect.sizes])
+            N[np.ix_(at, at)] = effect.precision
+            g[at] = effect.precision @ z
+            c += float(z @ effect.precision @ z)
+        for j, key in enumerate(shared):
+            if key not in point.levels:
+                continue
+            middle, sigma = self.unknowns.expected(key)
+            if np.isfinite(sigma):
+                away = (point.levels[key] - middle) / sigma
+                N[j, j], g[j], c = 1.0 / sigma**2, away / sigma, c + away**2
+        return Quadratic(N, g, c, 0)
+
+    def refine(
+        self,
+        best: Linearised,
+        active: Sequence[Effect],
+        rounds: int,
+        spread: Vector | None = None,
+        held: Mapping[Key, float] = MappingProxyType({}),
+    ) -> Linearised:
+        """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
+
+        Parameters
+        ----------
+        best : where to begin.
+        rounds : most evaluations; a step that made things worse is halved, which costs one.
+        spread : (m,) for the first step, if not that of the point: an effect that has only just
+            been put beside levels fitted without it makes all channels wrong.
+        held : common unknowns that are not fitted, at these values.
+
+        Returns
+        -------
+        best : the best point that was met; derivatives may be missing.
+        """
+        best = self.linearise(best, active)
+        first = best.spread if spread is None else spread
+        point, halved = self.stepped(best, first, held), 0
+        worse = self.decides.worse
+        for left in reversed(range(rounds)):
+            tried = self.tried(point)
+            fall = -np.inf if tried is None else best.deviance - tried.deviance
+            better = fall > -worse
+            if tried is not None and better:
+                best, halved = tried, 0
+            if abs(fall) < worse or halved == _HALVED:
+                return replace(best, settled=True)
+            if left == 0:
+                break
+            if better:
+                best = self.linearise(best, active)
+                point = self.stepped(best, best.spread, held)
+            else:
+                point, halved = between(best.point, point), halved + 1
+        return best
+
+    def least(
+        self, best: Linearised, active: Sequence[Effect], inflation: Vector, right: float = np.inf
+    ) -> tuple[float, Linearised]:
+        """Least chi-squared, tolerances included, and its point, where derivatives may be missing.
+
+        Gauss-Newton; a worse step is halved. Two small falls end it: in a bent valley one may be.
+
+        Parameters
+        ----------
+        best : where to begin.
+        inflation : (m,) variance of what is wrong in each channel over that of white noise.
+        right : what a right model leaves, if known; noise moves what is beyond by twice its root.
+        """
+        best, fall = self.linearise(replace(best, inflation=inflation), active), np.inf
+        least, point = self.quadratics(best).chi_squared, best.point
+        for _ in range(_ROUNDS):
+            best = self.linearise(best, active)
+            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
+            before, fall = abs(fall), -np.inf
+            if (tried := self.tried(point)) is not None:
+                tried = replace(tried, inflation=inflation)
+                fall = least - self.quadratics(tried.derived_as(best)).chi_squared
+                if fall > 0.0:
+                    best, least = tried, least - fall
+            if abs(fall) < _WORTH or max(before, abs(fall)) ** 2 < least - right:
+                break
+        return least, best
+
+    def stepped(self, lin: Linearised, spread: Vector, held: Mapping[Key, float]) -> Point:
+        """Where derivatives have the best point, beside what is held at values of its own."""
+        joint, point = self.quadratics(replace(lin, inflation=spread)), lin.point
+        at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
+        reach = [
+            (held[key], held[key]) if key in held else self._reach(point, key)
+            for key in joint.shared
+        ]
+        low, high = np.array(reach).reshape(-1, 2).T
+        count = len(self.unknowns.local)
+        step, locals_ = joint.solve(low - at, high - at)
+        sizes, levels = dict(point.sizes), dict(point.levels)
+        for key, value, least, greatest in zip(joint.shared, at + step, low, high, strict=True):
+            kind = levels if key in levels else sizes
+            kind[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
+        changes = np.array(locals_[: self.unknowns.count])
+        locked = enumerate(name for name, parameter in joint.shared if parameter == "amplitude")
+        phases = {name: point.phases[name] + changes[:, count + j] for j, name in locked}
+        return Point(sizes, levels, point.deviations + changes[:, :count], phases)
+
+    def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Results of a job that fits, by item."""
+        return self._simulations.together(job, items)
+
+    def _reach(self, point: Point, key: Key) -> tuple[float, float]:
+        """Least and greatest value after a step of a common unknown.
+
+        Within the bounds of its parameter, and not too unlikely; a shape changes by half at most.
+        """
+        if key in point.levels:
+            middle, sigma = self.unknowns.expected(key)
+            reach = self.decides.furthest_level * sigma
+            low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
+            return max(low, middle - reach), min(high, middle + reach)
+        effect, old = self.unknowns.effects[key[0]], point.sizes[key]
+        parameter = effect.size if key[1] == "amplitude" else key[1]
+        low, high = self.unknowns.bounds(effect, parameter)
+        if parameter in effect.sizes:
+            return low, high
+        return max(low, 0.5 * old), min(high, 2.0 * old)

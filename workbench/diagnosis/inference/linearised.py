@@ -1,0 +1,151 @@
+"""A point of the fit, and what the stops say about it: errors, derivatives, likelihood."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.inference.quadratic import Key
+from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.simulation.simulator import Evidence
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all unknowns.
+
+    Attributes
+    ----------
+    sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
+    levels : common level by parameter and choice of a condition, or by delay.
+    deviations : of each recording from the common values, in standard deviations, (K, d).
+    phases : [rad] of order-locked effects, (K,) by effect.
+    """
+
+    sizes: Mapping[Key, float]
+    levels: Mapping[Key, float]
+    deviations: Matrix
+    phases: Mapping[str, Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Evidence of all stops about a point.
+
+    Attributes
+    ----------
+    keys : of the columns of each jacobian: delays, what differs between recordings, (effect,
+        parameter).
+    lasting : blocks from which on an error is no noise.
+    inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
+    away : chi-squared of levels and deviations against what tolerances say of them.
+    excess : see `Thresholds`.
+    settled : whether a fit that ended here found no step that is worth one.
+    """
+
+    point: Point
+    keys: tuple[Key, ...]
+    evidence: tuple[Evidence, ...]
+    lasting: int
+    inflation: Vector
+    away: float
+    excess: float = Thresholds.excess
+    settled: bool = False
+
+    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
+        """The same with more columns, (b*m + 1, p) of each stop."""
+        evidence = tuple(
+            replace(one, jacobian=np.column_stack([one.jacobian, more]))
+            for one, more in zip(self.evidence, jacobians, strict=True)
+        )
+        return replace(self, keys=(*self.keys, *keys), evidence=evidence)
+
+    def derived_as(self, other: "Linearised") -> "Linearised":
+        """The same with derivatives at another point, where errors alone are asked for."""
+        evidence = tuple(
+            replace(one, jacobian=there.jacobian)
+            for one, there in zip(self.evidence, other.evidence, strict=True)
+        )
+        return replace(self, keys=other.keys, evidence=evidence)
+
+    @property
+    def misfit(self) -> float:
+        """Chi-squared of all stops at the point, in units of the noise."""
+        return float(sum(one.residual @ one.residual for one in self.evidence))
+
+    @property
+    def _squares(self) -> tuple[Vector, Vector]:
+        """Number of blocks that are told, and mean square of their errors, by channel (m,)."""
+        errors = np.concatenate([one.errors for one in self.evidence])
+        return _told(self.evidence), _share(self.evidence) * np.square(errors).mean(axis=0)
+
+    @property
+    def deviance(self) -> float:
+        """What a fit makes least: minus twice the log likelihood, up to a constant.
+
+        Of a channel that is wrong, the variance is unknown, and errors that last count once:
+        its logarithm counts. To spoil one channel for another is no gain then.
+        Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
+        """
+        count, mean = self._squares
+        noise = count * np.minimum(mean, 1.0 + self.excess)
+        wrong = count / self.lasting * np.log(self.spread)
+        rest = sum(one.rest**2 for one in self.evidence)
+        return float((noise + wrong).sum()) + rest + self.away
+
+    @property
+    def spread(self) -> Vector:
+        """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
+        wrong: Vector = np.maximum(0.0, self._squares[1] - (1.0 + self.excess))
+        return 1.0 + self.lasting * wrong
+
+    def weighed(self, inflation: Vector) -> float:
+        """Chi-squared, each channel in units of what is wrong with it, (m,)."""
+        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
+
+
+def lasting(errors: Matrix, blocks: int) -> Matrix:
+    """Squares of means of so many whitened errors (b, c), times their number: noise leaves 1."""
+    count = len(errors) // blocks * blocks
+    means = errors[:count].reshape(-1, blocks, errors.shape[1]).mean(axis=1)
+    squares: Matrix = blocks * means**2
+    return squares
+
+
+def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
+    """Variance of errors that last over that of white noise, by channel, at least 1.
+
+    What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
+    against that, not against the noise.
+    """
+    squares = np.concatenate([lasting(one.errors, blocks) for one in evidence])
+    slow: Vector = np.maximum(1.0, _share(evidence) * squares.mean(axis=0))
+    return slow
+
+
+def _told(evidence: Sequence[Evidence]) -> Vector:
+    """Number of blocks that are told, by channel (m,)."""
+    counts: Vector = np.sum([one.blocks for one in evidence], axis=0)
+    return counts
+
+
+def _share(evidence: Sequence[Evidence]) -> Vector:
+    """Blocks over those that are told, by channel (m,): silent ones have no errors."""
+    share: Vector = sum(len(one.errors) for one in evidence) / _told(evidence)
+    return share
+
+
+def between(one: Point, other: Point) -> Point:
+    """Half way; nothing that one of them lacks."""
+
+    def half(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> dict[Any, Any]:
+        return {key: 0.5 * (value + b[key]) for key, value in a.items()}
+
+    return Point(
+        half(one.sizes, other.sizes),
+        half(one.levels, other.levels),
+        0.5 * (one.deviations + other.deviations),
+        half(one.phases, other.phases),
+    )

@@ -1,0 +1,91 @@
+"""Errors of both models sample by sample, in units of the sensors, on recordings fitted or not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.diagnosis.data.samples import channels
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.search import ROUNDS, Fitted
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.recordings.case import Case
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of one channel along one recording, by the nominal and by the last model.
+
+    Attributes
+    ----------
+    held_out : whether nothing common to the recordings was fitted to this one.
+    samples : whose errors are told.
+    rms, mean_absolute : of these, (before, after) [unit].
+    """
+
+    recording: str
+    channel: str
+    unit: str
+    held_out: bool
+    samples: int
+    rms: tuple[float, float]
+    mean_absolute: tuple[float, float]
+
+
+def errors_of(
+    simulations: Simulations, before: Linearised, after: Linearised, *, held_out: bool
+) -> list[Errors]:
+    """Errors of all recordings by two models."""
+    found = []
+    for k, one in enumerate(simulations.recordings):
+        sizes = [lin.evidence[k].sizes for lin in (before, after)]
+        samples = int(one.told.sum())
+        for c, channel in enumerate(channels(simulations.system, one.signals)):
+            if one.silent[c]:
+                continue
+            rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
+            found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))
+    return found
+
+
+def held_out_errors(
+    everything: Path,
+    fitted: Simulations,
+    effects: Sequence[Effect],
+    before: Fitted,
+    after: Fitted,
+    cases: Sequence[Case],
+    workers: int,
+) -> tuple[list[Errors], dict[str, dict[str, float]]]:
+    """Errors on recordings that no common unknown was fitted to.
+
+    Of these recordings, only what differs from one to the other by nature is fitted: states at the
+    start, and deviations within tolerances.
+
+    Parameters
+    ----------
+    everything : FMU with all effects.
+    fitted : the other recordings.
+    before, after : the nominal and the last model, as fitted to those.
+
+    Returns
+    -------
+    errors : of both models.
+    starts : of the last model, by recording, see `Unknowns.starts`.
+    """
+    given = (everything, fitted.system, fitted.given, cases, workers)
+    with Simulations(*given, restarting=False) as simulations:
+        fit = Fit(simulations, effects, beside=fitted.cases)
+        ends = []
+        for one in (before, after):
+            start = fit.unknowns.start()
+            levels = {key: one.point.levels.get(key, usual) for key, usual in start.levels.items()}
+            phases = {name: np.zeros(len(cases)) for name in one.point.phases}
+            point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)
+            common = {**point.sizes, **point.levels}
+            ends.append(fit.refine(fit.at(point), one.active, ROUNDS, held=common))
+        starts = fit.unknowns.starts(ends[-1].point)
+        return errors_of(simulations, *ends, held_out=True), starts

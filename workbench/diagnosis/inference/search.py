@@ -1,0 +1,324 @@
+"""Which effects the data ask for, one after the other, judged on stops they were not fitted to."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Linearised, Point
+from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.inference.trial import Option, Prospect, Trial, shapes, tried
+from workbench.errors import FMUError
+
+Reporter = Callable[[str], None]
+Result = TypeVar("Result")
+
+BEGUN = 3  # rounds after which a rival that is far behind is given up
+_VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
+ROUNDS = 12  # of Gauss-Newton, most
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A set of effects, fitted in full.
+
+    Attributes
+    ----------
+    misfit : chi-squared of all stops at the point, in units of the noise.
+    """
+
+    active: tuple[Effect, ...]
+    point: Point
+    linearised: Linearised
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of the search: what was tried, and what came out.
+
+    Attributes
+    ----------
+    scores : of all candidates, linearised, best first.
+    rivals : fitted in full; the first was taken, the others best first.
+    """
+
+    before: Fitted
+    scores: tuple[Prospect, ...]
+    rivals: tuple[Fitted, ...]
+
+
+def seek(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: Fitted,
+    steps: list[Step],
+    dropped: Collection[Effect],
+    report: Reporter,
+) -> tuple[Fitted, Trial, bool]:
+    """Find what is missing.
+
+    Parameters
+    ----------
+    best : what was found before, fitted; at first the nominal model.
+    steps : how that was found; more are added.
+    dropped : effects that are not sought.
+
+    Returns
+    -------
+    best : the effects that are needed, fitted.
+    trial : all other effects about the best point.
+    interrupted : whether Ctrl-C ended it; before anything was found it ends the diagnosis.
+    """
+    sought = [effect for effect in catalogue if effect not in dropped]
+    try:
+        while True:
+            best, trial = examine(fit, best, catalogue, report)
+            step = _step(fit, sought, best, trial, report)
+            if step is None:
+                return best, trial, False
+            steps.append(step)
+            best = step.rivals[0]
+    except KeyboardInterrupt:
+        if not steps:
+            raise
+        report("interrupted: no more causes are sought, what was found is finished")
+        best, trial = examine(fit, best, catalogue, report)
+        return best, trial, True
+
+
+def _step(
+    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+) -> Step | None:
+    """One more effect, or none if the data do not ask for it; of equals the usual one."""
+    scores = tuple(one for one in trial.scores() if one.effect in catalogue)
+    rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
+    if not rivals:
+        return None
+    report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
+    fits = _fits(fit, best, rivals)
+    if not fits:
+        return None
+    equals = [one for one in fits if beyond(one, fits[0]) < fit.decides.tied]
+    first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
+    return Step(best, scores, (first, *(one for one in fits if one is not first)))
+
+
+def _gains(fit: Fit, before: Fitted, after: Fitted) -> bool:
+    """Whether an effect is worth a step."""
+    return before.linearised.deviance - after.linearised.deviance > fit.decides.fall
+
+
+def beyond(one: Fitted, other: Fitted) -> float:
+    """Chi-squared that one leaves and another does not.
+
+    Each channel in units of the lesser of what they leave wrong there: where both leave much, that
+    one leaves a little more means nothing.
+    """
+    inflation = np.minimum(one.linearised.inflation, other.linearised.inflation)
+    return one.linearised.weighed(inflation) - other.linearised.weighed(inflation)
+
+
+def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[Fitted]:
+    """Fits with one more effect that gain by it, best first; one far behind is not finished."""
+    tried = fit.together(partial(_begun, fit, best), rivals)
+    begun = [one for one in tried if one is not None]
+    if not begun:
+        return []
+    left = misfits(begun)
+    near = left < fit.decides.behind * left.min()
+    worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
+
+    def finished(one: Fitted) -> Fitted | None:
+        return differentiable(partial(fitted, fit, one.linearised, one.active))
+
+    ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
+    every = [end for i, one in enumerate(begun) if (end := ends.get(i, one)) is not None]
+    order = np.argsort(misfits(every)) if every else ()
+    return [every[i] for i in order if _gains(fit, best, every[i])]
+
+
+def misfits(fits: Sequence[Fitted]) -> Vector:
+    """Chi-squared of each, channels in units of the least that any of them leaves wrong, (f,)."""
+    inflation = np.min([one.linearised.inflation for one in fits], axis=0)
+    return np.array([one.linearised.weighed(inflation) for one in fits])
+
+
+def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | None:
+    """First rounds of a fit with one more effect, begun elsewhere where that gained nothing.
+
+    A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.
+    """
+    first, tried = variants[0], []
+    halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
+    for start in (*variants[:_VARIANTS], *halves):
+        if (one := extended(fit, best, start, BEGUN)) is None:
+            continue
+        if _gains(fit, best, one):
+            return one
+        tried.append(one)
+    return min(tried, key=lambda one: one.linearised.deviance, default=None)
+
+
+def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted | None:
+    """Fit with one more effect, begun where it was fitted without; None: not even begun."""
+    start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
+    if start is None:
+        return None
+    active = (*before.active, rival.effect)
+    return differentiable(partial(fitted, fit, start, active, rounds, spread))
+
+
+def differentiable(fitting: Callable[[], Result]) -> Result | None:
+    """A fit; None where it leads to no derivative, as an inertia less than none does."""
+    try:
+        return fitting()
+    except FMUError:
+        return None
+
+
+def examine(
+    fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter
+) -> tuple[Fitted, Trial]:
+    """Try every effect that the data can show and the point does not have.
+
+    Returns
+    -------
+    best : with the derivatives by all of them.
+    trial : of all of them.
+    """
+    candidates: list[Option] = [
+        (effect, shape)
+        for effect in catalogue
+        if effect not in best.active and not fit.unknowns.presence.unseen(effect)
+        for shape in shapes(effect)
+    ]
+    report(f"signatures of {len(candidates)} candidates")
+    lin = fit.linearise(best.linearised, best.active, candidates)
+    return replace(best, linearised=lin), tried(fit, lin, candidates)
+
+
+def pruned(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: Fitted,
+    known: Mapping[frozenset[Effect], Fitted],
+    trial: Trial,
+    report: Reporter,
+) -> tuple[Fitted, Trial, dict[Effect, Fitted]]:
+    """Drop effects that, beside the others, do not matter or are not significant.
+
+    What forms of laws fake must be exceeded beside others, and where states are restarted.
+
+    Parameters
+    ----------
+    known : fits by their effects, with all derivatives.
+
+    Returns
+    -------
+    best, trial : of the effects that are left.
+    less : see `lesser`.
+    """
+    while less := lesser(fit, best, known):
+        sigma = np.sqrt(np.diag(trial.covariance()))
+        ratios = {}
+        for effect in best.active:
+            key = (effect.name, effect.label)
+            size = abs(best.point.sizes[key])
+            clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
+            ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
+        if len(less) > 1 or fit.restarted:
+            for effect, one in less.items():
+                ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
+        weakest = min(ratios, key=lambda effect: ratios[effect])
+        if ratios[weakest] >= 1.0:
+            break
+        report(f"dropping {weakest.name}")
+        best, trial = examine(fit, less[weakest], catalogue, report)
+    return best, trial, less
+
+
+def lesser(
+    fit: Fit, best: Fitted, known: Mapping[frozenset[Effect], Fitted]
+) -> dict[Effect, Fitted]:
+    """The best fit without each of the effects, with all derivatives.
+
+    Parameters
+    ----------
+    known : fits by their effects, with all derivatives, which need not be made again.
+    """
+
+    def refitted(effect: Effect) -> Fitted:
+        kept = tuple(other for other in best.active if other is not effect)
+        if frozenset(kept) in known:
+            return known[frozenset(kept)]
+        start = fit.tried(without(best.point, effect))
+        if start is None:  # without it, the others stand for more than the machine can do
+            return known[frozenset()]
+        one = fitted(fit, start, kept)
+        return replace(one, linearised=fit.linearise(one.linearised, kept))
+
+    fits = fit.together(refitted, best.active)
+    return dict(zip(best.active, fits, strict=True))
+
+
+def without(point: Point, effect: Effect) -> Point:
+    """The point without one effect."""
+    return replace(
+        point,
+        sizes={key: value for key, value in point.sizes.items() if key[0] != effect.name},
+        phases={name: value for name, value in point.phases.items() if name != effect.name},
+    )
+
+
+def fitted(
+    fit: Fit,
+    start: Linearised,
+    active: tuple[Effect, ...],
+    rounds: int = ROUNDS,
+    spread: Vector | None = None,
+) -> Fitted:
+    """Fit a set of effects, from a point that has them; see `Fit.refine`."""
+    lin = fit.refine(start, active, rounds, spread)
+    return Fitted(active, lin.point, lin, lin.misfit)
+
+
+def joined(point: Point, rival: Prospect) -> Point:
+    """The point with one more effect."""
+    name = rival.effect.name
+    sizes = {**point.sizes, (name, rival.effect.label): rival.size}
+    sizes |= {(name, parameter): value for parameter, value in rival.shape.items()}
+    phases = dict(point.phases)
+    if rival.effect.order_locked:
+        phases[name] = rival.phases
+    return Point(sizes, point.levels, point.deviations, phases)
+
+
+def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> list[list[Prospect]]:
+    """Variants, best first, of effects that are large, significant and nearly as good as the best.
+
+    While much is wrong, all is weighed against that, and little is significant: then a hint makes
+    a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
+    What levels could stand for must be there without any one of the stops, too.
+    """
+    hinted = best.linearised.inflation.max() > decides.wrong
+    clear = decides.hint if hinted else decides.significant
+    able: dict[str, list[Prospect]] = {}
+    for one in scores:
+        phases = len(one.phases) if one.effect.order_locked else 0
+        needed = 0.0 if hinted else decides.fall_of(1 + phases)
+        if one.like_levels:
+            shown = one.gain > needed and one.least > min(needed, decides.immaterial**2)
+        else:
+            shown = min(one.gain, one.held_out.sum()) > needed
+        significant = abs(one.size) > clear * one.sigma and shown
+        if significant and abs(one.size) >= one.effect.matters:
+            able.setdefault(one.effect.name, []).append(one)
+    ranked = list(able.values())[: decides.rivals]
+    best_score = ranked[0][0].score if ranked else 0.0
+    return [one for one in ranked if one[0].score > decides.near * best_score]

@@ -1,0 +1,238 @@
+"""Which effects recordings need: found one by one, dropped, exchanged, until nothing changes.
+
+Source: A. J. Miller (2002), Subset Selection in Regression, 2nd ed., chapter 3 (forward selection,
+elimination, replacement).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from workbench.arrays import Matrix
+from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Point
+from workbench.diagnosis.inference.search import (
+    Fitted,
+    Reporter,
+    Step,
+    beyond,
+    examine,
+    extended,
+    fitted,
+    pruned,
+    seek,
+)
+from workbench.diagnosis.inference.trial import Prospect, Trial, shapes
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The effects that are needed, and how they were found.
+
+    Attributes
+    ----------
+    base, best : the nominal model and the last one, fitted.
+    less : the best fit without each of the effects.
+    steps : how they were found.
+    trial : of all other effects about the best point.
+    twins : fits of effects that explain the data as well as each of them, by name, best first.
+    names, cosines : effects, and the similarity of their signatures in these data, (e, e).
+    interrupted : whether the search was ended before its end.
+    validation : of the fits.
+    """
+
+    base: Fitted
+    best: Fitted
+    less: Mapping[Effect, Fitted]
+    steps: tuple[Step, ...]
+    trial: Trial
+    twins: Mapping[Effect, Mapping[str, Fitted]]
+    names: tuple[str, ...]
+    cosines: Matrix
+    interrupted: bool
+    validation: CrossValidation
+
+
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """What a search has come to, before anything is dropped or exchanged.
+
+    Attributes
+    ----------
+    best, steps, trial, interrupted : as of `Selection`.
+    begun : where it went on, when other samples counted.
+    """
+
+    best: Fitted
+    steps: list[Step]
+    trial: Trial
+    interrupted: bool
+    begun: Selection | None
+
+
+def search(
+    fit: Fit, catalogue: Sequence[Effect], report: Reporter, begun: Selection | None = None
+) -> Sought:
+    """Find what is missing, or what is missing beside what was when other samples counted."""
+    if begun is None:
+        report("nominal model, levels calibrated")
+        best, steps = anew(fit, fit.unknowns.start(), ()), list[Step]()
+    else:
+        best, steps = anew(fit, begun.best.point, begun.best.active), list(begun.steps)
+    best, trial, interrupted = seek(fit, catalogue, best, steps, (), report)
+    return Sought(best, steps, trial, interrupted, begun)
+
+
+def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Reporter) -> Selection:
+    """Find what a set of recordings needs.
+
+    An effect that was dropped beside others is not taken up again; one that explains clearly more
+    in place of another replaces it. So each round has less to choose from, or fits better.
+    """
+    best, trial, interrupted = sought.best, sought.trial, sought.interrupted
+    steps, begun = sought.steps, sought.begun
+    if begun is None:
+        base = steps[0].before if steps else best
+    else:
+        base = anew(fit, begun.base.point, ())
+    earlier = 0 if begun is None else len(begun.steps)
+    validation, dropped = CrossValidation(fit), set[Effect]()
+    while True:
+        met = (base, *(step.before for step in steps[earlier:]))
+        known = {frozenset(one.active): one for one in met}
+        before = set(best.active)
+        best, trial, less = pruned(fit, catalogue, best, known, trial, report)
+        while (idle := _idle(fit, validation, best, less)) is not None:
+            report(f"dropping {idle.name}")
+            # Beside fewer others, one that mattered may do so no longer.
+            best, trial = examine(fit, less[idle], catalogue, report)
+            best, trial, less = pruned(fit, catalogue, best, known, trial, report)
+        if (gone := before - set(best.active)) and not interrupted:
+            dropped |= gone
+            best, trial, interrupted = seek(fit, catalogue, best, steps, dropped, report)
+            continue
+        names, cosines = _confusability(trial, catalogue)
+        alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
+        replaced = [one for fits in alike.values() for one in fits.values()]
+        better = min(replaced, key=lambda one: beyond(one, best), default=best)
+        if interrupted or beyond(best, better) < fit.decides.needed:
+            break
+        report(f"{better.active[-1].name} explains more than what it replaces")
+        best, trial, interrupted = seek(fit, catalogue, better, steps, dropped, report)
+    twins = {
+        one: dict(
+            sorted(
+                (pair for pair in fits.items() if _close(fit, less[one], pair[1], best)),
+                key=lambda pair: beyond(pair[1], best),
+            )
+        )
+        for one, fits in alike.items()
+    }
+    return Selection(
+        *(base, best, less, tuple(steps), trial, twins, names, cosines, interrupted, validation)
+    )
+
+
+def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
+    """A fit that begins at a point, with all derivatives."""
+    # A point of its own, by which it is told from a fit to other samples.
+    one = fitted(fit, fit.at(replace(point)), active)
+    return replace(one, linearised=fit.linearise(one.linearised, active))
+
+
+def _idle(
+    fit: Fit, validation: CrossValidation, best: Fitted, less: Mapping[Effect, Fitted]
+) -> Effect | None:
+    """A cause that beside others explains next to nothing on held-out stops, if there is one."""
+    if len(best.active) < 2:
+        return None
+    shares = {
+        effect: validation.explained(one, best, fast=effect.order_locked)[0]
+        for effect, one in less.items()
+    }
+    weakest = min(shares, key=lambda effect: shares[effect])
+    return weakest if shares[weakest] < fit.decides.idle else None
+
+
+def _alike(
+    fit: Fit,
+    effect: Effect,
+    best: Fitted,
+    less: Fitted,
+    steps: Sequence[Step],
+    names: Sequence[str],
+    cosines: Matrix,
+) -> dict[str, Fitted]:
+    """Fits of effects in place of one, beside the other causes, by name.
+
+    Of those with a like signature, and of rivals that it met in a step; where it was named and they
+    were no match for it, they are none now.
+
+    Parameters
+    ----------
+    less : the best fit without the effect.
+    """
+    row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
+    alike = {name for name in names if row[name] > 1.0 - fit.decides.twin}
+    found: dict[str, Fitted] = {}
+    for step in steps:
+        winner = step.rivals[0]
+        rivals = {rival.active[-1].name: rival for rival in step.rivals}
+        if effect.name not in rivals:
+            continue
+        close = {name for name, one in rivals.items() if _close(fit, step.before, one, winner)}
+        named = winner.active[-1] is effect
+        alike |= close if named else set(rivals)
+        if named and winner.point is best.point:
+            found |= {name: rivals[name] for name in close}
+            alike -= set(rivals)
+    active = {one.name for one in best.active}
+    found = {name: one for name, one in found.items() if name not in active}
+    alike -= active | set(found)
+    others: dict[str, Prospect] = {}
+    for score in (score for step in steps for score in step.scores):
+        if score.effect.name in alike:
+            others.setdefault(score.effect.name, score)
+    fits = fit.together(partial(extended, fit, less), list(others.values()))
+    tried = zip(others, fits, strict=True)
+    return found | {name: one for name, one in tried if one is not None}
+
+
+def _close(fit: Fit, before: Fitted, one: Fitted, best: Fitted) -> bool:
+    """Whether chi-squared does not tell two effects apart, either of which explains."""
+    form = max(fit.decides.form, fit.decides.form_share * beyond(before, best))
+    return beyond(one, best) < form
+
+
+def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
+    """Cosines of the signatures of all effects, beside levels and tolerances; 1 is a twin."""
+    joint = trial.joint
+    total = joint.total().N
+    levels = [j for j, key in enumerate(joint.shared) if key in trial.levels]
+    own: dict[str, list[int]] = {}
+    for effect in catalogue:
+        middle = variant(effect, shapes(effect)[len(shapes(effect)) // 2])
+        keys = [(effect.name, effect.label), *((middle, name) for name in effect.sizes)]
+        at = [joint.shared.index(key) for key in keys if key in joint.shared]
+        if at:
+            own[effect.name] = at
+    solved = np.linalg.lstsq(total[np.ix_(levels, levels)], total[levels], rcond=None)[0]
+    rest = total - total[:, levels] @ solved
+    roots = {name: _inverse_root(rest[np.ix_(at, at)]) for name, at in own.items()}
+    cosines = np.eye(len(own))
+    for i, (a, at_a) in enumerate(own.items()):
+        for j, (b, at_b) in enumerate(own.items()):
+            coupling = roots[a] @ rest[np.ix_(at_a, at_b)] @ roots[b]
+            cosines[i, j] = np.linalg.norm(coupling, 2)
+    return tuple(own), np.clip(cosines, 0.0, 1.0)
+
+
+def _inverse_root(matrix: Matrix) -> Matrix:
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > 1e-9 * max(values[-1], 1e-300)
+    root: Matrix = (vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T
+    return root

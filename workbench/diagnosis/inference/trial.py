@@ -1,0 +1,231 @@
+"""Candidates about a point that is fitted: what each would explain, linearised."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.quadratic import Joint, Quadratic, add, covariance, minimum
+
+Option = tuple[Effect, Mapping[str, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What one effect would explain, linearised.
+
+    Attributes
+    ----------
+    effect, shape : the candidate, and the shape it was tried with.
+    size, sigma : estimate of its size and standard deviation.
+    units : of the size and of the parameters of the shape, by name.
+    gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
+    by_levels : what of it is that levels, or the one recording's own, are less far from expected.
+    least : the same fall without any one of the stops, the least.
+    held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
+    phases : (K,) [rad] of an order-locked effect.
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+    size: float
+    sigma: float
+    units: Mapping[str, str]
+    gain: float
+    by_levels: float
+    least: float
+    held_out: Vector
+    phases: Vector
+
+    @property
+    def like_levels(self) -> bool:
+        """Whether it is mostly how far levels are from expected that tells of it.
+
+        They explain a held-out stop as well as the effect does, which tells nothing then.
+        """
+        return self.by_levels > 0.5 * self.gain
+
+    @property
+    def score(self) -> float:
+        """By what fall of chi-squared it is ranked."""
+        return self.gain if self.like_levels else float(self.held_out.sum())
+
+
+def shapes(effect: Effect) -> list[dict[str, float]]:
+    """Shapes with which an effect is tried."""
+    tried: list[dict[str, float]] = [{}]
+    for name, values in effect.shapes:
+        tried = [{**one, name: value} for one in tried for value in values]
+    return tried
+
+
+def tried(fit: Fit, lin: Linearised, candidates: Sequence[Option]) -> "Trial":
+    """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
+    extra = [
+        (variant(effect, shape), parameter)
+        for effect, shape in candidates
+        for parameter in effect.sizes
+    ]
+    return Trial(fit, fit.apart(lin, extra), candidates)
+
+
+class Trial:
+    """All candidates about one point.
+
+    Each may be present at a size that does not matter, as part of the baseline: a candidate must
+    explain what all others together, too small to matter, do not. Where levels can stand for one,
+    their spread says already how much of it does not matter. On held-out stops it is judged
+    alone, since what companions cost, by their size, shows only where they are fitted.
+    """
+
+    def __init__(
+        self,
+        fit: Fit,
+        joint: Joint,
+        candidates: Sequence[Option],
+    ) -> None:
+        self._fit, self.joint, self._candidates = fit, joint, candidates
+        self._stops = joint.stops()
+        self._known = list(range(len(joint.known)))
+        self.levels = joint.levels
+        middle: dict[str, tuple[int, float]] = {}
+        for effect, shape in candidates:
+            if not effect.order_locked:
+                at = joint.shared.index((variant(effect, shape), effect.size))
+                middle[effect.name] = (at, effect.matters)
+        share = self._beside_levels()
+        # Of twins, by their cosine, levels take all but 1 - (1 - twin)^2.
+        self._immaterial = {
+            name: one for name, one in middle.items() if share[one[0]] > 2.0 * fit.decides.twin
+        }
+        alone = self._select({}, alone=True)
+        self._without, self._prior = _held_out(*alone), alone[1]
+        base = self._select({})
+        total = add([*base[0], base[1]])
+        best = minimum(total)
+        self._reference, self._away = total.at(best), self._far(best)
+        self._lacking = [one.at(minimum(one)) for one in _without_each(total, base[0])]
+
+    def _far(self, z: Vector) -> float:
+        """Chi-squared of known unknowns against what is expected of them."""
+        return self._prior.at(z[: len(self._known)])
+
+    def _beside_levels(self) -> Vector:
+        """(p,) Share of what stops say of each unknown that levels with a spread do not take.
+
+        Beside levels of which nothing is expected; what these take is nobody's.
+        """
+        levels = [self.joint.shared.index(key) for key in self.levels]
+        expected = np.diag(self.joint.prior.N) > 0.0
+        free = self._beside([j for j in levels if not expected[j]])
+        every = self._beside(levels)
+        return np.divide(every, free, out=np.ones_like(free), where=free > 0.0)
+
+    def _beside(self, at: Sequence[int]) -> Vector:
+        """(p,) What stops say of each unknown, where others are fitted freely."""
+        N = add(self._stops).N
+        solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at], rcond=None)[0]
+        left: Vector = np.diag(N) - np.einsum("ij,ij->j", N[at], solved)
+        return left
+
+    def _select(
+        self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
+    ) -> tuple[list[Quadratic], Quadratic]:
+        """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
+        others = [one for key, one in self._immaterial.items() if key != name and not alone]
+        columns = [*self._known, *(at for at, _ in others)]
+        count = len(columns) + bool(own)
+        transforms = []
+        for k in range(len(self._stops)):
+            transform = np.zeros((len(self.joint.shared), count))
+            transform[columns, range(len(columns))] = 1.0
+            for at, direction in own.items():
+                transform[at, -1] = direction[k]
+            transforms.append(transform)
+        stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
+        prior = self.joint.prior.columns(transforms[0])
+        for j, (_, matters) in enumerate(others, start=len(self._known)):
+            prior.N[j, j] += (self._fit.decides.immaterial / matters) ** 2
+        return stops, prior
+
+    def covariance(self) -> Matrix:
+        """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
+        stops, prior = self._select({})
+        count = len(self._known)
+        known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
+        return known
+
+    def scores(self) -> list[Prospect]:
+        """All candidates, best first."""
+        found = [self._score(effect, shape) for effect, shape in self._candidates]
+        return sorted(found, key=lambda one: -one.score)
+
+    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Prospect:
+        at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
+        phases = np.zeros(len(self._stops))
+        own = {at[0]: np.ones(len(self._stops))}
+        if effect.order_locked:
+            phases = np.array([_phase(stop, at) for stop in self._stops])
+            own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
+        low, high = self._fit.unknowns.bounds(effect, effect.size)
+        stops, prior = self._select(own, effect.name)
+        total = add([*stops, prior])
+        best = minimum(total)
+        sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
+        size = float(best[-1])
+        if not low <= size <= high:
+            # What its bounds allow of it: the rest of the unknowns do their best beside that.
+            size = float(np.clip(size, low, high))
+            stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
+            total = add([*stops, prior])
+            best = minimum(total)
+        lacking = [one.at(minimum(one)) for one in _without_each(total, stops)]
+        alone, own_prior = self._select(own, alone=True)
+        single = float(minimum(add([*alone, own_prior]))[-1])
+        if not low <= single <= high:
+            single = float(np.clip(single, low, high))
+            alone, own_prior = [_fixed(stop, single) for stop in alone], _fixed(own_prior, single)
+        return Prospect(
+            effect=effect,
+            shape=shape,
+            size=size,
+            sigma=sigma,
+            units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
+            gain=self._reference - total.at(best),
+            by_levels=self._away - self._far(best),
+            least=float(np.min(np.subtract(self._lacking, lacking))),
+            held_out=self._without - _held_out(alone, own_prior),
+            phases=phases,
+        )
+
+
+def _phase(stop: Quadratic, at: Sequence[int]) -> float:
+    """Phase of an order-locked effect in one stop [rad], everything else as it is."""
+    amplitude = -np.linalg.lstsq(stop.N[np.ix_(at, at)], stop.g[at], rcond=None)[0]
+    return float(np.arctan2(amplitude[1], amplitude[0]))
+
+
+def _fixed(one: Quadratic, last: float) -> Quadratic:
+    """Chi-squared over the other unknowns, the last one held."""
+    N = one.N[:-1, :-1]
+    g = one.g[:-1] + last * one.N[:-1, -1]
+    c = one.c + 2.0 * last * one.g[-1] + last**2 * one.N[-1, -1]
+    return Quadratic(N, g, float(c), one.rows)
+
+
+def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadratic]:
+    """Chi-squared without each of the stops."""
+    return [
+        Quadratic(total.N - one.N, total.g - one.g, total.c - one.c, total.rows - one.rows)
+        for one in stops
+    ]
+
+
+def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
+    """Chi-squared of each stop at the optimum of the others, (K,)."""
+    others = _without_each(add([*stops, prior]), stops)
+    return np.array([stop.at(minimum(rest)) for stop, rest in zip(stops, others, strict=True)])

@@ -1,0 +1,201 @@
+"""Unknowns of a fit: sizes of effects, levels, and what differs between recordings by nature.
+
+In each recording, parameters may differ from their common value within the tolerances of the
+machine, and states may start elsewhere.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from workbench.diagnosis.data.cleaning import ALONG
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.effects.presence import Presence
+from workbench.diagnosis.inference.linearised import Point
+from workbench.diagnosis.inference.quadratic import Key
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.simulator import delay
+from workbench.recordings.case import Case, Value
+from workbench.system.system import System
+
+SENSOR = "sensor"  # in place of a choice, of a sensor's delay
+ALL = "all"  # in place of a choice, of a level that no condition changes
+
+
+class Unknowns:
+    """Of one set of recordings.
+
+    Parameters
+    ----------
+    simulations : of the recordings.
+    effects : that may be asked for.
+    beside : other recordings of the machine, whose conditions say what it has too.
+
+    Attributes
+    ----------
+    effects : by name.
+    modes : of structures before sensors, by the name of their delay.
+    presence : of effects.
+    """
+
+    def __init__(
+        self, simulations: Simulations, effects: Sequence[Effect], beside: Sequence[Case]
+    ) -> None:
+        self._simulations = simulations
+        self._compare = simulations.system.comparison
+        self.effects = {effect.name: effect for effect in effects}
+        self.modes = {
+            delay(one.name): one.mode
+            for one in simulations.system.judged + simulations.system.outputs
+            if one.mode is not None and one.name in simulations.recordings[0].signals
+        }
+        self.presence = Presence(simulations.cases, simulations.recordings, beside)
+        self.count = len(simulations.cases)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the recordings."""
+        return [case.name for case in self._simulations.cases]
+
+    @cached_property
+    def local(self) -> dict[str, float]:
+        """Standard deviation of what differs between recordings, by name.
+
+        Relative of a parameter, in its unit of a state at the start.
+        """
+        return {**self._compare.tolerances, **self._starts}
+
+    @cached_property
+    def _starts(self) -> dict[str, float]:
+        """Standard deviation of states at the start, in their units.
+
+        What an output shows is as sure as the line that its first value is read from; a simulation
+        does not forget that unless it is led.
+        """
+        system, begin = self._simulations.system, self._simulations.begin[0]
+        led = self._compare.leading is not None
+        # What rolls along a measured state may have no sensor of its own.
+        seen = [] if led else [name for name in begin if name in system.signals]
+        shown = {name: ALONG * system.signals[name].noise_at_scale for name in seen}
+        return {**shown, **system.spreads}
+
+    def level_unit(self, key: Key) -> str:
+        """Unit of a level, or of a delay."""
+        return "s" if key[1] == SENSOR else self._simulations.units.get(key[0], "1")
+
+    def unit(self, effect: Effect, parameter: str) -> str:
+        """Unit of a parameter, "1" if it has none."""
+        return self._simulations.units.get(variables(effect, parameter)[0], "1")
+
+    def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:
+        """Least and greatest value of a parameter, SI."""
+        low, high = self._simulations.bounds[variables(effect, parameter)[0]]
+        # An amplitude has no sign: its phase has.
+        return (0.0, high) if parameter == "cosine" else (low, high)
+
+    def start(self) -> Point:
+        """The nominal model."""
+        levels: dict[Key, float] = {(name, SENSOR): 0.0 for name in self.modes}
+        for case in self._simulations.cases:
+            for name in self._compare.levels:
+                levels[name, self.choice(name, case)] = self._usual(name, case)
+        return Point({}, levels, np.zeros((self.count, len(self.local))), {})
+
+    def choice(self, level: str, case: Case) -> str:
+        """Which level of a parameter a recording has."""
+        return choice_of(self._simulations.system, level, case.conditions)
+
+    def _usual(self, name: str, case: Case) -> float:
+        """What a parameter is by the conditions of a recording, or else nominally."""
+        return self._simulations.system.set_by(case.conditions).get(
+            name, self._simulations.nominal[name]
+        )
+
+    def values(self, point: Point) -> list[dict[str, float]]:
+        """Values of the FMU's variables, and of delays, in each recording."""
+        return [self._values(point, k) for k in range(self.count)]
+
+    def starts(self, point: Point) -> dict[str, dict[str, float]]:
+        """All that a simulation of each recording starts with: states as measured, and `values`."""
+        begins, values = self._simulations.begin, self.values(point)
+        return {
+            name: {**begin, **known}
+            for name, begin, known in zip(self.names, begins, values, strict=True)
+        }
+
+    def _values(self, point: Point, k: int) -> dict[str, float]:
+        case = self._simulations.cases[k]
+        values = {**self._simulations.given, **self._simulations.system.set_by(case.conditions)}
+        values |= {name: point.levels[name, SENSOR] for name in self.modes}
+        values |= {
+            name: point.levels[name, self.choice(name, case)] for name in self._compare.levels
+        }
+        for j, (name, spread) in enumerate(self.local.items()):
+            values[name] = self._middle(point, name, k) + (
+                self.spread(point, name, k, spread) * point.deviations[k, j]
+            )
+        for effect in self.effects.values():
+            where = effect.where
+            if where is not None and where.share and self.presence.told(where):
+                values |= dict.fromkeys(
+                    variables(effect, where.share), self.presence.share(where, k)
+                )
+        for (name, parameter), size in point.sizes.items():
+            effect = self.effects[name]
+            if parameter == "amplitude":
+                phase = point.phases[name][k]
+                parts = {"cosine": size * np.cos(phase), "sine": size * np.sin(phase)}
+            elif parameter == effect.size:
+                parts = {parameter: size if self.presence.at(effect, k) else 0.0}
+            else:
+                parts = {parameter: size}
+            for part, value in parts.items():
+                names = variables(effect, part)
+                start = self._simulations.given.get(names[0], 0.0) if part in effect.sizes else 0.0
+                values |= dict.fromkeys(names, start + float(value))
+        return values
+
+    def _middle(self, point: Point, name: str, k: int) -> float:
+        """Value of what differs between recordings, without the deviation of this one."""
+        case = self._simulations.cases[k]
+        if name in self._compare.levels:
+            return point.levels[name, self.choice(name, case)]
+        if name in self._starts:
+            return self._simulations.begin[k].get(name, self._simulations.nominal.get(name, 0.0))
+        return self._usual(name, case)
+
+    def spread(self, point: Point, name: str, k: int, spread: float) -> float:
+        """Standard deviation of a local deviation, in the parameter's or state's unit."""
+        return spread if name in self._starts else spread * self._middle(point, name, k)
+
+    def shared(self, point: Point, name: str, k: int) -> float:
+        """By how much a recording's own value moves with the common level."""
+        if name not in self._compare.tolerances:
+            return 1.0
+        deviation = point.deviations[k, list(self.local).index(name)]
+        return float(1.0 + self._compare.tolerances[name] * deviation)
+
+    def expected(self, key: Key) -> tuple[float, float]:
+        """What is expected of a level, and its standard deviation, infinite for anything."""
+        name, choice = key
+        if choice == SENSOR:
+            return 0.0, self.modes[name].late
+        spread = self._compare.levels[name].spread
+        if not np.isfinite(spread):
+            return 0.0, np.inf
+        case = next(c for c in self._simulations.cases if self.choice(name, c) == choice)
+        middle = self._usual(name, case)
+        return middle, spread * abs(middle)
+
+
+def choice_of(system: System, level: str, conditions: Mapping[str, Value]) -> str:
+    """Which level of a parameter conditions have: of a list, by the entry that is not usual."""
+    by = system.comparison.levels[level].by
+    if not by:
+        return ALL
+    said = conditions[by]
+    entries = said if isinstance(said, tuple) else (said,)
+    usual = system.condition(by).choices[0]
+    return str(next((entry for entry in entries if entry != usual), usual))

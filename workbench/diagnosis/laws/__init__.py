@@ -1,0 +1,248 @@
+"""A law for what no effect explains: where it acts, what it depends on, and its form.
+
+laws about what is known, by evidence -> free functions, fitted -> closed forms of the best
+    -> diagnosis with these beside the catalogue, on recordings that were held out
+"""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.diagnosis import (
+    Effect,
+    Outcome,
+    build_everything,
+    diagnose,
+    given_values,
+    read_effects,
+)
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.search import Fitted, Reporter, Step, beyond, seek
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.inference.thresholds import Thresholds, of_system
+from workbench.diagnosis.inference.verdict import Diagnosis
+from workbench.diagnosis.laws.forms import WrittenForm, candidates
+from workbench.diagnosis.laws.free import FittedLaw, estimated
+from workbench.diagnosis.laws.outcome import Proposal, description_length
+from workbench.diagnosis.laws.places import Law
+from workbench.diagnosis.laws.scan import LawProspect, Scan
+from workbench.diagnosis.laws.writing import PACKAGE, extended_library, package
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.models.modelica import Library
+from workbench.recordings.case import Case
+from workbench.runtime.files import write_whole
+from workbench.system.system import OBSERVER, System
+
+__all__ = ["Proposal", "needs_law", "propose"]
+
+_OF_PLACE = 2  # of one place, since about the nominal model a wrong place may fake anything
+_OF_FORMS = 2  # closed forms: sizes of some are not sure beside their own shape
+_TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
+
+
+def needs_law(before: Outcome) -> bool:
+    """Whether a diagnosis leaves a law to propose: something unexplained, or several causes."""
+    found = before.diagnosis
+    left = found.verdict == "unexplained" or len(found.causes) > 1 or _more(found)
+    return found.late is None and left
+
+
+def _more(found: Diagnosis) -> bool:
+    """Whether beside the one cause that was found errors last: it explains most, and not all."""
+    lasting = float(found.best.linearised.inflation.max())
+    return len(found.causes) == 1 and lasting >= Thresholds.wrong
+
+
+def propose(
+    before: Outcome,
+    library: Library,
+    effects: Sequence[Effect],
+    out: Path,
+    workers: int,
+    report: Reporter,
+    *,
+    held_out: Sequence[Case] = (),
+) -> Proposal:
+    """Infer a law from recordings that no effect of a catalogue explains.
+
+    Parameters
+    ----------
+    before : the diagnosis that left something unexplained, or that needed several effects: then a
+        law is proposed only if it makes the description shorter. Where errors last beside a single
+        cause, a law is sought beside that.
+    library, effects, held_out : as of that.
+    out : folder of the extended model and of the generated classes.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If the library cannot be compiled, or the model is none of this library.
+    """
+    system, cases = before.system, before.cases
+    about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
+    scan = Scan(system, library, cases, workers, report, about)
+    estimates = _turning(scan.prospects)
+    if not estimates:
+        able = _likeliest(scan.prospects)
+        every = estimated(system, library, cases, workers, report, able, about) if able else []
+        fitted: dict[tuple[str, ...], FittedLaw] = {}
+        for one in every:
+            fitted.setdefault(_called(one.law), one)
+        estimates = list(fitted.values())
+    # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
+    decides = of_system(system.comparison, len(scan.prospects))
+    odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
+    tied = [one for one in estimates if estimates[0].evidence - one.evidence < near]
+    if not tied or tied[0].evidence < odds:
+        return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
+    forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
+    forms = _surviving(system, library, cases, forms, workers, report, about)
+    found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
+    proposal = Proposal(before, *found, forms, None)
+    # Beside what bends to the rest, a law may not be seen; alone it may explain a part.
+    comparison = replace(system.comparison, left=1.0)
+    ways = [(system, effects), (replace(system, comparison=comparison), ())]
+    for judged, beside in ways if before.diagnosis.verdict == "unexplained" else ways[:1]:
+        for name in list(forms)[:_OF_FORMS]:
+            own = {name: forms[name], **forms}
+            rest = (out, workers, report, held_out)
+            outcome = _diagnosed(judged, cases, library, beside, own, *rest)
+            proposal = Proposal(before, *found, own, outcome)
+            if proposal.laws:
+                return proposal
+    return proposal
+
+
+def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
+    """Laws that begin anew with each period, if one is likelier than all others.
+
+    They are small beside what they change, so that about what is known they are fitted well enough.
+    """
+    if not prospects or not _turns(prospects[0]):
+        return []
+    likeliest = [one for one in prospects if _turns(one)][:_TRIED]
+    return [
+        FittedLaw(
+            one, one.smoothness.evidence, one.smoothness.coefficients, one.smoothness.posterior
+        )
+        for one in likeliest
+        if one.smoothness.evidence > 0.0
+    ]
+
+
+def _turns(one: LawProspect) -> bool:
+    return one.law.influence is not None and one.law.influence.turns
+
+
+def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
+    """The best law of each place and of what it depends on, however it is carried.
+
+    Of heat there are all, with every time constant: which is right, small changes about what is
+    known hardly tell.
+    """
+    best: dict[tuple[str, ...], LawProspect] = {}
+    for one in prospects:
+        influence = one.law.influence
+        if one.smoothness.evidence <= 0.0 or _turns(one):
+            continue
+        factors = () if influence is None else tuple(part.name for part in influence.factors)
+        kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
+        best.setdefault((one.law.place.name, kind, *factors), one)
+    of_place: dict[str, list[LawProspect]] = {}
+    for one in best.values():
+        of_place.setdefault(one.law.place.name, []).append(one)
+    kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
+    first = sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
+    wanted = {_called(one.law) for one in first}
+    return [one for one in prospects if not _turns(one) and _called(one.law) in wanted]
+
+
+def _called(law: Law) -> tuple[str, ...]:
+    """What a law is called; one of heat however it is carried, and lost."""
+    if law.influence is None:
+        return law.place.name, law.carrier.expression
+    carrier = "" if law.influence.kind == "work" else law.carrier.expression
+    return law.place.name, carrier, law.influence.name
+
+
+def _forms(estimate: FittedLaw) -> list[WrittenForm]:
+    """Closed forms of a law."""
+    prospect = estimate.prospect
+    # Of an output that is nominally zero, what it seems to be.
+    scale = prospect.largest or float(np.abs(estimate.function()[1]).max())
+    return list(candidates(prospect.law, prospect.knots, scale))
+
+
+def _surviving(
+    system: System,
+    library: Library,
+    cases: Sequence[Case],
+    forms: Mapping[str, WrittenForm],
+    workers: int,
+    report: Reporter,
+    about: Fitted,
+) -> dict[str, WrittenForm]:
+    """The closed form with the shortest description, first, and those that are as good.
+
+    They are found as causes are, by what they predict of recordings that they were not fitted to.
+    Beside others each would be one of many: forms of one law are alike.
+    """
+    report(f"{len(forms)} closed forms, each alone")
+    base = system.models[OBSERVER].name
+    with tempfile.TemporaryDirectory() as scratch:
+        extended, own = _as_effects(library, base, forms, Path(scratch))
+        path = Path(scratch) / "Forms.fmu"
+        every = [*about.active, *own]
+        build_everything(system, extended, every, path)
+        given = given_values(path, system)
+        steps: list[Step] = []
+        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+            decides = of_system(system.comparison, len(own))
+            fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
+            seek(fit, own, anew(fit, about.point, about.active), steps, (), report)
+    if not steps:
+        return {}
+    before, rivals = steps[0].before, steps[0].rivals
+    near = max(decides.form, decides.form_share * beyond(before, rivals[0]))
+    alike = [one for one in rivals if beyond(one, rivals[0]) < near]
+    names = [one.active[-1].name for one in sorted(alike, key=description_length)]
+    return {name: forms[name] for name in names}
+
+
+def _as_effects(
+    library: Library, base: str, forms: Mapping[str, WrittenForm], folder: Path
+) -> tuple[Library, list[Effect]]:
+    """A library with closed forms, and these: the likelier law and the simpler form first."""
+    extended = extended_library(library, [one.written for one in forms.values()], folder)
+    order = list(forms)
+    own = [one for one in read_effects(extended, base) if one.name in forms]
+    return extended, sorted(own, key=lambda one: order.index(one.name))
+
+
+def _diagnosed(
+    system: System,
+    cases: Sequence[Case],
+    library: Library,
+    effects: Sequence[Effect],
+    forms: Mapping[str, WrittenForm],
+    out: Path,
+    workers: int,
+    report: Reporter,
+    held_out: Sequence[Case],
+) -> Outcome:
+    """Diagnose with the first closed form beside the catalogue; of equals, that has its name."""
+    first = dict(list(forms.items())[:1])
+    report(f"{', '.join(first)} beside {len(effects)} effects")
+    with tempfile.TemporaryDirectory() as scratch:
+        extended, own = _as_effects(library, system.models[OBSERVER].name, first, Path(scratch))
+        outcome = diagnose(
+            *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
+        )
+    if outcome.extension is not None:
+        text = package(library, [one.written for one in forms.values()])
+        write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
+    return outcome

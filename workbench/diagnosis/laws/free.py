@@ -1,0 +1,255 @@
+"""Free functions in place of what is missing, fitted in full: how a law looks."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis import given_values
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.quadratic import Key
+from workbench.diagnosis.inference.search import Fitted, Reporter, fitted
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.laws.places import Law
+from workbench.diagnosis.laws.scan import LawProspect, effect_at, eliminated
+from workbench.diagnosis.laws.splines import COEFFICIENTS, smoothest
+from workbench.diagnosis.laws.writing import Written, clock, extended_library, number, unit_of
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.errors import FMUError, InputError
+from workbench.models.modelica import Library
+from workbench.recordings.case import Case
+from workbench.system.system import OBSERVER, System
+
+_ROUNDS = 2  # of fit and smoothness
+_BEGUN = (1.0, 0.5, 0.25, 0.1)  # shares of a function that a fit begins with
+_POINTS = 101  # of a function that is drawn
+
+
+@dataclass(frozen=True)
+class Free(Effect):
+    """An effect that is a free function.
+
+    Attributes
+    ----------
+    count : of its coefficients.
+    inverse : covariance of its coefficients beforehand, inverted.
+    """
+
+    count: int = COEFFICIENTS
+    inverse: Matrix = field(default_factory=lambda: np.zeros((0, 0)), compare=False)
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Coefficients."""
+        return tuple(f"c{k}" for k in range(self.count))
+
+    @property
+    def precision(self) -> Matrix:
+        """Inverse covariance of the coefficients beforehand."""
+        return self.inverse
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLaw:
+    """A law, fitted as a free function.
+
+    Attributes
+    ----------
+    prospect : about what is known.
+    evidence : log of the marginal likelihood over that of what is known.
+    coefficients, posterior : of the function, (K,) and their covariance, (K, K); of what turns,
+        cosine and sine of each recording.
+    """
+
+    prospect: LawProspect
+    evidence: float
+    coefficients: Vector
+    posterior: Matrix
+
+    @property
+    def law(self) -> Law:
+        """Where it acts, and what it depends on."""
+        return self.prospect.law
+
+    def function(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """What it depends on, its function, deviations of that and of its shape; (n,) each.
+
+        The shape is the function less its mean, which calibrated levels may take.
+        """
+        knots, influence = self.prospect.knots, self.law.influence
+        if influence is not None and influence.turns:
+            size = np.hypot(*self.coefficients.reshape(-1, 2).T)
+            wave = np.cos(np.linspace(0.0, 2.0 * np.pi, _POINTS))
+            sigma = np.full(_POINTS, np.sqrt(np.trace(self.posterior)) / size.size)
+            return np.linspace(0.0, influence.span, _POINTS), size.mean() * wave, sigma, sigma
+        if knots is None:
+            sigma = np.sqrt(np.diag(self.posterior))
+            return np.zeros(1), self.coefficients, sigma, np.zeros(1)
+        values = np.linspace(knots.low, knots.high, _POINTS)
+        basis = knots.basis(values)
+        whole, shape = (
+            np.sqrt(np.einsum("ij,jk,ik->i", one, self.posterior, one))
+            for one in (basis, basis - basis.mean(axis=0))
+        )
+        return values, basis @ self.coefficients, whole, shape
+
+
+def _written(name: str, prospect: LawProspect) -> Written:
+    """The class of a free function."""
+    law, knots = prospect.law, prospect.knots
+    about = f"Free function: {law.text}"
+    if law.influence is None or knots is None:
+        declared_ = f"parameter Real c0({unit_of(law.carrier.unit)}) = 0.0;"
+        change = f"{law.carrier.expression}*c0"
+        return Written(name, about, law.place, (declared_,), (), change)
+    last = COEFFICIENTS - 3
+    declared, equations = clock(law.influence)
+    terms = " + ".join(f"c{k}*({_bump(k - 1)})" for k in range(COEFFICIENTS))
+    inside = f"({law.influence.expression} - ({number(knots.low)}))/{number(knots.step)}"
+    return Written(
+        name=name,
+        about=about,
+        place=law.place,
+        declarations=(
+            *(
+                f"parameter Real c{k}({unit_of(law.carrier.unit)}) = 0.0;"
+                for k in range(COEFFICIENTS)
+            ),
+            *declared,
+            'Real x(unit="1") "Place among the knots";',
+        ),
+        equations=(*equations, f"x = noEvent(max(0.0, min({number(last)}, {inside})));"),
+        change=f"{law.carrier.expression}*({terms})",
+    )
+
+
+def _bump(knot: int) -> str:
+    """Cubic B-spline about a knot, of x."""
+    away = f"abs(x - ({number(knot)}))"
+    return f"(noEvent(max(0.0, 2.0 - {away}))^3 - 4.0*noEvent(max(0.0, 1.0 - {away}))^3)/6.0"
+
+
+def estimated(
+    system: System,
+    library: Library,
+    cases: Sequence[Case],
+    workers: int,
+    report: Reporter,
+    prospects: Sequence[LawProspect],
+    about: Fitted,
+) -> list[FittedLaw]:
+    """Fit free functions in full, best first.
+
+    What is large bends what the other quantities do, so that each function is fitted anew about
+    where it led, with the smoothness that is likeliest there.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "Free.fmu"
+        report(f"compiling {len(prospects)} free functions")
+        able = _compiled(system, library, prospects, path, about.active)
+        if not able:
+            return []
+        effects = _effects(library, able)
+        given = given_values(path, system)
+        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+            fit = Fit(simulations, [*about.active, *effects])
+            report("fitting free functions")
+            job = partial(_estimate, simulations, anew(fit, about.point, about.active))
+            tried = fit.together(job, list(zip(effects, able, strict=True)))
+    found = [one for one in tried if one is not None]
+    return sorted(found, key=lambda one: -one.evidence)
+
+
+def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
+    return [
+        Free(
+            **vars(effect_at(f"Free{k}", library, one.law.place, "c0")),
+            count=len(one.smoothness.coefficients),
+        )
+        for k, one in enumerate(prospects)
+    ]
+
+
+def _compiled(
+    system: System,
+    library: Library,
+    prospects: Sequence[LawProspect],
+    path: Path,
+    known: Sequence[Effect],
+) -> list[LawProspect]:
+    """Build the FMU of free functions; returns those that it has.
+
+    What a law depends on may depend on it: a loop that is not linear, which no FMU of ours solves.
+    """
+    base = system.models[OBSERVER].name
+    with tempfile.TemporaryDirectory() as scratch:
+        written = [_written(f"Free{k}", one) for k, one in enumerate(prospects)]
+        extended = extended_library(library, written, Path(scratch))
+        effects = [*known, *_effects(library, prospects)]
+        text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
+        try:
+            build(extended, "FreeFunctions", text, path, every_platform=False)
+        except InputError:
+            if len(prospects) == 1:
+                return []
+        else:
+            return list(prospects)
+    able = [one for one in prospects if _compiled(system, library, [one], path, known)]
+    return _compiled(system, library, able, path, known) if able else []
+
+
+def _estimate(
+    simulations: Simulations, base: Fitted, item: tuple[Free, LawProspect]
+) -> FittedLaw | None:
+    """Fit one function; None if it leads where the model has no solution."""
+    try:
+        return _fitted(simulations, base, *item)
+    except (FMUError, np.linalg.LinAlgError):
+        return None
+
+
+def _fitted(
+    simulations: Simulations, base: Fitted, effect: Free, prospect: LawProspect
+) -> FittedLaw:
+    """The likelier of all rounds: smoothness about a point may promise what bends away from it."""
+    smoothness, best = prospect.smoothness, base
+    keys = [(effect.name, name) for name in effect.sizes]
+    found: list[FittedLaw] = []
+    for _ in range(_ROUNDS):
+        inverse: Matrix = np.asarray(np.linalg.inv(smoothness.covariance), np.float64)
+        effect = replace(effect, inverse=inverse)
+        active = (*base.active, effect)
+        fit = Fit(simulations, active)
+        start = _started(fit, best, keys, smoothness.coefficients)
+        best = fitted(fit, start, active, spread=start.spread)
+        lin = fit.linearise(best.linearised, active)
+        N, g = eliminated(fit.quadratics(lin), keys)
+        # Of the data alone, about no function: the prior is put in anew.
+        now = np.array([best.point.sizes[key] for key in keys])
+        N = N - effect.precision
+        g = g - effect.precision @ now - N @ now
+        gained = base.linearised.deviance - best.linearised.deviance
+        spread = np.linalg.slogdet(np.eye(len(keys)) + N @ smoothness.covariance)[1]
+        posterior: Matrix = np.asarray(np.linalg.inv(N + effect.precision), np.float64)
+        found.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
+        smoothness = smoothest(N, g, most=prospect.most)
+    return max(found, key=lambda one: one.evidence)
+
+
+def _started(fit: Fit, best: Fitted, keys: Sequence[Key], coefficients: Vector) -> Linearised:
+    """Where a fit with a free function begins: as much of it as lowers the deviance."""
+    before = best.linearised.deviance
+    for share in _BEGUN:
+        now = dict(zip(keys, map(float, share * coefficients), strict=True))
+        tried = fit.tried(replace(best.point, sizes={**best.point.sizes, **now}))
+        if tried is not None and tried.deviance < before:
+            return tried
+    none = dict.fromkeys(keys, 0.0)
+    return fit.at(replace(best.point, sizes={**none, **best.point.sizes}))

@@ -1,0 +1,219 @@
+"""What was proposed, as a value: sentences, tables, a figure."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import ttest_rel
+
+from workbench.diagnosis import Cause, Outcome
+from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.laws.forms import MARK, WrittenForm
+from workbench.diagnosis.laws.free import FittedLaw
+from workbench.diagnosis.laws.scan import LawProspect
+from workbench.system.units import BAND
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_CHANCE = 0.05  # that held-out recordings fare better with a law that is none
+_NONE = "No law is proposed"
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A law for what no effect explains, or why there is none.
+
+    Attributes
+    ----------
+    before : of the diagnosis without them.
+    prospects : of all laws as free functions about the nominal model, the likeliest first.
+    estimates : those that were fitted in full, the likeliest first.
+    tied : of them, those that these recordings do not tell from the first.
+    forms : of the closed forms of these the one that explains most, and those that are as good, by
+        name of their class.
+    outcome : of the diagnosis with them beside the catalogue; None if it was not made.
+    """
+
+    before: Outcome
+    prospects: tuple[LawProspect, ...]
+    estimates: tuple[FittedLaw, ...]
+    tied: tuple[FittedLaw, ...]
+    forms: Mapping[str, WrittenForm]
+    outcome: Outcome | None
+
+    @property
+    def laws(self) -> tuple[Cause, ...]:
+        """What was found of them, and holds on recordings that were held out."""
+        if self.outcome is None or not self._supported(self.outcome):
+            return ()
+        return tuple(
+            cause for cause in self.outcome.diagnosis.causes if cause.effect.name in self.forms
+        )
+
+    def _supported(self, outcome: Outcome) -> bool:
+        """Whether errors fall on what was held out, and, of what was explained, with less.
+
+        Without recordings that were never fitted, of what is held out in turn, by a paired t-test
+        of its mean squares.
+        """
+        gain = outcome.diagnosis.gain
+        held_out = [one for one in outcome.errors if one.held_out]
+        before, after = (sum(one.samples * one.rms[i] ** 2 for one in held_out) for i in (0, 1))
+        if gain is None or (held_out and after >= before):
+            return False
+        squares = np.square(list(gain.recordings.values()))
+        chance = ttest_rel(squares[:, 0], squares[:, 1], alternative="greater").pvalue
+        if not held_out and not chance < _CHANCE:
+            return False
+        if self.before.diagnosis.verdict == "unexplained":
+            return True
+        return description_length(outcome.diagnosis.best) < description_length(
+            self.before.diagnosis.best
+        )
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a few sentences."""
+        if not self.tied:
+            return f"{_NONE}: no function of one quantity in one place explains what is missing."
+        first = self.tied[0].law
+        others = list(dict.fromkeys(one.law.short for one in self.tied[1:]))
+        where = first.text + f" (or {', '.join(others)})" * bool(others)
+        if not self.laws or self.outcome is None or (gain := self.outcome.diagnosis.gain) is None:
+            why = "no closed form of it holds on recordings that were held out"
+            if self.before.diagnosis.verdict == "found":
+                why = "with none of its closed forms is the description shorter"
+            return f"{_NONE}: what is missing may be {where}, but {why}."
+        known = [
+            cause.effect.name
+            for cause in self.outcome.diagnosis.causes
+            if cause.effect.name not in self.forms
+        ]
+        beside = f", beside {' and '.join(known)}" * bool(known)
+        part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
+        alone = self.before.diagnosis.gain
+        first_error = (
+            alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
+        )
+        return (
+            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. On "
+            f"held-out recordings the error falls from {first_error:.1f} to {gain.after:.1f} times "
+            f"the noise. As a free function it is {where}."
+        )
+
+    def said(self, cause: Cause) -> str:
+        """A law in words, with those that are as good."""
+        alike = [
+            f"{one.law.short}, {one.form.text}"
+            for name, one in self.forms.items()
+            if name != cause.effect.name
+        ]
+        others = [*alike, *cause.confusable_with]
+        return self.forms[cause.effect.name].text + f" (or {'; '.join(others)})" * bool(others)
+
+    def summary(self) -> str:
+        """The answer and what it rests on, for people."""
+        lines = [self.sentence]
+        for cause in self.laws:
+            lines += ["", f"{cause.effect.name}, {MARK}: {self.forms[cause.effect.name].text}"]
+            lines += [
+                f"  {name} = {one.value:.4g} {one.unit}, 95 %: {one.low:.4g} to {one.high:.4g}"
+                for name, one in cause.parameters.items()
+            ]
+            lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
+        if self.laws and self.outcome is not None and self.outcome.extension is not None:
+            extension = self.outcome.extension
+            lines += ["", f"extended model: {extension.modelica}, {extension.fmu}"]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Laws as free functions, the likeliest first; those fitted in full before the others."""
+        fitted = {id(one.prospect): one for one in self.estimates}
+        rows = []
+        for one in (*(e.prospect for e in self.estimates), *self.prospects):
+            if id(one) in fitted or one not in [e.prospect for e in self.estimates]:
+                full = fitted.pop(id(one), None)
+                law = one.law
+                rows.append(
+                    {
+                        "slot": law.place.slot.name,
+                        "output": law.place.output.name,
+                        "carrier": law.carrier.text,
+                        "depends_on": "" if law.influence is None else law.influence.text,
+                        "log_evidence_nominal": one.smoothness.evidence,
+                        "log_evidence": None if full is None else full.evidence,
+                        "tied": full is not None and full in self.tied,
+                    }
+                )
+        return pd.DataFrame(rows)
+
+    def functions(self) -> pd.DataFrame:
+        """Estimated functions with their 95 % bands, and those of their shapes, in SI units."""
+        tables = []
+        for one in self.estimates:
+            if one.law.influence is None:
+                continue
+            values, function, sigma, shape = one.function()
+            tables.append(
+                pd.DataFrame(
+                    {
+                        "slot": one.law.place.slot.name,
+                        "output": one.law.place.output.name,
+                        "carrier": one.law.carrier.text,
+                        "depends_on": one.law.influence.text,
+                        "unit": one.law.influence.unit,
+                        "value": values,
+                        "function_unit": one.law.carrier.unit,
+                        "function": function,
+                        "low": function - BAND * sigma,
+                        "high": function + BAND * sigma,
+                        "shape_low": function - BAND * shape,
+                        "shape_high": function + BAND * shape,
+                    }
+                )
+            )
+        return pd.concat(tables) if tables else pd.DataFrame()
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts."""
+        return {
+            "sentence": self.sentence,
+            "mark": MARK,
+            "tied": [one.law.text for one in self.tied],
+            "alike": {name: one.text for name, one in self.forms.items()},
+            "laws": [
+                {
+                    "class": cause.effect.name,
+                    "slot": self.forms[cause.effect.name].law.place.slot.name,
+                    "text": self.forms[cause.effect.name].text,
+                    "parameters": {
+                        name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+                        for name, p in cause.parameters.items()
+                    },
+                    "confusable_with": list(cause.confusable_with),
+                    "explained": cause.explained,
+                }
+                for cause in self.laws
+            ],
+        }
+
+    def plot(self) -> "Figure":
+        """Figure of the functions that were estimated, those that are tied first."""
+        from workbench.diagnosis.laws.report import functions_figure
+
+        return functions_figure(self)
+
+
+def description_length(best: Fitted) -> float:
+    """What recordings and the sizes of causes take to be told [nat], up to a constant.
+
+    Half the deviance, and half the logarithm of the number of means that last for each parameter.
+    Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
+    """
+    lin = best.linearised
+    count = sum(one.blocks.sum() for one in lin.evidence) / lin.lasting
+    return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)

@@ -1,0 +1,78 @@
+"""Files of a proposal: proposal.json, tables and a figure of the functions, the full diagnosis."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from workbench.diagnosis import Outcome
+from workbench.diagnosis.laws import Proposal
+from workbench.diagnosis.report import relate_diagnosis, write_diagnosis
+from workbench.pages.figures import LIGHT, STYLE, save_figure
+from workbench.runtime.files import write_json, write_whole
+
+PROPOSED = "proposed"  # folder below that of the diagnosis
+_SHOWN = 3
+
+
+def write_proposal(
+    found: Proposal, outcome: Outcome, provenance: Mapping[str, Any], diagnosis: Path, workers: int
+) -> Path:
+    """Write what was proposed; returns the page of the diagnosis with it, or proposal.json.
+
+    proposal.json, laws.csv (where something may act, and on what it may depend, by evidence),
+    functions.csv and the figure of the estimated functions; of a law that holds, all files of a
+    diagnosis that has it beside the catalogue. Both pages have a link to the other.
+
+    Parameters
+    ----------
+    outcome : without the proposal, as it was written to the folder `diagnosis`.
+    """
+    out = diagnosis / PROPOSED
+    write_json(out / "proposal.json", {**found.to_dict(), "provenance": provenance})
+    write_whole(out / "laws.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
+    if found.estimates:
+        functions = found.functions()
+        write_whole(out / "functions.csv", functions.to_csv(index=False, float_format="%.6g"))
+        save_figure(functions_figure(found), [out / "functions.png", out / "functions.svg"])
+    if not found.laws or found.outcome is None:
+        told, text = out / "proposal.json", "No law that was proposed holds: what was tried"
+    else:
+        back = {"../index.html": "The diagnosis without what is proposed here"}
+        told = write_diagnosis(found.outcome, provenance, out, workers, back)
+        text = "Proposed, not known physics: the diagnosis with a law for what is missing"
+    relate_diagnosis(outcome, diagnosis, {told.relative_to(diagnosis).as_posix(): text})
+    return told
+
+
+def functions_figure(found: Proposal) -> Figure:
+    """Draw the likeliest functions with the 95 % bands of their shapes."""
+    shown = [one for one in found.estimates if one.law.influence is not None][:_SHOWN]
+    table = found.functions()
+    with mpl.rc_context(STYLE | {"font.size": 8}):
+        sheet = Figure(figsize=(4.2 * max(1, len(shown)), 3.0), layout="constrained")
+        for axes, one in zip(
+            sheet.subplots(1, max(1, len(shown)), squeeze=False)[0], shown, strict=False
+        ):
+            law = one.law
+            assert law.influence is not None
+            own = table[
+                (table.slot == law.place.slot.name)
+                & (table.output == law.place.output.name)
+                & (table.carrier == law.carrier.text)
+                & (table.depends_on == law.influence.text)
+            ]
+            axes.fill_between(
+                own.value, own.shape_low, own.shape_high, color=LIGHT["raw"], alpha=0.3
+            )
+            axes.plot(own.value, own.function, color=LIGHT["measured"])
+            axes.axhline(0.0, color=LIGHT["raw"], linewidth=0.6)
+            axes.set_xlabel(f"{law.influence.short} [{law.influence.unit or '?'}]")
+            axes.set_ylabel(f"function [{law.carrier.unit or '?'}]")
+            tied = "tied" if one in found.tied else f"{one.evidence:.0f} nat"
+            axes.set_title(
+                f"{law.carrier.text},\n{law.place.text} ({tied})", fontsize=7, loc="left"
+            )
+    return sheet

@@ -1,0 +1,292 @@
+"""Where a law acts and what it depends on: all of them about what is known, by evidence."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis import given_values
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import build, source, variables
+from workbench.diagnosis.effects.slots import read_slots
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.quadratic import Joint, Key
+from workbench.diagnosis.inference.search import Fitted, Reporter
+from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.laws.periods import Period, strongest_period
+from workbench.diagnosis.laws.places import (
+    Law,
+    LawInfluence,
+    Place,
+    laws,
+    places,
+    turning,
+    turning_laws,
+)
+from workbench.diagnosis.laws.splines import APART, COEFFICIENTS, Knots, Smoothness, smoothest
+from workbench.diagnosis.laws.writing import PACKAGE, Written, extended_library, unit_of
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.prediction import Variation
+from workbench.models.modelica import Library
+from workbench.recordings.case import Case
+from workbench.system.system import OBSERVER, System
+
+_AT_ONCE = 300  # columns of derivatives: some hundred megabytes
+_ROUNDING = 1e-8  # share of what an unknown explains alone
+_SPAN = 0.25  # of what lasts, over which a rate is taken: it settles within that
+_SEEN = 0.01  # share of the samples that are beyond the ends of a function
+_BEGINS = 10.0  # of what lasts, that a beginning takes at most
+_SIZE = "d"  # of a probe
+
+
+@dataclass(frozen=True, eq=False)
+class LawProspect:
+    """A law, as a free function about what is known.
+
+    Attributes
+    ----------
+    knots : where its function lives; None for a constant, and for what turns.
+    largest : of the output of its place, without it.
+    """
+
+    law: Law
+    knots: Knots | None
+    smoothness: Smoothness
+    largest: float
+
+    @property
+    def most(self) -> float:
+        """What a law may change beforehand, see `_most`."""
+        return _most(self.law, self.largest)
+
+
+def _most(law: Law, largest: float) -> float:
+    """What a law may change beforehand: an output by its own size, one that is zero by anything."""
+    relative = law.carrier.expression != "1.0"
+    return 1.0 if relative else largest or np.inf
+
+
+def effect_at(name: str, library: Library, place: Place, size: str) -> Effect:
+    """A generated class as an effect."""
+    return Effect(
+        name=name,
+        model=f"{library.name}.{PACKAGE}.{name}",
+        slots=(place.slot.name,),
+        size=size,
+        matters=1.0,
+        text="",
+        separation="",
+    )
+
+
+def _probe(place: Place) -> Written:
+    declared = f"parameter Real {_SIZE}({unit_of(place.output.unit)}) = 0.0;"
+    return Written(place.name, "Probe", place, (declared,), (), _SIZE)
+
+
+class Scan:
+    """All laws about what is known: the nominal model, or that with what was found.
+
+    A law that is small acts as a parameter that is added to the output of its slot, and that
+    changes in time as the law says along the motion without it; so one FMU serves all of them.
+
+    Attributes
+    ----------
+    base : what is known, fitted.
+    prospects : of all laws, the likeliest first.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        library: Library,
+        cases: Sequence[Case],
+        workers: int,
+        report: Reporter,
+        about: Fitted,
+    ) -> None:
+        self._lasting = system.comparison.lasting
+        base = system.models[OBSERVER].name
+        where = tuple(places(library, base, read_slots(library, base)))
+        names = list(
+            dict.fromkeys(f"{place.slot.name}.{one}" for place in where for one in _seen(place))
+        )
+        with tempfile.TemporaryDirectory() as scratch:
+            extended = extended_library(library, map(_probe, where), Path(scratch))
+            probes = [effect_at(place.name, library, place, _SIZE) for place in where]
+            effects = [*about.active, *probes]
+            path = Path(scratch) / "Probes.fmu"
+            text = source(extended, base, "Probes", effects, {}, {}, "With probes")
+            report(f"compiling probes in {len(where)} places")
+            build(extended, "Probes", watching(text, names), path, every_platform=False)
+            given = given_values(path, system)
+            with Simulations(path, system, given, cases, workers, report=report) as simulations:
+                self._fit = Fit(simulations, effects)
+                self.base = anew(self._fit, about.point, about.active)
+                values = self._fit.unknowns.values(self.base.point)
+                tables = simulations.along(values, [f"watched{k}" for k in range(len(names))])
+                self._recordings = [
+                    (one.time, dict(zip(names, table.T, strict=True)))
+                    for one, table in zip(simulations.recordings, tables, strict=True)
+                ]
+                span = _SPAN * system.comparison.lasting
+                every = [law for place in where for law in laws(place, self._recordings, span)]
+                report(f"{len(every)} laws in {len(where)} places")
+                found = self._judged(simulations, values, every)
+                found += self._turning(simulations, values, where)
+        self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)
+
+    def _judged(
+        self,
+        simulations: Simulations,
+        values: Sequence[Mapping[str, float]],
+        every: Sequence[Law],
+    ) -> list[LawProspect]:
+        lin = self.base.linearised
+        found: list[LawProspect] = []
+        each = max(1, _AT_ONCE // COEFFICIENTS)
+        for first in range(0, len(every), each):
+            part = every[first : first + each]
+            bases = [self._basis(law) for law in part]
+            columns = [
+                Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+                for law, (_, basis) in zip(part, bases, strict=True)
+                for _ in range(basis[0].shape[1])
+            ]
+            courses = [
+                np.hstack([basis[k] for _, basis in bases]) for k in range(len(self._recordings))
+            ]
+            derivatives = simulations.responses(values, columns, courses)
+            at = 0
+            for law, (knots, basis) in zip(part, bases, strict=True):
+                count = basis[0].shape[1]
+                keys = [(law.place.name, f"c{k}") for k in range(count)]
+                more = [one[:, at : at + count] for one in derivatives]
+                joint = self._fit.quadratics(lin.extended(keys, more), keys)
+                largest = self._largest(law.place)
+                smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
+                found.append(LawProspect(law, knots, smoothness, largest))
+                at += count
+        return found
+
+    def _turning(
+        self,
+        simulations: Simulations,
+        values: Sequence[Mapping[str, float]],
+        where: Sequence[Place],
+    ) -> list[LawProspect]:
+        """Laws that begin anew with the period that errors have most of, each phase its own.
+
+        Of all periods that are told apart each is as likely beforehand.
+        """
+        periods: dict[tuple[str, LawInfluence], Period | None] = {}
+        every: list[tuple[Law, Period]] = []
+        for place in where:
+            for influence in turning(place):
+                # Time is the same everywhere.
+                at = (place.slot.name if influence.factors else "", influence)
+                if at not in periods:
+                    periods[at] = self._period(simulations, place, influence)
+                if (period := periods[at]) is not None:
+                    own = replace(influence, span=period.length)
+                    laws_ = turning_laws(place, self._recordings, own)
+                    every += [(law, period) for law in laws_]
+        if not every:
+            return []
+        waves = [self._waves(law, period) for law, period in every]
+        columns = [
+            Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+            for law, _ in every
+            for _ in range(2)
+        ]
+        courses = [np.hstack([wave[k] for wave in waves]) for k in range(len(self._recordings))]
+        derivatives = simulations.responses(values, columns, courses)
+        found = []
+        for n, (law, period) in enumerate(every):
+            keys = [(law.place.name, f"c{k}") for k in range(2 * len(derivatives))]
+            more = [np.zeros((len(one), len(keys))) for one in derivatives]
+            for k, one in enumerate(derivatives):
+                more[k][:, 2 * k : 2 * k + 2] = one[:, 2 * n : 2 * n + 2]
+            joint = self._fit.quadratics(self.base.linearised.extended(keys, more), keys)
+            largest = self._largest(law.place)
+            likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
+            evidence = likeliest.evidence - float(np.log(period.tried))
+            likeliest = replace(likeliest, evidence=evidence)
+            found.append(LawProspect(law, None, likeliest, largest))
+        return found
+
+    def _period(
+        self, simulations: Simulations, place: Place, influence: LawInfluence
+    ) -> Period | None:
+        """The period that errors have most of, along an influence."""
+        middles = [one.blocks.mean(axis=1).astype(int) for one in simulations.recordings]
+        clocks = [
+            influence.course(place, watched, time)[at]
+            for (time, watched), at in zip(self._recordings, middles, strict=True)
+        ]
+        lin = self.base.linearised
+        return strongest_period([one.errors for one in lin.evidence], clocks, lin.lasting)
+
+    def _waves(self, law: Law, period: Period) -> list[Matrix]:
+        """Carrier times cosine and sine in each recording, (n, 2)."""
+        assert law.influence is not None
+        found = []
+        for time, watched in self._recordings:
+            angle = 2.0 * np.pi / period.length * law.influence.course(law.place, watched, time)
+            carrier = law.carrier.course(law.place, watched)
+            found.append(carrier[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+        return found
+
+    def _largest(self, place: Place) -> float:
+        """Largest size of an output, without a law."""
+        name = place.output.name
+        return max(float(np.abs(place.at(one, name)).max()) for _, one in self._recordings)
+
+    def _basis(self, law: Law) -> tuple[Knots | None, list[Matrix]]:
+        """Columns of a law in each recording: carrier times basis functions."""
+        carriers = [law.carrier.course(law.place, watched) for _, watched in self._recordings]
+        if law.influence is None:
+            return None, [one[:, None] for one in carriers]
+        courses = [
+            law.influence.course(law.place, watched, time) for time, watched in self._recordings
+        ]
+        low, high = 0.0, 1.0
+        if law.influence.kind == "rate":  # which begins from anywhere
+            low, high = 0.5 * _SEEN, 1.0 - 0.5 * _SEEN
+        ends = np.quantile(np.concatenate(courses), (low, high))
+        knots = Knots(float(ends[0]), float(ends[1]))
+        if law.influence.kind == "since":  # what is slower is a function of time
+            knots = Knots(0.0, min(knots.high, _BEGINS * self._lasting))
+        return knots, [
+            one[:, None] * knots.basis(course)
+            for one, course in zip(carriers, courses, strict=True)
+        ]
+
+
+def watching(text: str, names: Sequence[str]) -> str:
+    """A model with outputs for what is within its slots."""
+    outputs = [f"  output Real watched{k} = {name};\n" for k, name in enumerate(names)]
+    head, end, tail = text.rpartition("end ")
+    return head + "".join(outputs) + end + tail
+
+
+def _seen(place: Place) -> list[str]:
+    return [place.output.name, *(one.name for one in place.inputs)]
+
+
+def eliminated(joint: Joint, keys: Sequence[Key]) -> tuple[Matrix, Vector]:
+    """Normal matrix and gradient of some unknowns, the others at their best."""
+    total = joint.total()
+    own = np.array([key in keys for key in joint.shared])
+    others = total.N[np.ix_(~own, ~own)]
+    both = np.column_stack([total.N[np.ix_(~own, own)], total.g[~own]])
+    solved = np.linalg.lstsq(others, both, rcond=None)[0]
+    before = np.diag(total.N)[own]
+    N = total.N[np.ix_(own, own)] - total.N[np.ix_(own, ~own)] @ solved[:, :-1]
+    g = total.g[own] - total.N[np.ix_(own, ~own)] @ solved[:, -1]
+    # What the others do as well, but for rounding, the data do not show.
+    shown = np.diag(N) > _ROUNDING * before
+    return N * np.outer(shown, shown), g * shown

@@ -1,0 +1,264 @@
+"""What each recording says about every parameter: whitened prediction errors, their derivatives.
+
+The derivatives are made beside the simulation. Everything that follows, fits, tests on held-out
+recordings and confusability, is linear algebra on them.
+"""
+
+import threading
+from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import numpy as np
+
+from workbench.arrays import Matrix
+from workbench.diagnosis.data.clocks import late_signals
+from workbench.diagnosis.data.motion import Opened, opened
+from workbench.diagnosis.data.samples import Samples, compared, prepare
+from workbench.diagnosis.inference.thresholds import SOUND, Soundness
+from workbench.diagnosis.simulation.prediction import Variation
+from workbench.diagnosis.simulation.simulator import (
+    Evidence,
+    Simulated,
+    Simulator,
+    settled_parts,
+    simulating,
+)
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.runtime.progress import Pace
+from workbench.system.system import System
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Simulations:
+    """A model along all recordings, in worker processes if there are more than one.
+
+    Parameters
+    ----------
+    path : FMU with all effects that may be asked for.
+    given : values of its variables that the diagnosed model has instead of the defaults.
+    sound : which samples count.
+    restarting : whether samples count where states can be restarted.
+    report : takes a line now and then on how many simulations were made.
+    model : the FMU with these values, where it is open already; it must outlive the simulations.
+
+    Attributes
+    ----------
+    nominal, units, bounds : value, unit, (least, greatest) value by variable of the FMU.
+    begin : start values of states by recording, as measured.
+    simulated : what its simulators are made from.
+    cases, recordings : as recorded, and made ready.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        system: System,
+        given: Mapping[str, float],
+        cases: Sequence[Case],
+        workers: int,
+        sound: Soundness = SOUND,
+        report: Callable[[str], None] = lambda line: None,
+        *,
+        restarting: bool = True,
+        model: Opened | None = None,
+    ) -> None:
+        self._pace = Pace(report, "simulations")
+        self.system, self.given, self.cases = system, dict(given), list(cases)
+        self._sound, self._workers = sound, min(workers, len(cases))
+        self._alone = self._workers == 1
+        self._at = list(range(len(cases)))  # of each recording, among all forms
+        self._without = list(self._at)
+        self._refused: dict[int, InputError] = {}
+        self._interrupted = threading.Event()
+        with ExitStack() as stack:
+            self._model = model or stack.enter_context(opened(path, system, given))
+            self._tell(self._model.fmu)
+            self.recordings = [self._ready(one, restarting=restarting) for one in cases]
+            coarse = Simulated(path, system, tuple(self.recordings))
+            parts = settled_parts(self._simulator(coarse), self.nominal)
+            self.simulated = coarse._replace(parts=parts)
+            self._forms = self._weighed([*self.recordings, *self._lesser()])
+            every = self.simulated._replace(recordings=tuple(self._forms))
+            self._pool = stack.enter_context(self._workers_with(every))
+            self._open = stack.pop_all()
+        self._choose()
+        # Long ones first: the last one to finish leaves the other processors idle.
+        self._order = sorted(range(len(cases)), key=lambda k: -self.recordings[k].time.size)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._open.close()
+
+    def _tell(self, fmu: FMU) -> None:
+        """What the model says of its variables."""
+        self.nominal = dict(fmu.defaults)
+        self.units = dict(fmu.units)
+        self.bounds = {
+            v.name: (
+                -np.inf if v.minimum is None else v.minimum,
+                np.inf if v.maximum is None else v.maximum,
+            )
+            for v in fmu.description.variables
+        }
+        for name in late_signals(self.system):
+            self.units[name] = "s"
+            # A small change: a block is short against all that the machine does.
+            self.bounds[name] = (-self.system.comparison.block, self.system.comparison.block)
+
+    def _simulator(self, given: Simulated) -> Simulator:
+        """One in this process, with the FMU that is open."""
+        return Simulator(given, self._model.fmu)
+
+    def _workers_with(self, given: Simulated) -> Pool[Simulator]:
+        """Simulators in processes, or the one of this process."""
+        if self._alone:
+            return Pool(1, lambda given: nullcontext(self._simulator(given)), given)
+        return Pool(self._workers, simulating, given)
+
+    def _ready(self, case: Case, *, restarting: bool) -> Samples:
+        """A recording made ready."""
+        signals = compared(self.system, self.cases)
+        given = (case, self.system, signals, self.nominal, self._model.motion, self._sound)
+        return prepare(*given, restarting=restarting)
+
+    def _lesser(self) -> list[Samples]:
+        """Recordings as they are where what is restarted does not count."""
+        found: list[Samples] = []
+        for k in (k for k, one in enumerate(self.recordings) if one.restarted.any()):
+            try:
+                found.append(self._ready(self.cases[k], restarting=False))
+                self._without[k] = len(self.cases) + len(found) - 1
+            except InputError as error:
+                self._refused[k] = error
+        return found
+
+    def _weighed(self, forms: Sequence[Samples]) -> list[Samples]:
+        """Forms of recordings, with what is uncertain in them weighed."""
+        owners = [*self._at, *(k for k, at in enumerate(self._without) if at != k)]
+        own = self._simulator(self.simulated._replace(recordings=tuple(forms)))
+        weighed = []
+        for at, k in enumerate(owners):
+            said = self.system.set_by(self.cases[k].conditions)
+            weighed.append(own.weighed(at, {**self.given, **said}))
+        self._begins = [own.begin(at) for at in range(len(forms))]
+        return weighed
+
+    def _choose(self) -> None:
+        """Take the forms of recordings that are asked for."""
+        self.recordings[:] = [self._forms[at] for at in self._at]
+        self.begin = [self._begins[at] for at in self._at]
+        self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
+
+    def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
+        """Let samples of some recordings count, or not, where states can be restarted.
+
+        Raises
+        ------
+        InputError
+            If a recording has too little else.
+        """
+        for k in numbers if not counting else ():
+            if k in self._refused:
+                raise self._refused[k]
+        for k in numbers:
+            self._at[k] = k if counting else self._without[k]
+        self._choose()
+
+    def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
+        """Errors of every recording at its own point.
+
+        Parameters
+        ----------
+        points : values of the FMU's variables and of delays, one mapping for each recording.
+        """
+        found = self._gathered({k: (Simulator.at, self._at[k], points[k]) for k in self._order})
+        return [found[k] for k in range(len(self.recordings))]
+
+    def derivatives(
+        self,
+        points: Sequence[Mapping[str, float]],
+        columns: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]] | None = None,
+    ) -> list[Matrix]:
+        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p).
+
+        Parameters
+        ----------
+        sizes : see `Simulator.derivatives`.
+        """
+        found = self._gathered(
+            {
+                k: (Simulator.derivatives, self._at[k], points[k], columns, None, sizes)
+                for k in self._order
+            }
+        )
+        return [found[k] for k in range(len(self.recordings))]
+
+    def responses(
+        self,
+        points: Sequence[Mapping[str, float]],
+        columns: Sequence[Variation],
+        courses: Sequence[Matrix],
+    ) -> list[Matrix]:
+        """As `derivatives`, of columns that act by factors `courses` of each recording, (n, p)."""
+        found = self._gathered(
+            {
+                k: (Simulator.derivatives, self._at[k], points[k], columns, courses[k])
+                for k in self._order
+            }
+        )
+        return [found[k] for k in range(len(self.recordings))]
+
+    def along(self, points: Sequence[Mapping[str, float]], watched: Sequence[str]) -> list[Matrix]:
+        """Variables of the FMU at the samples of every recording, each (n, w); see `at`."""
+        found = self._gathered(
+            {k: (Simulator.along, self._at[k], points[k], watched) for k in self._order}
+        )
+        return [found[k] for k in range(len(self.recordings))]
+
+    def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """Results of a job that asks for evidence, by item; no processor waits for one of them."""
+        if self._alone or len(items) < 2:
+            return [job(item) for item in items]
+        with ThreadPoolExecutor(len(items)) as threads:
+            jobs = [threads.submit(job, item) for item in items]
+            try:
+                return [one.result() for one in jobs]
+            except BaseException:
+                # Others end with what they wait for.
+                self._interrupted.set()
+                wait(jobs)
+                self._interrupted.clear()
+                raise
+
+    def _gathered(self, tasks: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Any]:
+        """Results of tasks, by their names."""
+        if self._interrupted.is_set():
+            raise CancelledError
+        counted = self._pace.part(len(tasks))
+        under_way = {}
+        try:
+            for name, task in tasks.items():
+                under_way[name] = self._pool.submit(*task)
+                under_way[name].add_done_callback(counted)
+            return {name: one.result() for name, one in under_way.items()}
+        finally:
+            # After Ctrl-C nobody waits for the others.
+            for one in under_way.values():
+                one.cancel()

@@ -1,0 +1,294 @@
+"""Prediction errors of a model along a recording: what the data say that the model does not.
+
+The model is simulated from the measured inputs. Only a slow motion that integrates the noise of
+inputs is led along its measured output, by the stationary Kalman gain for that noise: errors of the
+past are forgotten and the prediction errors are white when the model is right. All else stays the
+model's own. Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2 (prediction-error
+methods).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix
+from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.simulation.steps import Steps, step, steps
+from workbench.diagnosis.simulation.tangent import Tangent, advance, renew, share, tangent, tell
+from workbench.errors import FMUError
+from workbench.models.fmu import FMU
+from workbench.models.native import (
+    checked,
+    compiled,
+    inlined,
+    instance,
+    place,
+    read,
+    set_inputs,
+    set_states,
+)
+from workbench.system.system import System
+
+_LONGEST = 1.2  # sample times, of a step: what is stepped explicitly has to be stable
+_SWIFT = 1.0  # rate times step from which on a state is stepped implicitly
+
+
+class _Led(NamedTuple):
+    """The motion that is led.
+
+    Attributes
+    ----------
+    states : that a correction scales alike, the leader first; empty: all outputs lead.
+    column : of the output that leads alone.
+    corrected : (p,) states that all outputs lead.
+    gain : (p, l) of these corrections.
+    restarted, seen : (r,) states that restarts set, and the columns of their outputs.
+    """
+
+    states: NDArray[np.intp]
+    column: int
+    corrected: NDArray[np.intp]
+    gain: Matrix
+    restarted: NDArray[np.intp]
+    seen: NDArray[np.intp]
+
+
+@inlined
+def _lead(model, led, share, error, states, errors):  # type: ignore[no-untyped-def]
+    """Correct the states by prediction errors (c,), and derivatives (n, p) by theirs (c, p).
+
+    A correction scales all states that move together: what depends on their ratio stays as it is,
+    so that the noise of one sample does not come back as something else in the next.
+    """
+    x, p = model.x, states.shape[1]
+    if led.states.size:
+        first, column = led.states[0], led.column
+        correction, leader = share * error[column], x[first]
+        if led.states.size == 1:
+            x[first] += correction
+            for q in range(p):
+                states[first, q] += share * errors[column, q]
+        elif abs(leader) > 2.0 * abs(correction):
+            for q in range(p):
+                moved = share * errors[column, q] - correction / leader * states[first, q]
+                for i in led.states:
+                    states[i, q] *= 1.0 + correction / leader
+                    states[i, q] += moved / leader * x[i]
+            for i in led.states:
+                x[i] *= 1.0 + correction / leader
+    for i in range(led.corrected.size):
+        for j in range(led.gain.shape[1]):
+            x[led.corrected[i]] += led.gain[i, j] * error[j]
+            for q in range(p):
+                states[led.corrected[i], q] += led.gain[i, j] * errors[j, q]
+
+
+@inlined
+def _restart(model, led, error, states, errors):  # type: ignore[no-untyped-def]
+    """Set states as measured, by errors (c,), and derivatives (n, p) by theirs (c, p)."""
+    for i in range(led.restarted.size):
+        at, column = led.restarted[i], led.seen[i]
+        model.x[at] += error[column]
+        for q in range(states.shape[1]):
+            states[at, q] += errors[column, q]
+
+
+@compiled
+def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work, tangent):  # type: ignore[no-untyped-def]
+    """Fill `errors` (n, c), measured minus predicted, and their derivatives; returns a status."""
+    varied = tangent.states.shape[1] > 0
+    for i in range(x0.size):
+        model.x[i] = x0[i]
+    for j in range(u.shape[1]):
+        model.u[j] = u[0, j]
+    if place(model):
+        return 1
+    holds = False
+    for j in range(held.size):
+        holds = holds or held[j]
+    for k in range(time.size):
+        if k > 0:
+            before = k - 1 if varied else 0
+            if anew[k]:
+                _restart(model, led, errors[k - 1], tangent.states, tangent.errors[before])
+            _lead(model, led, gain[k - 1], errors[k - 1], tangent.states, tangent.errors[before])
+            if set_states(model):
+                return 1
+            interval = time[k] - time[k - 1]
+            count = max(1, math.ceil(interval / longest - 1e-6))
+            for i in range(1, count + 1):
+                for j in range(u.shape[1]):
+                    moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / count
+                    work.to[j] = u[k - 1, j] + moved
+                status = step(model, work, interval / count)
+                if varied and not status:
+                    share(tangent, k, i / count)
+                    status = advance(model, tangent, interval / count)
+                if status:
+                    return status
+            for j in range(u.shape[1]):
+                model.u[j] = u[k, j]
+            if holds and set_inputs(model, 0, u.shape[1]):
+                return 1
+        if read(model):
+            return 1
+        for i in range(y.shape[1]):
+            errors[k, i] = y[k, i] - model.y[i]
+        if varied:
+            if (k == 0 or holds) and renew(model, tangent):
+                return 1
+            tell(tangent, k)
+    return 0
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A parameter that is varied.
+
+    Attributes
+    ----------
+    variables : of the FMU that take its value; of a state it is the start.
+    setting : other variables that are set while it is varied, such as the shape of an effect that
+        is absent otherwise.
+    """
+
+    variables: tuple[str, ...]
+    setting: Mapping[str, float] = field(default_factory=dict)
+
+
+class Predictor:
+    """One model, ready for many runs.
+
+    Parameters
+    ----------
+    fmu : model with the states, inputs and readings of the system; it must outlive the predictor.
+    signals : that are predicted.
+    parts : of a sample time, one step each.
+    watched : variables that `along` tells.
+    """
+
+    def __init__(
+        self,
+        fmu: FMU,
+        system: System,
+        signals: Sequence[str],
+        parts: int = 1,
+        watched: Sequence[str] = (),
+    ) -> None:
+        self._fmu, self._system = fmu, system
+        inputs = [one.name for one in system.inputs]
+        readings = [*(system.signals[name].reading for name in signals), *watched]
+        self._model = instance(fmu, inputs, system.corrections, readings)
+        self._longest = _LONGEST * system.sample_time / parts
+        leading = system.comparison.leading
+        states: list[int] = []
+        if leading is not None:
+            others = [name for name in leading.together if name != leading.output]
+            states = [fmu.states.index(name) for name in (leading.output, *others)]
+        column = list(signals).index(leading.output) if leading is not None else 0
+        self._leading = np.array(states, np.intp), column
+
+    def begin(self, samples: Samples) -> dict[str, float]:
+        """Start values of states, as known at the start of a recording."""
+        return {name: value for name, value in samples.begin.items() if name in self._fmu.states}
+
+    def errors(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
+        """Prediction errors along one recording.
+
+        Parameters
+        ----------
+        values : by name of the FMU's variables, SI; others keep their defaults.
+
+        Returns
+        -------
+        errors : (n, c) measured minus predicted; zero from the second sample on after all that
+            counts.
+
+        Raises
+        ------
+        FMUError
+            If the model cannot be evaluated along the recording.
+        """
+        return self.derivatives(samples, values, ())[0]
+
+    def along(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
+        """What is watched, at each sample of a recording, (n, w); see `errors`."""
+        count = len(self._model.y) - samples.y.shape[1]
+        y = np.hstack([samples.y, np.zeros((samples.time.size, count))])
+        found: Matrix = -self.errors(replace(samples, y=y), values)[:, samples.y.shape[1] :]
+        return found
+
+    def derivatives(
+        self,
+        samples: Samples,
+        values: Mapping[str, float],
+        columns: Sequence[Variation],
+        courses: Matrix | None = None,
+        absent: Sequence[str] = (),
+    ) -> tuple[Matrix, Tangent]:
+        """Prediction errors along one recording, and their derivatives by p columns.
+
+        The FMU is left at the last sample. See `errors`.
+
+        Parameters
+        ----------
+        courses : (n, p) factors by which the columns act at each sample, if they change in time.
+        absent : components of the FMU whose states nothing depends on.
+        """
+        fmu, values = self._fmu, {**self.begin(samples), **values}
+        for column in columns:
+            values |= column.setting
+        fmu.start(values)
+        errors = np.zeros_like(samples.y)
+        self._model.u[:] = 0.0
+        x0 = fmu.get_states()
+        end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
+        work = self._steps()
+        varied = [column.variables for column in columns]
+        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, courses, absent)
+        status = _predict(
+            self._model,
+            samples.time[:end],
+            samples.u,
+            samples.held,
+            samples.y,
+            samples.gain,
+            self._led(samples),
+            np.zeros(end, np.bool_) if samples.restarts is None else samples.restarts.at[:end],
+            x0,
+            self._longest,
+            errors,
+            work,
+            along,
+        )
+        checked(status, fmu)
+        if not np.isfinite(along.states).all():  # once lost, they stay so
+            raise FMUError(f"{fmu.path.name}: derivatives of {samples.name} grow beyond all bounds")
+        return errors, along
+
+    def _led(self, samples: Samples) -> _Led:
+        lead, restarts = samples.lead, samples.restarts
+        corrected = () if lead is None else lead.states
+        gain = np.zeros((0, 0)) if lead is None else np.ascontiguousarray(lead.gain)
+        restarted = () if restarts is None else tuple(restarts.noise)
+        seen = np.array([samples.signals.index(name) for name in restarted], np.intp)
+        return _Led(*self._leading, self._at(corrected), gain, self._at(restarted), seen)
+
+    def _at(self, states: Sequence[str]) -> NDArray[np.intp]:
+        """Places of states in the model."""
+        return np.array([self._fmu.states.index(name) for name in states], np.intp)
+
+    def _steps(self) -> Steps:
+        """Work space; which states are stiff is judged where the recording begins."""
+        fmu = self._fmu
+        rates = np.abs(fmu.state_jacobian().diagonal()) * self._longest
+        stiff = [
+            i
+            for i, name in enumerate(fmu.states)
+            if name in (self._system.states or ()) or rates[i] > _SWIFT
+        ]
+        return steps(fmu, np.array(stiff, np.intp), len(self._system.inputs))

@@ -1,0 +1,334 @@
+"""A model along recordings, in one process: whitened prediction errors and their derivatives."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, moved
+from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.simulation.prediction import Predictor, Variation
+from workbench.models.fmu import FMU
+from workbench.system.system import System
+
+_DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
+_FINEST = 32  # steps of a sample time
+
+
+def delay(signal: str) -> str:
+    """Name of the delay of a sensor behind a structure [s], which is no variable of the FMU."""
+    return f"{signal}Delay"
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """One recording, linearised about a point.
+
+    Attributes
+    ----------
+    errors : (b, c) whitened prediction errors of the blocks, by channel.
+    rest : whitened error of the input at rest.
+    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units; NaN of
+        a silent channel.
+    jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
+    """
+
+    errors: Matrix
+    rest: float
+    sizes: Matrix
+    jacobian: Matrix
+
+    @property
+    def blocks(self) -> Vector:
+        """(c,) number of blocks, none of a silent channel."""
+        counts: Vector = len(self.errors) * ~np.isnan(self.sizes[0])
+        return counts
+
+    @property
+    def residual(self) -> Vector:
+        """(b*c + 1,) errors and rest in one vector."""
+        return np.append(self.errors.ravel(), self.rest)
+
+
+class Simulated(NamedTuple):
+    """What a simulator is made from: an FMU and the recordings."""
+
+    path: Path
+    system: System
+    recordings: tuple[Samples, ...]
+    parts: int = 1  # steps of a sample time
+
+
+class Simulator:
+    """An FMU along recordings, in one process; the FMU must outlive it."""
+
+    def __init__(self, given: Simulated, fmu: FMU) -> None:
+        self._fmu = fmu
+        self._recordings = given.recordings
+        self._system, self._parts = given.system, given.parts
+        signals = given.recordings[0].signals
+        self._predictor = Predictor(fmu, given.system, signals, given.parts)
+        self._delays = {
+            j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
+        }
+        rest = given.system.comparison.rest
+        self._rest = fmu.variables([rest.output]) if rest else None
+        self._clocks = late_signals(given.system)
+
+    def stepped(self, parts: int) -> "Simulator":
+        """The same FMU in other steps, so many to a sample time."""
+        other = copy(self)
+        other._parts = parts
+        signals = self._recordings[0].signals
+        other._predictor = Predictor(self._fmu, self._system, signals, parts)
+        return other
+
+    @property
+    def parameters(self) -> set[str]:
+        """Names of the FMU's variables that have a default."""
+        return set(self._fmu.defaults)
+
+    def errors(self, values: Mapping[str, float]) -> list[Matrix]:
+        """Prediction errors of the samples that count, of each recording, (m, c)."""
+        recordings = enumerate(self._recordings)
+        return [self._simulated(k, values)[0][one.told] for k, one in recordings]
+
+    def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
+        """Variables of the FMU at each sample of one recording, (n, w)."""
+        one = self._in_time(number, values)
+        predictor = Predictor(self._fmu, self._system, one.signals, self._parts, watched)
+        return predictor.along(one, self._known(values))
+
+    def begin(self, number: int) -> dict[str, float]:
+        """Start values of states that a recording's outputs show."""
+        return self._predictor.begin(self._recordings[number])
+
+    def at(self, number: int, values: Mapping[str, float]) -> Evidence:
+        """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
+
+        Parameters
+        ----------
+        values : of the FMU's variables and of delays, SI.
+        """
+        simulated, rest = self._simulated(number, values)
+        read_ = self._read(number, simulated, values)
+        errors = self._whitened(number, read_)
+        columns = []
+        for name, spread in self._delays.values():
+            step = _DELAY_STEP * spread
+            delayed = {**values, name: values[name] + step}
+            late = self._whitened(number, self._read(number, simulated, delayed))
+            columns.append(np.append((late - errors).ravel() / step, 0.0))
+        jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
+        return Evidence(errors, rest, self._recordings[number].sizes(read_), jacobian)
+
+    def derivatives(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        columns: Sequence[Variation],
+        courses: Matrix | None = None,
+        sizes: Mapping[str, Sequence[str]] | None = None,
+    ) -> Matrix:
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
+
+        Parameters
+        ----------
+        courses : (n, p) factors by which the columns act at each sample, if they change in time;
+            what is read at rest does not change then.
+        sizes : variables by the component of the FMU that is nominal while they are zero: then
+            nothing depends on its states.
+        """
+        one, fmu = self._in_time(number, values), self._fmu
+        jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
+        clocks = [j for j, column in enumerate(columns) if column.variables[0] in self._clocks]
+        if clocks:
+            jacobian[:-1, clocks] = self._by_clocks(number, values, [columns[j] for j in clocks])
+        for part in _compatible(columns, clocks):
+            varied = [columns[j] for j in part]
+            shares = None if courses is None else courses[:, part]
+            absent = self._absent(values, varied, sizes or {})
+            given = one, self._known(values), varied, shares, absent
+            _, found = self._predictor.derivatives(*given)
+            by = self._whitened(number, self._late(number, found.errors, values))
+            jacobian[:-1, part] = by.reshape(-1, len(part))
+            if self._rest is not None and courses is None:
+                place = self._rest.references
+                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ found.states)[0]
+                for q, column in enumerate(varied):
+                    acting = [name for name in column.variables if name not in fmu.states]
+                    slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
+                jacobian[-1, part] = -slopes / one.rest_noise
+        return jacobian
+
+    def _absent(
+        self,
+        values: Mapping[str, float],
+        varied: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]],
+    ) -> list[str]:
+        """Components of which no size is varied, or other than zero."""
+        acting = {name for column in varied for name in column.variables}
+        return [
+            name
+            for name, own in sizes.items()
+            if not any(one in acting or values.get(one, self._fmu.defaults[one]) for one in own)
+        ]
+
+    def _by_clocks(
+        self, number: int, values: Mapping[str, float], columns: Sequence[Variation]
+    ) -> Matrix:
+        """Derivatives of the errors by the lateness of loggers, (b*c, p).
+
+        By differences over a sample: within one, a signal that is moved is a straight line.
+        """
+        step = float(np.median(np.diff(self._recordings[number].time)))
+
+        def errors(values: Mapping[str, float]) -> Matrix:
+            simulated, _ = self._simulated(number, values)
+            return self._whitened(number, self._read(number, simulated, values)).ravel()
+
+        now = errors(values)
+        names = [column.variables[0] for column in columns]
+        later = [errors({**values, name: values.get(name, 0.0) + step}) for name in names]
+        return np.column_stack([(one - now) / step for one in later])
+
+    def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
+        """A recording whose errors are weighed by how sharply they depend on what is not known.
+
+        Where a motion runs away, the noise of what a restart reads grows until the next one, and a
+        law that is simplified shows by more. Both are linear within a block. What a parameter
+        wanders by along the recording counts as noise of blocks that moves means by as much: a
+        variance over a correlation time, twice, is one over so many blocks.
+
+        Parameters
+        ----------
+        values : of the FMU's variables, SI, at which this is judged.
+        """
+        one = self._recordings[number]
+        compare = self._system.comparison
+        if one.restarts is None and not compare.wander:
+            return one
+        values = {**dict.fromkeys((name for name, _ in self._delays.values()), 0.0), **values}
+        nominal, moved = self._means(number, one.y, values), []
+
+        def shifted(name: str, share: float) -> Matrix:
+            value = (1.0 + share) * values.get(name, self._fmu.defaults[name])
+            return self._means(number, one.y, {**values, name: value}) - nominal
+
+        if one.restarts is not None:
+            for name, noise in one.restarts.noise.items():
+                y, read = one.y.copy(), np.flatnonzero(one.restarts.at) - 1
+                y[read, one.signals.index(name)] += noise[read]
+                moved.append(self._means(number, y, values) - nominal)
+            moved.extend(shifted(name, share) for name, share in one.restarts.uncertain.items())
+        apart = [
+            shifted(name, by.share) * max(1.0, 2.0 * by.over / compare.block) ** 0.5
+            for name, by in compare.wander.items()
+        ]
+        return one.loosened(moved, apart)
+
+    def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""
+        one = self._recordings[number]
+        errors = self._predictor.errors(replace(one, y=y), self._known(values)) - (y - one.y)
+        return one.channels(self._read(number, errors, values))
+
+    def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
+        """Prediction errors of all samples, and the whitened error of the input at rest."""
+        one, in_time = self._recordings[number], self._in_time(number, values)
+        errors = self._predictor.errors(in_time, self._known(values)) + (one.y - in_time.y)
+        if self._rest is None:
+            return errors, 0.0
+        return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
+
+    def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
+        """A recording as by one clock."""
+        return in_time(self._recordings[number], lateness(self._clocks, values))
+
+    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the FMU's variables."""
+        others = {*(name for name, _ in self._delays.values()), *self._clocks}
+        return {name: value for name, value in values.items() if name not in others}
+
+    def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
+        measured = self._recordings[number].y
+        return measured - self._late(number, measured - errors, values)
+
+    def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
+        """What sensors read of signals (n, c, ...), behind structures and late."""
+        one, late = self._recordings[number], lateness(self._clocks, values)
+        if self._delays or late:
+            signals = signals.copy()
+        for j, (name, _) in self._delays.items():
+            behind = one.behind_structure(j, signals[:, j])
+            signals[:, j] = behind - values[name] * np.gradient(behind, one.time, axis=0)
+        for j, name in enumerate(one.signals):
+            if name in late:
+                signals[:, j] = moved(one.time, signals[:, j], late[name])
+        return signals
+
+    def _whitened(self, number: int, errors: Matrix) -> Matrix:
+        """Whitened errors of the blocks, (b, c, ...)."""
+        one = self._recordings[number]
+        whitened: Matrix = np.einsum("bij,bj...->bi...", one.whitening, one.channels(errors))
+        return whitened
+
+
+def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[list[int]]:
+    """Numbers of columns that may be varied in one run: none sets what another sets otherwise.
+
+    Parameters
+    ----------
+    left : numbers of columns that are left out.
+    """
+    parts: list[tuple[list[int], dict[str, float]]] = []
+    for j, column in ((j, one) for j, one in enumerate(columns) if j not in left):
+        wanted = column.setting.items()
+        able = (
+            one for one in parts if all(one[1].get(name, value) == value for name, value in wanted)
+        )
+        if (part := next(able, None)) is None:
+            parts.append(part := ([], {}))
+        part[0].append(j)
+        part[1].update(wanted)
+    return [part for part, _ in parts]
+
+
+@contextmanager
+def simulating(given: Simulated) -> Iterator[Simulator]:
+    """Open an FMU and simulate with it."""
+    with FMU(given.path) as fmu:
+        yield Simulator(given, fmu)
+
+
+def settled_parts(simulator: Simulator, values: Mapping[str, float]) -> int:
+    """Steps of a sample time from which on finer ones hardly move prediction errors.
+
+    A step that is long for what oscillates damps it and turns its phase, and a wrong law would be
+    named for that. Of the squares of errors, half a step may move what forms of laws differ by.
+
+    Parameters
+    ----------
+    values : of the FMU's variables, SI.
+    """
+
+    def errors(parts: int) -> list[Matrix]:
+        return simulator.stepped(parts).errors(values)
+
+    parts, coarse = 1, errors(1)
+    while parts < _FINEST:
+        fine = errors(2 * parts)
+        moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
+        wrong = [np.square(a).sum(axis=0) for a in fine]
+        if np.all(np.sum(moved, axis=0) <= Thresholds.form_share * np.sum(wrong, axis=0)):
+            break
+        parts, coarse = 2 * parts, fine
+    return parts

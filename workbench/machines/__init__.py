@@ -1,0 +1,1 @@
+"""Machines that come with the workbench, each a plugin."""

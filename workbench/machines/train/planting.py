@@ -1,0 +1,134 @@
+"""What can be planted in stops of the virtual train, and what the library calls it."""
+
+import dataclasses
+import hashlib
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.errors import InputError, closest
+from workbench.machines.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
+from workbench.machines.train.stops import USUAL, Faults, Made, draw_train, make, write_stop
+from workbench.recordings.datasets import write_cases
+from workbench.studies.power.planting import Plantable, SheetError
+
+# A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
+# one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off,
+# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off, a film of water.
+_SINGLE = (
+    ("pads", "WeakPads", AXLES, "1", 0.15, False),
+    ("units", "IsolatedUnit", AXLES, "1", 1.0, False),
+    ("drag", "DraggingBrake", AXLES, "N.m", 1500.0, False),
+    ("radius", "WheelRadius", AXLES, "m", 2.5e-3, True),
+    ("late", "LateSpeed", AXLES, "s", 0.1, False),
+    ("lag", "CylinderLag", BOGIES, "s", 0.4, False),
+    ("reading", "PressureSensorGain", BOGIES, "1", 0.10, True),
+    ("mass", "WrongMass", VEHICLES, "1", 0.15, True),
+)
+PLANTABLE = (
+    *(
+        Plantable(f"{name}[{i}]", unit, f"{effect}[{i}]", signed=signed, unit_size=size / 4)
+        for name, effect, count, unit, size, signed in _SINGLE
+        for i in range(1, count + 1)
+    ),
+    Plantable("gradient", "1", "WrongGradient", signed=True, unit_size=4e-3 / 4),
+    Plantable("water", "1", "WaterFilm", signed=False, unit_size=1.0 / 4),
+    Plantable("glazing", "1", "Glazing", signed=False, unit_size=0.15 / 4),
+)
+SHEET_ERRORS = (SheetError("noise", 2.0), SheetError("tolerances", 1.0))
+
+
+@dataclass(frozen=True)
+class PlantedTrain:
+    """Sets of stops of one train each, a `VirtualRig`.
+
+    Attributes
+    ----------
+    stops : of a set.
+    """
+
+    stops: tuple[AskedStop, ...]
+
+    @property
+    def plantables(self) -> tuple[Plantable, ...]:
+        """What can be planted."""
+        return PLANTABLE
+
+    @property
+    def sheet_errors(self) -> tuple[SheetError, ...]:
+        """What the data sheet may have wrong."""
+        return SHEET_ERRORS
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the stops."""
+        return tuple(stop.name for stop in self.stops)
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """Stops and code."""
+        code = sorted(Path(__file__).parent.glob("*.py"))
+        return {
+            "stops": [repr(stop) for stop in self.stops],
+            "rig": hashlib.sha256(b"".join(file.read_bytes() for file in code)).hexdigest(),
+        }
+
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> list[tuple[Made, int]]:
+        """What happens in the stops of one train; each with the seed of its noise."""
+        faults = _faults(gains)
+        fixed = draw_train(seed, faults.tolerances)
+        return [(make(stop, seed, fixed, faults), seed) for stop in self.stops]
+
+    def write(
+        self, simulated: Sequence[tuple[Made, int]], gains: Mapping[str, float], folder: Path
+    ) -> None:
+        """Write what the train's computer records, read as that of any train."""
+        with tempfile.TemporaryDirectory() as recorded:
+            for made, seed in simulated:
+                write_stop(made, seed, _faults(gains), Path(recorded) / made.stop.name)
+            write_cases("train", Path(recorded), folder)
+
+
+def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
+    """Stops by name, three dry ones and a wet one if none is named.
+
+    Raises
+    ------
+    InputError
+        If there is no stop of a name, or a model is given: the rig has its own equations.
+    """
+    known = {stop.name: stop for stop in USUAL}
+    for name in names:
+        if name not in known:
+            raise InputError(
+                where=f"--case {name}",
+                found=f"no stop of this name{closest(name, known)}",
+                expected=f"one of {', '.join(known)}",
+                remedy="correct the name",
+            )
+    if model is not None:
+        raise InputError(
+            where=f"--reference {model}",
+            found="a model",
+            expected="none: this virtual rig has equations of its own",
+            remedy="leave it out",
+        )
+    return PlantedTrain(tuple(stop for stop in USUAL if stop.name in names or not names))
+
+
+def _faults(gains: Mapping[str, float]) -> Faults:
+    """Faults by their names, `NAME[PLACE]` where there are several places."""
+    found: dict[str, Any] = {}
+    for name, gain in gains.items():
+        kind, _, place = name.partition("[")
+        if place:
+            nothing = getattr(Faults(), kind)
+            found[kind] = found.get(kind, np.zeros_like(nothing))
+            found[kind][int(place.removesuffix("]")) - 1] = gain
+        else:
+            found[kind] = gain
+    return dataclasses.replace(Faults(), **found)

@@ -1,0 +1,126 @@
+"""Sets of stops that somebody recorded and says what is wrong in: judged as those of the rig."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from workbench.errors import InputError
+from workbench.machines.train.planting import PLANTABLE
+from workbench.recordings.datasets import write_cases
+from workbench.runtime.files import read_text
+from workbench.studies.power.planting import Group, Kind, Plantable, Planting, SheetError
+
+_TRUTH = "truth.json"
+_KNOWN = {  # what a truth calls a fault: as it is here, and the size of one of its units
+    "pads_axle": ("pads", -1.0),
+    "isolated_unit": ("units", 1.0),
+    "dragging": ("drag", 1.0),
+    "radius_axle": ("radius", 1e-3),
+    "speed_delay": ("late", 1.0),
+    "cylinder_lag_bogie": ("lag", 1.0),
+    "pressure_sensor": ("reading", 1.0),
+    "glazing": ("glazing", 1.0),
+}
+
+
+@dataclass(frozen=True)
+class RecordedTrain:
+    """Sets of recorded stops, a `VirtualRig` that makes none: a set's seed is its number.
+
+    Attributes
+    ----------
+    folders : of the sets.
+    """
+
+    folders: tuple[Path, ...]
+
+    @property
+    def plantables(self) -> tuple[Plantable, ...]:
+        """What may be wrong in them."""
+        return PLANTABLE
+
+    @property
+    def sheet_errors(self) -> tuple[SheetError, ...]:
+        """None: what was recorded is as it is."""
+        return ()
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the sets."""
+        return tuple(folder.name for folder in self.folders)
+
+    @property
+    def groups(self) -> list[Group]:
+        """What each set hides, by its truth."""
+        return [(_planting(k, folder),) for k, folder in enumerate(self.folders)]
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """What was recorded."""
+        files = (file for folder in self.folders for file in sorted(folder.glob("*/*")))
+        whole = hashlib.sha256()
+        for file in files:
+            whole.update(file.read_bytes())
+        return {"sets": list(self.recordings), "recorded": whole.hexdigest()}
+
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> Path:
+        """Folder of a set, which was recorded."""
+        return self.folders[seed]
+
+    def write(self, simulated: Path, gains: Mapping[str, float], folder: Path) -> None:
+        """Make cases of its stops."""
+        write_cases("train", simulated, folder)
+
+
+def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
+    """Sets of stops: folders with a `truth.json`, or folders of such.
+
+    Raises
+    ------
+    InputError
+        If there is none in a folder, or a truth is not understood.
+    """
+    found: list[Path] = []
+    for folder in folders:
+        inner = [folder, *sorted(path for path in folder.glob("*") if path.is_dir())]
+        sets = [path for path in inner if (path / _TRUTH).is_file()]
+        if not sets:
+            raise InputError(
+                where=str(folder),
+                found=f"no set with a {_TRUTH}",
+                expected="folders of stops, each with what is wrong in them",
+                remedy="name the folder that holds them",
+            )
+        found += sets
+    rig = RecordedTrain(tuple(found))
+    _ = rig.groups  # a truth that is not understood is refused here
+    return rig
+
+
+def _planting(number: int, folder: Path) -> Planting:
+    path, known = folder / _TRUTH, {one.name: one for one in PLANTABLE}
+    try:
+        effects = json.loads(read_text(path, "name another folder"))["effects"]
+        gains = dict(_gain(name, told) for name, told in effects.items())
+        planted = [known[name] for name in gains]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(
+            where=str(path),
+            found=f"a truth that is not understood ({type(error).__name__}: {error})",
+            expected=f'"effects" of some of {", ".join(_KNOWN)}, each with "size" and "at"',
+            remedy="correct it, or leave the set out",
+        ) from None
+    kinds: tuple[Kind, ...] = ("clean", "single", "pair")
+    multiple = min((abs(gains[one.name]) / one.unit_size for one in planted), default=0.0)
+    kind, names = kinds[min(len(gains), 2)], tuple(one.effect for one in planted)
+    return Planting(kind, number, multiple, gains, names)
+
+
+def _gain(name: str, told: Mapping[str, float]) -> tuple[str, float]:
+    """Name of what can be planted, and its gain."""
+    own, unit = _KNOWN[name]
+    place = f"[{int(told['at'])}]" if "at" in told else ""
+    return own + place, unit * float(told["size"])

@@ -1,0 +1,356 @@
+"""The virtual rig of the train: stops by its data sheet, of which the observer model knows less.
+
+Wheel loads shift with the forces that act, each disc has its own temperature, the rail differs
+along the way and is cleaned by the wheels before, and slide protection works on each axle. Each
+wheelset is stepped by the linearly implicit Euler method.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.models.native import compiled
+
+AXLES, BOGIES, VEHICLES, DISCS = 8, 4, 2, 3
+PLACES = np.array([0.0, 2.5, 19.0, 21.5, 26.4, 28.9, 45.4, 47.9])  # of the axles [m]
+STEP = 2e-3  # [s]
+
+_BRAKE_RADIUS, _GRAVITY = 0.300, 9.81  # m, m/s2
+_WET, _DRIES = 0.12, 0.45e6  # friction of a wet disc, work that leaves 1/e of its water [J]
+_GRID = 5.0  # of what differs along the rail [m]
+_LEAD = 100.0  # of the rail before the start [m]
+_END = 6000.0  # of the rail [m]
+_LONGEST = 150.0  # of a stop [s]
+_REST = 2.0  # recorded after standstill [s]
+_STANDSTILL = 0.05  # [m/s]
+
+
+@dataclass(frozen=True)
+class AskedStop:
+    """What is asked of a stop.
+
+    Attributes
+    ----------
+    name : of its folder, NN_noun.
+    speed : at the command [m/s].
+    pressure : that is asked for in a full vehicle [Pa].
+    rail : what the crew says, dry or wet.
+    """
+
+    name: str
+    speed: float
+    pressure: float
+    rail: str
+
+    @property
+    def number(self) -> int:
+        """NN of the name."""
+        return int(self.name[:2])
+
+
+class Train(NamedTuple):
+    """A train and its stop, as the equations read them, SI.
+
+    Attributes
+    ----------
+    friction, units, drag, radius, stiffness, share, inertia : (8,) of each axle.
+    target, begin, lag : (4,) pressure of each bogie, when it begins to rise, lag of its cylinders.
+    mass : (2,) of each vehicle.
+    resistance : (3,) A, B, C.
+    law : (5,) of the pads: speed, exponent, fade, glazing, film of water at the start.
+    polach : (4,) kA, kS, A, B.
+    """
+
+    friction: Vector
+    units: Vector
+    drag: Vector
+    radius: Vector
+    stiffness: Vector
+    share: Vector
+    inertia: Vector
+    target: Vector
+    begin: Vector
+    lag: Vector
+    mass: Vector
+    resistance: Vector
+    law: Vector
+    polach: Vector
+
+
+class Way(NamedTuple):
+    """The rail and the line, every 5 m from 100 m before the start.
+
+    Attributes
+    ----------
+    mu0 : (w,) friction at zero slip, which wheels change as they clean it.
+    gradient, curve : (w,) [1] true gradient, resistance of curves over weight.
+    rolling : (w,) deviation of the rolling radius [m].
+    """
+
+    mu0: Vector
+    gradient: Vector
+    curve: Vector
+    rolling: Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Ridden:
+    """What happened in a stop, every STEP.
+
+    Attributes
+    ----------
+    time, v, s, a : (n,) [s], [m/s], [m] of the first axle, [m/s2] as an accelerometer feels it.
+    omega : (n, 8) [rad/s].
+    pressure : (n, 4) behind the relay valves [Pa].
+    force, load : (n, 8) creep force of an axle, and load of its two wheels [N].
+    standstill : [s].
+    """
+
+    time: Vector
+    v: Vector
+    s: Vector
+    a: Vector
+    omega: Matrix
+    pressure: Matrix
+    force: Matrix
+    load: Matrix
+    standstill: float
+
+
+class _Work(NamedTuple):
+    """What the equations remember and work with.
+
+    Attributes
+    ----------
+    omega, before : (8,) speeds of the axles, and when slide protection last looked [rad/s].
+    T, heat, rubbed : (8, 3) temperature of each disc [degrees C], torque of its pads [N.m], and
+        their work [J].
+    supply : (4,) pressure behind the relay valves [Pa].
+    cylinder, passed : (8,) pressure in the cylinders of an axle [Pa], and share of what its valve
+        passes on.
+    valve : (8,) of slide protection: 1 fills, 0 holds, -1 vents.
+    force, loads : (8,) creep force of an axle, load of one wheel [N].
+    """
+
+    omega: Vector
+    before: Vector
+    T: Matrix
+    heat: Matrix
+    rubbed: Matrix
+    supply: Vector
+    cylinder: Vector
+    passed: Vector
+    valve: Vector
+    force: Vector
+    loads: Vector
+
+
+@compiled
+def _at(values, s):  # type: ignore[no-untyped-def]
+    """Value of the way at a place, between its points."""
+    x = min(max((s + _LEAD) / _GRID, 0.0), values.size - 1.001)
+    i = int(x)
+    return values[i] + (x - i) * (values[i + 1] - values[i])
+
+
+@compiled
+def _creep(polach, mu0, stiffness, load, w, v):  # type: ignore[no-untyped-def]
+    """Creep force of one wheel after Polach (2005)."""
+    kA, kS, A, B = polach[0], polach[1], polach[2], polach[3]
+    mu = mu0 * ((1.0 - A) * math.exp(-B * abs(w)) + A)
+    K = stiffness * (load / 80e3) ** (2.0 / 3.0)
+    epsilon = math.pi * K * w / (4.0 * load * mu * math.sqrt(v * v + 0.01))
+    adhesion = kA * epsilon / (1.0 + (kA * epsilon) ** 2)
+    return 2.0 * load * mu / math.pi * (adhesion + math.atan(kS * epsilon))
+
+
+@compiled
+def _clean(mu0, s, moved, energy):  # type: ignore[no-untyped-def]
+    """Bring the rail under a wheel nearer to clean, by slip work [J/m] over a way moved [m]."""
+    i = int((s + _LEAD) / _GRID + 0.5)
+    if 0 <= i < mu0.size and mu0[i] < 0.16:
+        mu0[i] += min(energy / 4e3 * moved / _GRID, 1.0) * mu0[i]
+    elif 0 <= i < mu0.size and mu0[i] < 0.32:
+        mu0[i] += min(energy / 4e3 * moved / _GRID, 1.0) * (0.32 - mu0[i])
+
+
+@compiled
+def _load(train, work, slowing):  # type: ignore[no-untyped-def]
+    """Load of one wheel of each axle, which shifts with deceleration and forces."""
+    for i in range(work.loads.size):
+        j, first = (i // 2) % 2, i - i % 2
+        m = train.mass[i // 4]
+        both = work.force[first] + work.force[first + 1]
+        shift = slowing * m * 1.3 / 38.0 * (1 - 2 * j) + both * 0.2 * (1 - 2 * (i % 2))
+        work.loads[i] = 0.5 * (m * _GRAVITY / 4.0 * train.share[i] + shift)
+
+
+@compiled
+def _protect(train, work, v):  # type: ignore[no-untyped-def]
+    """Slide protection: vents at 12 % slip, holds as the wheel gains speed, fills below 3 %."""
+    for i in range(work.valve.size):
+        slip = 1.0 - train.radius[i] * work.omega[i] / max(v, 0.1)
+        if v < 2.0 or slip < 0.03:
+            work.valve[i] = 1.0
+        elif work.valve[i] < 1.0 and work.omega[i] > work.before[i]:
+            work.valve[i] = 0.0
+        elif slip > 0.12:
+            work.valve[i] = -1.0
+        work.before[i] = work.omega[i]
+
+
+@compiled
+def _press(train, work, braking):  # type: ignore[no-untyped-def]
+    """Pressure behind the relay valves, in the cylinders, and what slide protection leaves."""
+    for j in range(work.supply.size):
+        target = train.target[j] if braking >= train.begin[j] else 0.0
+        work.supply[j] += STEP / 0.45 * (target - work.supply[j])
+    for i in range(work.cylinder.size):
+        before = work.supply[i // 2]
+        lag = train.lag[i // 2]
+        share = STEP / (lag + STEP)  # all of it without a lag
+        work.cylinder[i] += share * (before - work.cylinder[i])
+        if work.valve[i] > 0.0:
+            work.passed[i] += STEP / 0.45 * (1.0 - work.passed[i])
+        elif work.valve[i] < 0.0:
+            work.passed[i] -= STEP / 0.2 * work.passed[i]
+
+
+@compiled
+def _pads(train, work, i, v):  # type: ignore[no-untyped-def]
+    """Torque of an axle's pads, disc by disc; isolated units press none."""
+    force = 0.1086 * max(0.0, work.cylinder[i] * work.passed[i] - 25e3)
+    speed, exponent, fade, glazing = train.law[0], train.law[1], train.law[2], train.law[3]
+    common = train.friction[i] * (1.0 + speed * (1.0 - v / 22.0)) * force * _BRAKE_RADIUS
+    common *= (max(force, 100.0) / 35e3) ** -exponent
+    torque = 0.0
+    for d in range(DISCS):
+        T = work.T[i, d]
+        glazed = 1.0 - glazing / (1.0 + math.exp(-(T - 110.0) / 6.0))
+        acting = min(max(train.units[i] - d, 0.0), 1.0)
+        dry = common * (1.0 - fade * (T - 60.0)) * glazed
+        film = train.law[4] * math.exp(-work.rubbed[i, d] / _DRIES)
+        work.heat[i, d] = acting * (dry + film * (_WET * force * _BRAKE_RADIUS - dry))
+        torque += work.heat[i, d]
+    return torque
+
+
+@compiled
+def _turn(train, way, work, i, v, s):  # type: ignore[no-untyped-def]
+    """One implicit step of an axle, by its own speed; sets its creep force and heats each disc."""
+    omega, r = work.omega[i], train.radius[i] + _at(way.rolling, s)
+    mu0, load, K = _at(way.mu0, s), work.loads[i], train.stiffness[i]
+    w, dw = v - r * omega, 1e-4
+    F = 2.0 * _creep(train.polach, mu0, K, load, w, v)
+    slope = (2.0 * _creep(train.polach, mu0, K, load, w + dw, v) - F) / dw
+    braked = _pads(train, work, i, v) + 25.0 + 0.6 * omega + 0.004 * omega * omega + train.drag[i]
+    smooth = math.tanh(omega / 0.05)
+    rate = r * F - braked * smooth
+    stiff = r * r * slope + braked / 0.05 * (1.0 - smooth * smooth)
+    change = STEP * rate / (train.inertia[i] + STEP * stiff)
+    work.omega[i] = max(omega + change, 0.0)
+    work.force[i] = F - slope * r * (work.omega[i] - omega)
+    for d in range(DISCS):
+        T = work.T[i, d]
+        cooling = 1.1 * (25.0 + 8.0 * (0.65 * v) ** 0.8) * (T - 20.0)
+        work.rubbed[i, d] += STEP * work.heat[i, d] * omega
+        work.T[i, d] = T + STEP / 37.5e3 * (0.93 * work.heat[i, d] * omega - cooling)
+    return abs(work.force[i] * w) / max(v, 1.0)
+
+
+@compiled
+def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped-def]
+    """Fill rows of t, v, s, a, speeds, forces, loads, pressures; number of the last that moves.
+
+    Rows are (n, 4 + 3*8 + 4).
+    """
+    s, slowing, m = 0.0, 0.0, train.mass[0] + train.mass[1]
+    A, B, C = train.resistance[0], train.resistance[1], train.resistance[2]
+    for k in range(rows.shape[0]):
+        t = k * STEP
+        _press(train, work, t - command)
+        _load(train, work, slowing)
+        if k % 5 == 0:
+            _protect(train, work, v)
+        total = 0.0
+        for i in range(work.omega.size):
+            energy = _turn(train, way, work, i, v, s - places[i])
+            _clean(way.mu0, s - places[i], v * STEP, 0.5 * energy)
+            total += work.force[i]
+        first, second = _at(way.gradient, s - 10.75), _at(way.gradient, s - 37.15)
+        hill = _GRAVITY * (train.mass[0] * first + train.mass[1] * second)
+        hill += _GRAVITY * m * _at(way.curve, s - 23.95)
+        rate = -(total + A + B * v + C * v * v + hill) / m
+        slowing = -rate
+        rows[k, 0], rows[k, 1], rows[k, 2] = t, v, s
+        rows[k, 3] = rate + _GRAVITY * first
+        n = work.omega.size
+        for i in range(n):
+            rows[k, 4 + i] = work.omega[i]
+            rows[k, 4 + n + i] = work.force[i]
+            rows[k, 4 + 2 * n + i] = 2.0 * work.loads[i]
+        for j in range(work.supply.size):
+            rows[k, 4 + 3 * n + j] = work.supply[j]
+        s += STEP * (v + 0.5 * STEP * rate)
+        v += STEP * rate
+        if v < _STANDSTILL:
+            return k
+    return -1
+
+
+def points() -> Vector:
+    """Places of the values of a way, (w,), from the start of the first axle [m]."""
+    return np.arange(-_LEAD, _END, _GRID)
+
+
+def ride(
+    train: Train, way: Way, stop: AskedStop, speed: float, command: float, T: Matrix
+) -> Ridden:
+    """Let a train stop.
+
+    Parameters
+    ----------
+    way : its rail is cleaned by the wheels.
+    speed : at the start [m/s].
+    command : when to brake [s].
+    T : (8, 3) temperature of each disc at the start [degrees C].
+
+    Raises
+    ------
+    InputError
+        If the train does not stand after 150 s.
+    """
+    rows = np.zeros((round(_LONGEST / STEP), 4 + 3 * AXLES + BOGIES))
+    none = np.zeros(AXLES)
+    work = _Work(
+        speed / train.radius,
+        none.copy(),
+        T.copy(),
+        np.zeros((AXLES, DISCS)),
+        np.zeros((AXLES, DISCS)),
+        np.zeros(BOGIES),
+        none.copy(),
+        np.ones(AXLES),
+        np.ones(AXLES),
+        none.copy(),
+        none.copy(),
+    )
+    last = _run(train, way, work, PLACES, speed, command, rows)
+    if last < 0:
+        raise InputError(
+            where=stop.name,
+            found=f"{rows[-1, 1]:.1f} m/s after {_LONGEST:g} s",
+            expected="brakes that stop the train",
+            remedy="plant smaller effects",
+        )
+    end = min(last + round(_REST / STEP), len(rows) - 1)
+    rest = rows[last + 1 : end]
+    rest[:, 0] = STEP * np.arange(last + 1, end)
+    rest[:, 2], rest[:, 28:] = rows[last, 2], rows[last, 28:]
+    t, v, s, a = rows[:end, :4].T
+    omega, force, load, pressure = np.split(rows[:end, 4:], (8, 16, 24), axis=1)
+    return Ridden(t, v, s, a, omega, pressure, force, load, float(rows[last, 0]))

@@ -1,0 +1,311 @@
+"""Stops of the virtual rig: what is drawn of a train and of a stop, and what is recorded."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.machines.train.rig import (
+    AXLES,
+    BOGIES,
+    DISCS,
+    STEP,
+    VEHICLES,
+    AskedStop,
+    Ridden,
+    Train,
+    Way,
+    points,
+    ride,
+)
+from workbench.runtime.files import write_whole
+
+_RADIUS = 0.460  # of the sheet [m]
+_POLACH = {"dry": (1.0, 0.4, 0.4, 0.6), "wet": (0.3, 0.1, 0.4, 0.2)}  # kA, kS, A, B
+_START = 10_000.0  # kilometrage of the first axle at the start [m]
+_PERIOD = 0.02  # of the computer's samples [s]
+_SATELLITES = 5  # samples until their speed is new
+_TUNNELS, _TUNNEL = 1 / 8, (200.0, 800.0)  # share of stops with one, and how long it is [m]
+
+USUAL = (
+    AskedStop("01_120_service_dry", 120 / 3.6, 2.7e5, "dry"),
+    AskedStop("02_160_service_dry", 160 / 3.6, 2.7e5, "dry"),
+    AskedStop("03_80_emergency_dry", 80 / 3.6, 4.2e5, "dry"),
+    AskedStop("04_120_service_wet", 120 / 3.6, 2.7e5, "wet"),
+)
+
+
+def _axles() -> Vector:
+    return np.zeros(AXLES)
+
+
+def _bogies() -> Vector:
+    return np.zeros(BOGIES)
+
+
+def _vehicles() -> Vector:
+    return np.zeros(VEHICLES)
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What a train has that its sheet does not say, SI.
+
+    Attributes
+    ----------
+    pads : (8,) share of the friction of an axle's pads that is lost.
+    units : (8,) brake units of an axle that are isolated.
+    drag : (8,) torque of a brake that does not release.
+    radius : (8,) true minus sheet.
+    late : (8,) delay of a speed sensor.
+    lag : (4,) time constant of a bogie's cylinders behind their valve.
+    reading : (4,) relative error of a pressure sensor.
+    mass : (2,) true mass of a vehicle over the reported one, less one.
+    gradient : true less that of the track file, everywhere [1].
+    glazing : share of the friction that is lost on a disc far above 110 degrees C.
+    water : film on every disc at the start of each stop, 1 where it is wet.
+    noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
+    """
+
+    pads: Vector = field(default_factory=_axles)
+    units: Vector = field(default_factory=_axles)
+    drag: Vector = field(default_factory=_axles)
+    radius: Vector = field(default_factory=_axles)
+    late: Vector = field(default_factory=_axles)
+    lag: Vector = field(default_factory=_bogies)
+    reading: Vector = field(default_factory=_bogies)
+    mass: Vector = field(default_factory=_vehicles)
+    gradient: float = 0.0
+    glazing: float = 0.0
+    water: float = 0.0
+    noise: float = 0.0
+    tolerances: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """What differs from train to train, relative where no unit stands.
+
+    Attributes
+    ----------
+    radius : (8,) true minus sheet [m].
+    pads, stiffness, share, inertia : (8,).
+    regulation : (4,); zero : (4,) of the pressure sensors [Pa].
+    weighed : (2,).
+    A, C, fade : each alone.
+    speed_law, exponent : added [1].
+    gain, bias : of the accelerometer, bias [m/s2].
+    """
+
+    radius: Vector
+    pads: Vector
+    stiffness: Vector
+    share: Vector
+    inertia: Vector
+    regulation: Vector
+    zero: Vector
+    weighed: Vector
+    A: float
+    C: float
+    fade: float
+    speed_law: float
+    exponent: float
+    gain: float
+    bias: float
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A stop that was made.
+
+    Attributes
+    ----------
+    command : when the brake was told [s].
+    mass, weighed : (2,) of the vehicles, true and as reported [kg].
+    track : (k, 3) rows of the file: position [m], gradient [permille], radius [m].
+    gradient : (w,) true one, at the `points` of the way [1].
+    fixed : of the train.
+    """
+
+    stop: AskedStop
+    ridden: Ridden
+    command: float
+    mass: Vector
+    weighed: Vector
+    track: Matrix
+    gradient: Vector
+    fixed: Fixed
+
+
+def draw_train(seed: int, tolerances: float) -> Fixed:
+    """A train within the tolerances of its sheet, one sigma each where they are not limits."""
+    rng, t = np.random.default_rng([seed, 0]), 1.0 + tolerances
+    return Fixed(
+        radius=t * rng.uniform(-4e-4, 4e-4, AXLES),
+        pads=t * rng.normal(0.0, 0.02, AXLES),
+        stiffness=t * rng.normal(0.0, 0.02, AXLES),
+        share=t * rng.normal(0.0, 0.01, AXLES),
+        inertia=t * rng.normal(0.0, 0.01, AXLES),
+        regulation=t * rng.normal(0.0, 0.01, BOGIES),
+        zero=t * rng.normal(0.0, 300.0, BOGIES),
+        weighed=t * np.clip(rng.normal(0.0, 0.015, 2), -0.03, 0.03),
+        A=t * float(rng.normal(0.0, 0.10)),
+        C=t * float(rng.normal(0.0, 0.05)),
+        fade=t * float(rng.normal(0.0, 0.15)),
+        speed_law=t * float(rng.normal(0.0, 0.02)),
+        exponent=t * float(rng.normal(0.0, 0.003)),
+        gain=t * float(rng.normal(0.0, 0.005)),
+        bias=t * float(rng.uniform(-0.03, 0.03)),
+    )
+
+
+def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
+    """Make one stop.
+
+    Parameters
+    ----------
+    seed : with the stop's number it fixes all that is drawn of the stop.
+    """
+    rng, t = np.random.default_rng([seed, stop.number, 1]), 1.0 + faults.tolerances
+    mass = 44e3 + rng.uniform(0.0, 12e3, 2)
+    weighed = mass * (1.0 + fixed.weighed + t * rng.normal(0.0, 0.013, 2)) / (1.0 + faults.mass)
+    track, gradient, curve = _line(rng, t)
+    track[:, 1] -= 1e3 * faults.gradient
+    mu0 = 0.40 * (1.0 + t * rng.normal(0.0, 0.02)) if stop.rail == "dry" else rng.uniform(0.25, 0.3)
+    way = Way(
+        mu0 * (1.0 + t * 0.03 * _walk(rng, 80.0)), gradient, curve, t * 1e-5 * _walk(rng, 150.0)
+    )
+    wind = 1.0 + t * rng.normal(0.0, 0.03)
+    level = 0.30 * (1.0 + t * rng.normal(0.0, 0.02)) * (1.0 + t * rng.normal(0.0, 0.007, AXLES))
+    command = round(float(rng.uniform(20.0, 30.0)), 1)
+    train = Train(
+        friction=level * (1.0 + fixed.pads) * (1.0 - faults.pads),
+        units=DISCS - faults.units,
+        drag=faults.drag,
+        radius=_RADIUS + fixed.radius + faults.radius,
+        stiffness=12.4e6 * (1.0 + fixed.stiffness),
+        share=1.0 + fixed.share,
+        inertia=110.0 * (1.0 + fixed.inertia),
+        target=(25e3 + (stop.pressure - 25e3) * np.repeat(weighed, 2) / 56e3)
+        * (1.0 + fixed.regulation),
+        begin=np.array([0.2, 0.2, 0.3, 0.3]),
+        lag=faults.lag,
+        mass=mass,
+        resistance=np.array([1100.0 * (1.0 + fixed.A) * wind, 12.0, 5.5 * (1.0 + fixed.C) * wind]),
+        law=np.array([*_law(fixed), faults.glazing, faults.water]),
+        polach=np.array(_POLACH[stop.rail]),
+    )
+    at_command = stop.speed * (1.0 + t * rng.normal(0.0, 0.01))
+    slowing = (1100.0 + 5.5 * at_command**2 + 1500.0 + faults.drag.sum() / _RADIUS) / mass.sum()
+    temperature = 50.0 + t * rng.normal(0.0, 8.0, (AXLES, DISCS))
+    ridden = ride(train, way, stop, at_command + slowing * command, command, temperature)
+    return Made(stop, ridden, command, mass, weighed, track, gradient, fixed)
+
+
+def _law(fixed: Fixed) -> tuple[float, float, float]:
+    """Speed law, exponent and fade of the pads."""
+    return 0.20 + fixed.speed_law, 0.02 + fixed.exponent, 3e-4 * (1.0 + fixed.fade)
+
+
+def _walk(rng: np.random.Generator, length: float) -> Vector:
+    """What differs along the way by one, with a correlation length [m]."""
+    way = points()
+    kept = np.exp(-(way[1] - way[0]) / length)
+    steps = rng.standard_normal(way.size)
+    values = np.empty(way.size)
+    values[0] = steps[0]
+    for i in range(1, way.size):
+        values[i] = kept * values[i - 1] + np.sqrt(1.0 - kept**2) * steps[i]
+    return values
+
+
+def _line(rng: np.random.Generator, t: float) -> tuple[Matrix, Vector, Vector]:
+    """Rows of the track's file; true gradient and resistance of curves along the way [1]."""
+    way = points()
+    position = np.cumsum(rng.uniform(200.0, 450.0, 30)) + way[0] - 600.0
+    gradient = np.clip(rng.normal(0.0, 3.0, position.size), -8.0, 8.0)  # permille
+    radius = np.where(rng.random(position.size) < 0.3, rng.uniform(600.0, 2500.0, 30), 0.0)
+    place = np.clip(np.searchsorted(position, way, "right") - 1, 0, None)
+    curve = np.divide(0.6, radius, out=np.zeros_like(radius), where=radius > 0.0)[place]
+    true = 1e-3 * np.interp(way, position, gradient)
+    shown = position + _START + t * rng.uniform(-20.0, 20.0)
+    wrong = gradient + t * rng.normal(0.0, 0.3, position.size)
+    return np.column_stack([shown, wrong, radius]), true, curve
+
+
+def write_stop(made: Made, seed: int, faults: Faults, folder: Path) -> None:
+    """Write what the train's computer records, and the file of the track, into a new folder."""
+    rng, stop, n = np.random.default_rng([seed, made.stop.number, 2]), made.stop, 1.0 + faults.noise
+    ridden, fixed = made.ridden, made.fixed
+    time = np.arange(0.0, ridden.time[-1], _PERIOD)
+    columns: dict[str, Vector] = {"time [s]": time}
+    for j in range(BOGIES):
+        pressure = np.interp(time, ridden.time, ridden.pressure[:, j]) * (1.0 + faults.reading[j])
+        read = pressure + fixed.zero[j] + n * 500.0 * rng.standard_normal(time.size)
+        columns[f"pB{j + 1} [bar]"] = 0.0024 * np.round(1e-5 * read / 0.0024)
+    speeds = np.empty((AXLES, time.size))
+    for i in range(AXLES):
+        true = np.interp(time - faults.late[i], ridden.time, ridden.omega[:, i])
+        deviation = n * (0.002 + 3e-4 * true) * rng.standard_normal(time.size)
+        speeds[i] = np.where(true < 0.5, 0.0, true + deviation)
+        columns[f"omega{i + 1} [rad/s]"] = speeds[i]
+    felt = np.interp(time, ridden.time, _filtered(ridden.a)) * (1.0 + fixed.gain) + fixed.bias
+    columns["a [m/s2]"] = felt + n * 0.02 * rng.standard_normal(time.size)
+    columns["vGNSS [km/h]"] = _satellites(ridden, time, seed, stop.number, n)
+    rolled = _PERIOD * np.cumsum(_RADIUS * np.median(speeds, axis=0))
+    columns["s [m]"] = _START + rng.normal(0.0, 5.0) + rolled
+    write_whole(folder / "measured.csv", _table(columns, "%.6g"))
+    names = ("position [m]", "gradient [permille]", "radius [m]")
+    track = dict(zip(names, made.track.T, strict=True))
+    write_whole(folder / "track.csv", _table(track, "%.2f"))
+    write_whole(folder / "case.toml", _case(stop, made))
+
+
+def _satellites(ridden: Ridden, time: Vector, seed: int, number: int, n: float) -> Vector:
+    """Speed by satellites [km/h], (n,): new at 10 Hz, then held, NaN in a tunnel."""
+    rng, new = np.random.default_rng([seed, number, 3]), time[::_SATELLITES]
+    v, s = (np.interp(new, ridden.time, values) for values in (ridden.v, ridden.s))
+    read = np.abs(np.round(3.6 * v + n * 0.06 * rng.standard_normal(new.size), 2))
+    begins, length = rng.uniform(-_TUNNEL[1], ridden.s[-1]), rng.uniform(*_TUNNEL)
+    if rng.random() < _TUNNELS:
+        read[(s > begins) & (s < begins + length)] = np.nan
+    held: Vector = np.repeat(read, _SATELLITES)[: time.size]
+    return held
+
+
+def _filtered(values: Vector) -> Vector:
+    """Behind a filter of first order at 5 Hz, (n,) every STEP."""
+    share, found = 1.0 - np.exp(-2.0 * np.pi * 5.0 * STEP), values.copy()
+    for k in range(1, found.size):
+        found[k] = found[k - 1] + share * (values[k] - found[k - 1])
+    return found
+
+
+def _table(columns: dict[str, Vector], form: str) -> str:
+    row = ",".join([form] * len(columns))
+    rows = np.column_stack(list(columns.values())).tolist()
+    lines = ((row % tuple(one)).replace("nan", "") for one in rows)
+    return "\n".join([",".join(columns), *lines]) + "\n"
+
+
+def _case(stop: AskedStop, made: Made) -> str:
+    brake = "emergency" if stop.pressure > 3e5 else "service"
+    return f"""\
+title = "{stop.speed * 3.6:.0f} km/h, {brake} brake, rail {stop.rail}"
+
+[conditions]
+initial_speed = "{stop.speed * 3.6:.0f} km/h"
+brake_command = "{made.command:.2f} s"
+brake = "{brake}"
+pressure_full_load = "{stop.pressure / 1e5:g} bar"
+rail = "{stop.rail}"
+mass1 = "{made.weighed[0] / 1e3:.2f} t"
+mass2 = "{made.weighed[1] / 1e3:.2f} t"
+
+[measurement]
+file = "measured.csv"
+
+[track]
+file = "track.csv"
+"""

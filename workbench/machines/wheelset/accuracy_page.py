@@ -1,0 +1,125 @@
+"""The page of `accuracy`: estimates against the truth, the worst of each row, and every stop."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from workbench.machines.wheelset.accuracy import COVERED, ROWS, StopAccuracy, covered, worst
+from workbench.machines.wheelset.accuracy_report import cell
+from workbench.observers import label
+from workbench.pages.figures import ESTIMATORS
+from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
+from workbench.system.system import System
+
+
+def write_accuracy_page(
+    system: System, summary: Mapping[str, Any], stops: Sequence[StopAccuracy], out: Path
+) -> Path:
+    """Write the page into the folder; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to accuracy.json.
+    """
+    names = {name: label(name, system) for name in stops[0].estimators}
+    failures = [
+        f"{stop.name}, {names[name]}: {result.failure}"
+        for stop in stops
+        for name, result in stop.estimators.items()
+        if result.failure
+    ]
+    parts = [
+        Part(
+            "shown",
+            "Error of the force in every stop",
+            ("Each dot is a stop: error of the estimated force, rms over the mean of the truth.",),
+            dots=(_forces(stops, names),),
+        ),
+        Part("worst", "Worst stop by quantity", tables=(_worst(stops, names),), printed=True),
+        Part("stops", "Every stop", tables=(_stops(stops, names),)),
+        Part(
+            "definitions",
+            "Definitions",
+            terms={
+                name.replace("_", " "): f"{one['text']} [{one['unit']}]"
+                for name, one in summary["quantities"].items()
+            },
+        ),
+    ]
+    if any(covered(stops, name, one) is not None for name in names for one in COVERED):
+        parts.insert(2, Part("bands", "What the bands hold", tables=(_bands(stops, names),)))
+    path = out / "index.html"
+    title = f"Estimates against the truth of {len(stops)} stops"
+    write_parts(title, summary, parts, path, file="accuracy.json", warnings=failures)
+    return path
+
+
+def _forces(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Dots:
+    rows, told = [], []
+    for k, (name, text) in enumerate(names.items()):
+        errors = [stop.estimators[name].force for stop in stops]
+        known = [100.0 * error for error in errors if error is not None and math.isfinite(error)]
+        style = ESTIMATORS[k % len(ESTIMATORS)]
+        rows.append((text, tuple(Dot(error, style) for error in known)))
+        if known:
+            told.append(f"{text} up to {max(known):.2f} %")
+    finding = f"Worst stop: {'; '.join(told)}."
+    return Dots(finding, "error of the force [%], logarithmic", tuple(rows), logarithmic=True)
+
+
+def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
+    rows = tuple(
+        (
+            row.text,
+            tuple(
+                Cell(f"{cell(row, one)} ({one.stop})" if one else "")
+                for one in (worst(row, stops, name) for name in names)
+            ),
+        )
+        for row in ROWS
+    )
+    columns = (
+        Heading("quantity", number=False),
+        *(Heading(text, number=False) for text in names.values()),
+    )
+    caption = "The worst of the stops that a row concerns, below 5 Hz; the stop in brackets."
+    return Rows("worst-table", caption, columns, rows)
+
+
+def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
+    rows = []
+    for least in (False, True):
+        for quantity in COVERED:
+            shares = [covered(stops, name, quantity, least=least) for name in names]
+            cells = (
+                number(None if one is None else 100.0 * one, "{:.1f}".format, one) for one in shares
+            )
+            rows.append((f"{quantity}, {'least' if least else 'mean'}", tuple(cells)))
+    columns = (
+        Heading("quantity", number=False),
+        *(Heading(f"{one} [%]") for one in names.values()),
+    )
+    caption = (
+        "Share of samples in which a 95 % band holds the truth: mean of all stops, and the stop in "
+        "which it does so least; far below 95 % the filter is overconfident there."
+    )
+    return Rows("band-table", caption, columns, tuple(rows))
+
+
+def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
+    rows = []
+    for stop in stops:
+        forces = (stop.estimators[name].force for name in names)
+        cells = tuple(
+            number(None if one is None or not math.isfinite(one) else 100.0 * one, "{:.2f}".format)
+            for one in forces
+        )
+        rows.append((stop.name, (Cell(stop.title), *cells)))
+    columns = (
+        Heading("stop", number=False),
+        Heading("conditions", number=False),
+        *(Heading(f"{text} [%]") for text in names.values()),
+    )
+    caption = "Error of the force in each stop; all quantities are in accuracy.csv."
+    return Rows("stop-table", caption, columns, tuple(rows))

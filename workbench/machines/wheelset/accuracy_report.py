@@ -1,0 +1,201 @@
+"""Accuracy against the truth of the virtual rig: files and table."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from workbench.machines.wheelset.accuracy import (
+    COVERED,
+    NOISE,
+    ROWS,
+    Accuracy,
+    Row,
+    StopAccuracy,
+    Worst,
+    covered,
+    needed_bands,
+    worst,
+)
+from workbench.observers import label
+from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.views import percent
+from workbench.runtime.files import write_json, write_whole
+from workbench.system.system import System
+
+_QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
+_CELL = 8  # characters, that of "+100.0 %"
+_DIGITS = {"force": 2, "oscillation": 0}  # of percentages, else 1
+
+
+def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
+    """Write one CSV: a line for each stop and estimator, `quantity [unit]`.
+
+    A field is empty where there is nothing to judge, and `inf` if a delay never ends.
+    """
+    lines = [
+        {"case": stop.name, "estimator": name}
+        | {f"{q} [{meta['unit']}]": getattr(result, q) for q, meta in _QUANTITIES.items()}
+        | {f"covers_{q} [1]": result.bands[q].share if q in result.bands else None for q in COVERED}
+        | {"failure": result.failure}
+        for stop in stops
+        for name, result in stop.estimators.items()
+    ]
+    write_whole(path, pd.DataFrame(lines).to_csv(index=False, float_format="%.6g"))
+
+
+def write_accuracy(
+    system: System, stops: Sequence[StopAccuracy], provenance: Mapping[str, Any], path: Path
+) -> None:
+    """Write accuracy.json: each estimator in each stop, and the worst of them by row.
+
+    What is not to be judged is left out; null is a delay that never ends, or of a failed run.
+    `bands` are those of the system file by which bands would hold 95 % in these stops.
+    """
+    summary = {
+        "provenance": provenance,
+        "quantities": {name: dict(meta) for name, meta in _QUANTITIES.items()},
+        "stops": {
+            stop.name: {
+                "title": stop.title,
+                "wet_discs": stop.wet,
+                "slides": stop.slides,
+                "estimators": {name: _plain(result) for name, result in stop.estimators.items()},
+            }
+            for stop in stops
+        },
+        "worst": {
+            name: {
+                row.text: {"quantity": row.quantity, "value": _finite(one.value), "stop": one.stop}
+                for row in ROWS
+                if (one := worst(row, stops, name)) is not None
+            }
+            for name in stops[0].estimators
+        },
+        "bands": {
+            name: {
+                quantity: system.bands.get(name, {}).get(quantity, 1.0) * factor
+                for quantity, factor in one.items()
+            }
+            for name, one in needed_bands(stops).items()
+        },
+    }
+    write_json(path, with_answer(_answer(system, stops), summary))
+
+
+def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
+    """The worst of each row by estimator, and whose worst force is nearest."""
+    headline, force = {}, {}
+    for name in stops[0].estimators:
+        for row in ROWS:
+            if (one := worst(row, stops, name)) is not None:
+                unit, factor = _shown(row.quantity)
+                value = _finite(factor * row.badness(one.value))
+                headline[f"{row.text}, {name}"] = Measure(value, unit, "lower")
+        errors = [stop.estimators[name].force for stop in stops]
+        if all(error is not None and math.isfinite(error) for error in errors):
+            force[name] = max(error for error in errors if error is not None)
+    details = {
+        f"{stop.name}: error of the force, {name}": Measure(100.0 * result.force, "%", "lower")
+        for stop in stops
+        for name, result in stop.estimators.items()
+        if result.force is not None and math.isfinite(result.force)
+    }
+    if not force:
+        return Answer("No estimator has a force in every stop.", headline, details)
+    best = min(force, key=lambda name: force[name])
+    share = covered(stops, best, "Fx")
+    held = ""
+    if share is not None:
+        held = f"; its 95 % bands hold the truth in {100.0 * share:.1f} % of the time"
+    sentence = (
+        f"Nearest to the true force is the {label(best, system)}: its error is "
+        f"{percent(force[best])} of the mean force in the worst of {len(stops)} stops{held}."
+    )
+    return Answer(sentence, headline, details)
+
+
+def _shown(quantity: str) -> tuple[str, float]:
+    """Unit in which a quantity is compared, and the factor to it."""
+    unit = str(_QUANTITIES[quantity]["unit"])
+    return ("%", 100.0) if unit == "1" and quantity != "muDC" else (unit, 1.0)
+
+
+def _plain(result: Accuracy) -> dict[str, Any]:
+    if result.failure:
+        return {"failure": result.failure}
+    values = {name: getattr(result, name) for name in _QUANTITIES}
+    plain = {name: _finite(value) for name, value in values.items() if value is not None}
+    shares = {name: one.share for name, one in result.bands.items()}
+    return plain | ({"covers": shares} if shares else {})
+
+
+def _finite(value: float) -> float | None:
+    """JSON has neither infinity nor NaN."""
+    return value if math.isfinite(value) else None
+
+
+def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
+    """Table for the terminal: the worst stop of each row, by estimator."""
+    names = list(stops[0].estimators)
+    width = max(len(row.text) for row in ROWS)
+    header = " " * width + "".join(f"  {name:>{_CELL}}" for name in names)
+    lines = ["Worst over the stops that a row concerns, below 5 Hz", header, "-" * len(header)]
+    for row in ROWS:
+        cells = (
+            f"  {cell(row, worst(row, stops, name)):>{max(_CELL, len(name))}}" for name in names
+        )
+        lines.append(f"{row.text:<{width}}{''.join(cells)}")
+    lines.append("-" * len(header))
+    if any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED):
+        lines += [
+            "Share of samples in which a 95 % band holds the truth, mean of all stops",
+            header,
+        ]
+        lines += [f"{q:<{width}}{_covers(stops, names, q)}" for q in COVERED]
+        lines.append("The same of the stop in which it holds the truth least")
+        lines += [f"{q:<{width}}{_covers(stops, names, q, least=True)}" for q in COVERED]
+        lines.append("-" * len(header))
+    failures = [
+        f"{stop.name}, {name}: {result.failure}"
+        for stop in stops
+        for name, result in stop.estimators.items()
+        if result.failure
+    ]
+    return "\n".join(lines + failures)
+
+
+def _covers(
+    stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str, *, least: bool = False
+) -> str:
+    shares = {name: covered(stops, name, quantity, least=least) for name in names}
+    texts = {name: "" if one is None else f"{100.0 * one:.1f} %" for name, one in shares.items()}
+    return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
+
+
+def cell(row: Row, found: Worst | None) -> str:
+    """A value as a text; empty if there is nothing to judge.
+
+    >>> cell(ROWS[0], Worst("01", 0.00271)), cell(ROWS[4], Worst("09", 0.0729))
+    ('0.27 %', '+7.3 %')
+    >>> cell(ROWS[5], Worst("01", math.inf)), cell(ROWS[6], Worst("01", 0.02))
+    ('never', 'none')
+    """
+    if found is None:
+        return ""
+    value = found.value
+    if math.isnan(value):
+        return "failed"
+    if math.isinf(value):
+        return "never"
+    if row.quantity == "muDC":
+        return f"{value:.3f}"
+    if row.quantity == "rise_delay":
+        return f"{value:.3f} s"
+    if row.quantity == "oscillation" and value < NOISE:
+        return "none"
+    sign = "+" if row.quantity == "minimum_in_slide" else ""
+    return f"{100.0 * value:{sign}.{_DIGITS.get(row.quantity, 1)}f} %"

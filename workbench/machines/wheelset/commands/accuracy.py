@@ -1,0 +1,96 @@
+"""`workbench accuracy`: estimators against the truth of the virtual rig."""
+
+import argparse
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from importlib.metadata import version
+
+from workbench.cli.inputs import given_cases
+from workbench.cli.output import Done, Output, read_result
+from workbench.errors import InputError
+from workbench.machines.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
+from workbench.machines.wheelset.accuracy_page import write_accuracy_page
+from workbench.machines.wheelset.accuracy_report import (
+    format_accuracy,
+    write_accuracies,
+    write_accuracy,
+)
+from workbench.machines.wheelset.truth import read_truth
+from workbench.observers import choose, estimators_of
+from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
+from workbench.observers.gains_file import usual_gains
+from workbench.pages.provenance import run_of, sources
+from workbench.recordings.case import Case
+from workbench.runtime.files import claimed
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Judge the estimators."""
+    system = load_system(options.system)
+    # Of a wheelset, which has no like parts, the block filter is the extended one.
+    every = [name for name in estimators_of(system) if name != BlockKalmanFilter.name]
+    chosen = choose(system, options.estimator or every)
+    cases = _stops(options, system)
+    # All of them before the first run, so that one that is missing is told at once.
+    truths = [read_truth(case, system) for case in cases]
+    stops: list[StopAccuracy] = []
+    begin = time.perf_counter()
+    with claimed(options.out), ExitStack() as stack:
+        roles = dict.fromkeys(kind.role for kind in chosen.values())
+        models = {role: stack.enter_context(open_model(system, role)) for role in roles}
+        gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}
+        ready = [kind(models[kind.role], system, gains[name]) for name, kind in chosen.items()]
+        provenance = {
+            "run": run_of("accuracy", system, sources(cases)),
+            "workbench": version("wheelset-workbench"),
+            "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
+            "fmus": [
+                {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
+                for fmu in models.values()
+            ],
+            "gains": {name: one.source for name, one in gains.items() if one.names},
+        }
+        output.stage("preparing the observers' loops (compiled once, up to a minute)")
+        for case, truth in zip(cases, truths, strict=True):
+            stops.append(stop_accuracy(observe_stop(case, truth, ready, system)))
+            output.step(len(stops), len(cases), case.name, begin)
+        output.result(format_accuracy(stops))
+        write_accuracies(stops, options.out / "accuracy.csv")
+        write_accuracy(system, stops, provenance, options.out / "accuracy.json")
+        summary = read_result(options.out / "accuracy.json")
+        page = write_accuracy_page(system, summary, stops, options.out)
+    output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
+    units = {name: one["unit"] for name, one in summary["quantities"].items()}
+    return Done(summary, units, page=page)
+
+
+def _stops(options: argparse.Namespace, system: System) -> list[Case]:
+    """The stops that are asked for; where folders hold several, each with its folder's name.
+
+    A rig calls its stops the same whatever its seed.
+
+    Raises
+    ------
+    InputError
+        If there are none, one cannot be read, or a folder is given twice.
+    """
+    if len(options.cases) < 2:
+        return given_cases(options, system)
+    found: dict[str, Case] = {}
+    for folder in options.cases:
+        alone = argparse.Namespace(**{**vars(options), "cases": [folder]})
+        before = "" if (folder / "case.toml").exists() else f"{folder.resolve().name}/"
+        for case in given_cases(alone, system):
+            name = before + case.name
+            if name in found:
+                raise InputError(
+                    where=str(case.source),
+                    found=f"a second stop '{name}' beside {found[name].source}",
+                    expected="a different name for each stop, because results are kept by name",
+                    remedy="rename one of the folders, or give it once",
+                )
+            found[name] = replace(case, name=name)
+    return list(found.values())

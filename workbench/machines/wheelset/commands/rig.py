@@ -1,0 +1,141 @@
+"""`workbench rig`: recordings from the virtual rig."""
+
+import argparse
+import dataclasses
+import time
+from collections.abc import Sequence
+from concurrent.futures import as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.cli.output import Done, Output
+from workbench.cli.planted import make_planted
+from workbench.errors import InputError
+from workbench.machines.wheelset.rig import (
+    CONSTANT_PADS,
+    ORDINARY_PADS,
+    SCENARIOS,
+    STANDARD,
+    Effects,
+    Scenario,
+    check_files,
+    plant,
+    proposed_stop,
+    select,
+    simulate,
+    write_recording,
+)
+from workbench.models.fmu import CoSimulation
+from workbench.runtime.files import claimed
+from workbench.runtime.pool import Pool
+from workbench.system.registry import load_system, model_path
+from workbench.system.system import REFERENCE, System
+
+COMPANION = "workbench.machines.wheelset"
+
+
+def _listed() -> str:
+    """Scenarios and effects, for people."""
+    effects = "\n".join(
+        f"  {field.name:<18} [{field.metadata['unit']}]".ljust(28) + field.metadata["text"]
+        for field in dataclasses.fields(Effects)
+    )
+    pads = ", ".join(
+        f"{name}={gain:g}" for name, gain in dataclasses.asdict(ORDINARY_PADS).items() if gain
+    )
+    scenarios = "\n".join(f"  {name:<26} {scenario.title}" for name, scenario in SCENARIOS.items())
+    return f"""\
+scenarios, of which the first {len(STANDARD)} are standard:
+{scenarios}
+
+effects, zero if not given:
+{effects}
+  phiW is the angle of the wheelset; phases are drawn for each stop.
+  Ordinary pads have {pads}."""
+
+
+def run(options: argparse.Namespace, output: Output) -> Done:
+    """Make the recordings, or list what can be made."""
+    system = load_system(options.system)
+    if system.companion != COMPANION:
+        return _of_another(options, output, system)
+    if options.list:
+        output.result(_listed())
+        return Done(
+            {
+                "scenarios": {name: one.title for name, one in SCENARIOS.items()},
+                "effects": {one.name: dict(one.metadata) for one in dataclasses.fields(Effects)},
+            }
+        )
+    scenarios = [proposed_stop(options.next, system)] if options.next else select(options.case)
+    pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
+    effects = plant(pads, options.effect)
+    with claimed(options.out):
+        return _recorded(options, output, system, scenarios, effects)
+
+
+def _of_another(options: argparse.Namespace, output: Output, system: System) -> Done:
+    """What another machine's companion makes, which has nothing of this rig's own."""
+    own = {"next": None, "pads": "ordinary", "rate": 200, "truth_every": 1}
+    for name, usual in own.items():
+        if getattr(options, name) != usual:
+            raise InputError(
+                where=f"--{name.replace('_', '-')} {getattr(options, name)}",
+                found="an option of the roller rig",
+                expected=f"none of that of '{system.name}'",
+                remedy="leave it out",
+            )
+    return make_planted(options, output, system)
+
+
+def _recorded(
+    options: argparse.Namespace,
+    output: Output,
+    system: System,
+    scenarios: Sequence[Scenario],
+    effects: Effects,
+) -> Done:
+    check_files([options.out / scenario.name for scenario in scenarios], options.rate)
+    fmu = options.reference or model_path(system, REFERENCE)
+    with CoSimulation(fmu):
+        pass  # a file that is no FMU is refused here, once
+    begin = time.perf_counter()
+    made: list[str] = []
+    interrupted = False
+    order = _Order(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
+    # A stop that is under way at Ctrl-C is finished and kept, in a process even if it is alone.
+    workers = min(options.workers, len(scenarios))
+    with Pool(workers, nullcontext, order, isolated=True) as pool:
+        tasks = [pool.submit(_make, scenario) for scenario in scenarios]
+        try:
+            for task in as_completed(tasks):
+                made.append(task.result())
+                output.step(len(made), len(tasks), made[-1], begin)
+        except KeyboardInterrupt:
+            interrupted = True
+            pool.finish()
+    kept = sum(task.done() and not task.cancelled() for task in tasks)
+    output.result(f"{kept} of {len(tasks)} cases in {options.out}")
+    status = 130 if interrupted else 0
+    return Done({"out": options.out, "cases": kept, "of": len(tasks)}, status=status)
+
+
+@dataclass(frozen=True)
+class _Order:
+    """What is made of every scenario; see `simulate` and `write_recording`."""
+
+    effects: Effects
+    seed: int
+    rate: int
+    every: int
+    fmu: Path
+    out: Path
+
+
+def _make(order: _Order, scenario: Scenario) -> str:
+    """Make and write one case; returns a line for people."""
+    stop = simulate(scenario, order.seed, order.effects, order.fmu)
+    write_recording(stop, order.effects, order.rate, order.out / scenario.name, order.every)
+    seconds = stop.standstill - stop.drawn.coasting
+    return f"{scenario.name:<26} stopped in {seconds:5.1f} s"

@@ -1,0 +1,97 @@
+"""The stop that `workbench next` proposes, as the rig makes it."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.machines.wheelset.rig.drive import TRAIN_INERTIA
+from workbench.machines.wheelset.rig.scenarios import (
+    DISC_TEMPERATURE,
+    FRICTION,
+    WHEEL_LOAD,
+    Conditions,
+    Scenario,
+    Surface,
+)
+from workbench.machines.wheelset.rig.sensors import FURTHER
+from workbench.runtime.files import read_text
+from workbench.studies.design.candidates import Profile
+from workbench.system.system import System
+
+_NAME = "30_next"
+_SURFACES: Mapping[str, Surface] = {"dry": "dry", "wet": "wet"}
+_DEMAND = np.arange(0.0, 90.0, 0.05)  # [s] from the first, when a controller asks anew
+
+
+def proposed_stop(result: Path, system: System) -> Scenario:
+    """The best experiment of a result of `workbench next`.
+
+    Parameters
+    ----------
+    result : folder with next.json.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it asks for what the rig cannot do.
+    """
+    file = result / "next.json"
+    remedy = "give the folder that 'workbench next' wrote for this rig"
+    text = read_text(file, remedy)
+    try:
+        return stop_of(json.loads(text)["tried"][0], system)
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        raise InputError(
+            where=str(file),
+            found="no experiment that says speed, direction, surfaces and pressure of a stop",
+            expected="what 'workbench next' writes",
+            remedy=remedy,
+        ) from None
+
+
+def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
+    """A stop whose pressure follows the profile of an experiment, as `workbench next` writes it.
+
+    All sensors of the system that the rig may have besides are fitted.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        If it asks for what the rig cannot do.
+    """
+    said, asked = experiment["conditions"], experiment["inputs"]["pB"]
+    if system.experiments is None:
+        raise ValueError
+    (varied,) = (one for one in system.experiments.varied if one.name == "pB")
+    levels = tuple(map(float, asked["levels"]))
+    profile = Profile(varied, str(asked["profile"]), levels, float(asked["every"]))
+    demand = profile.demand(_DEMAND + varied.begins)
+    changes = np.flatnonzero(np.diff(demand)) + 1
+    steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
+    direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
+    rail, *discs = (_SURFACES[one] for one in (said["wheel_rail"], *said["discs"]))
+    if len(discs) != system.condition("discs").count:
+        raise ValueError
+    speed, pressure = float(said["initial_speed"]), float(demand[0])
+    load = float(said.get("wheel_load", WHEEL_LOAD))
+    warm = float(said.get("disc_temperature", DISC_TEMPERATURE))
+    conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load, warm)
+    imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
+    sensors = tuple(one.name for one in system.judged if one.name in FURTHER)
+    # A roller that stops as fast as no train does is a slide to the protection, which would vent.
+    protected = imitated >= TRAIN_INERTIA
+    return Scenario(
+        name=_NAME,
+        conditions=conditions,
+        muWR=FRICTION[rail],
+        patch=None,
+        protected=protected,
+        steps=steps,
+        imitated=imitated,
+        lasts=system.experiments.lasts,
+        sensors=sensors,
+    )

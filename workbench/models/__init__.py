@@ -1,0 +1,1 @@
+"""An FMU: what it says of itself, opening and calling it, its trial, Modelica and its compiler."""

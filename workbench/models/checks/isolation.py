@@ -1,0 +1,145 @@
+"""A check in a process of its own, because a foreign library may crash or hang."""
+
+import multiprocessing
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from types import FrameType
+
+from workbench.errors import FMUError
+from workbench.models.checks.finding import Finding
+from workbench.models.trial import Limits, NoAnswerError
+from workbench.runtime.files import scratch_folder
+from workbench.runtime.pool import start
+
+try:
+    import resource
+except ImportError:  # Windows: the time of an answer is all that is limited
+    resource = None  # type: ignore[assignment]
+
+# A check yields findings, and numbers that say how far it is.
+Task = Callable[[], Iterator[int | Finding]]
+_Report = int | Finding | str | NoAnswerError  # text: of an exception; both are the last report
+_SHARE = 10.0  # of the processor that a check gets at least, on a machine with other work to do
+
+
+def isolated(task: Task, questions: Sequence[Finding], limits: Limits) -> list[Finding]:
+    """Run a check in a process; returns one finding per question, whatever happens there.
+
+    If the check ends before its time, the question it was at fails with the reason, and those
+    after it stay open. One that does not answer, though it does not work either, is not measured.
+
+    Parameters
+    ----------
+    task : the check; a function that can be pickled.
+    questions : what it answers, in this order.
+    limits : of processor time in one call of the FMU, of memory and of files.
+    """
+    reports, to_parent = multiprocessing.Pipe(duplex=False)
+    wait = max(limits.answer, _SHARE * limits.processor)
+    with scratch_folder() as scratch:
+        process = start(_work, (task, to_parent, scratch, limits, dict(os.environ)))
+        to_parent.close()
+        found, reached, reason = _listen(reports, wait)
+        process.join(1.0 if reason else wait)
+        unknown = isinstance(reason, NoAnswerError)
+        if process.exitcode is None:
+            process.kill()
+            process.join()
+            unknown = unknown or not reason
+            reason = reason or f"the FMU did not let itself be freed within {wait:.0f} s"
+    missing = any(question.name not in found for question in questions)
+    if not reason and (process.exitcode or missing):
+        reason = f"the FMU {_death(process.exitcode or 0, limits)}"
+    reports.close()
+    if not reason:
+        return [found[question.name] for question in questions]
+    blamed = next((q for q in questions if q.name not in found), questions[-1])
+    progress = f" after {reached} {blamed.unit}" if reached is not None else ""
+    told = f"{'not measured: ' if unknown else ''}{reason}{progress}"
+    passed = None if unknown else False
+    found[blamed.name] = replace(blamed, passed=passed, unknown=unknown, value=reached, reason=told)
+    return [
+        found.get(q.name, replace(q, unknown=unknown, reason=f"not measured: {reason}"))
+        for q in questions
+    ]
+
+
+def _listen(
+    reports: "Connection[None, _Report]", timeout: float
+) -> tuple[dict[str, Finding], int | None, str | NoAnswerError]:
+    """Collect reports to the end: findings, progress since the last, and what went wrong."""
+    found: dict[str, Finding] = {}
+    reached: int | None = None
+    while reports.poll(timeout):
+        try:
+            report = reports.recv()
+        except EOFError:
+            return found, reached, ""
+        if isinstance(report, str | NoAnswerError):
+            return found, reached, report
+        if isinstance(report, Finding):
+            found[report.name] = report
+            reached = None
+        else:
+            reached = report
+    return found, reached, NoAnswerError(f"the FMU did not answer within {timeout:.0f} s")
+
+
+def _work(
+    task: Task,
+    reports: "Connection[_Report, None]",
+    scratch: str,
+    limits: Limits,
+    environment: Mapping[str, str],
+) -> None:
+    """Run a check in this process and report."""
+    os.environ.clear()
+    os.environ.update(environment)
+    _limit(limits)
+    tempfile.tempdir = scratch  # a crash leaves unpacked files, which go with the folder
+    # What an FMU prints must not get between the lines of the caller's table.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    try:
+        for report in task():
+            reports.send(report)
+    except Exception as error:  # whatever a foreign library brings about is a finding
+        known = isinstance(error, FMUError) and not isinstance(error, NoAnswerError)
+        reports.send(
+            error if isinstance(error, NoAnswerError) else str(error) if known else repr(error)
+        )
+
+
+def _limit(limits: Limits) -> None:
+    """Limit what this process may use; processor time in each call that does not return."""
+    if resource is None:
+        return
+    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # Python ignores it
+    for kind, size in (
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, limits.file),
+        (resource.RLIMIT_DATA, limits.memory),
+    ):
+        resource.setrlimit(kind, (size, size))
+
+    def alive(number: int = 0, frame: FrameType | None = None) -> None:
+        # Python calls this between calls of the FMU only: one that does not return meets the limit.
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        seconds = int(used.ru_utime + used.ru_stime + limits.processor) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
+
+    alive()
+    signal.signal(signal.SIGPROF, alive)
+    period = limits.processor / 10.0
+    signal.setitimer(signal.ITIMER_PROF, period, period)
+
+
+def _death(exit_code: int, limits: Limits) -> str:
+    if os.name == "posix" and exit_code == -signal.SIGXCPU:
+        return f"did not return from a call within {limits.processor:g} s of processor time"
+    if exit_code < 0:
+        return f"crashed with {signal.Signals(-exit_code).name}"
+    return f"ended the process with exit code {exit_code}"

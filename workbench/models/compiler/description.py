@@ -1,0 +1,356 @@
+"""modelDescription.xml of FMI 2.0 and FMI 3.0, stage 4 of the compiler."""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import pint
+
+from workbench.errors import InputError
+from workbench.models.compiler.ccode import GeneratedCode, identifier
+from workbench.models.compiler.explicit import StateSpace
+from workbench.models.compiler.flat import FlatVariable
+
+_REGISTRY: "pint.UnitRegistry[float]" = pint.UnitRegistry()
+_REGISTRY.define("@alias ohm = Ohm")  # as Modelica writes it
+_BASE_UNITS = {
+    "kilogram": "kg",
+    "meter": "m",
+    "second": "s",
+    "ampere": "A",
+    "kelvin": "K",
+    "mole": "mol",
+    "candela": "cd",
+    "radian": "rad",
+}
+# What people read instead of the SI unit: (name, display = factor * SI).
+_DISPLAY_UNITS = {"Pa": ("bar", 1e-5)}
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A variable of the FMU; `row` and `column` are its places in the Jacobian, None if none."""
+
+    name: str
+    variable: FlatVariable
+    unit: str | None
+    causality: str
+    variability: str
+    initial: str | None
+    start: bool
+    reference: int
+    row: int | None = None
+    column: int | None = None
+    derivative_of: int | None = None
+
+
+def describe(
+    model: StateSpace, code: GeneratedCode, token: str, fmi: int, tool: str, sources: Sequence[str]
+) -> str:
+    """Text of modelDescription.xml.
+
+    Parameters
+    ----------
+    fmi : 2 or 3.
+    tool : generation tool, with its version.
+    sources : names of the C sources (FMI 2 lists them here).
+    """
+    entries = _entries(model)
+    units = sorted({e.unit for e in entries if e.unit})
+    root = _root2(model, token, tool, sources) if fmi == 2 else _root3(model, token, tool)
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for unit in units:
+        _define_unit(definitions, unit)
+    categories = ET.SubElement(root, "LogCategories")
+    for name, text in (
+        ("logAll", "All messages"),
+        ("logStatusError", "Errors and discarded steps"),
+    ):
+        ET.SubElement(categories, "Category", name=name, description=text)
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=repr(model.experiment.get("StopTime", 1.0)),
+        tolerance=repr(model.experiment.get("Tolerance", 1e-6)),
+    )
+    variables = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
+    if fmi == 2:
+        for entry in entries:
+            _variable2(variables, entry)
+        _structure2(structure, entries, code)
+    else:
+        for entry in entries:
+            _variable3(variables, entry)
+        time = {"name": "time", "valueReference": str(len(entries)), "causality": "independent"}
+        ET.SubElement(variables, "Float64", {**time, "variability": "continuous"})
+        _structure3(structure, entries, code)
+    ET.indent(root, "  ")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _entries(model: StateSpace) -> list[_Entry]:
+    """Variables in the order of their value references: x, der(x), u, p, w."""
+    entries: list[_Entry] = []
+    n, m = len(model.states), len(model.inputs)
+
+    def add(
+        variable: FlatVariable,
+        causality: str,
+        variability: str,
+        initial: str | None,
+        row: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        entries.append(
+            _Entry(
+                name=variable.name,
+                variable=variable,
+                unit=variable.unit,
+                causality=causality,
+                variability=variability,
+                initial=initial,
+                start=initial == "exact" or causality == "input",
+                reference=len(entries),
+                row=row,
+                column=column,
+            )
+        )
+
+    for i, state in enumerate(model.states):
+        role = "output" if state.name in model.state_outputs else "local"
+        add(state, role, "continuous", "exact", column=i)
+    for i, state in enumerate(model.states):
+        entries.append(
+            _Entry(
+                name=f"der({state.name})",
+                variable=state,
+                unit=_rate_unit(state.unit),
+                causality="local",
+                variability="continuous",
+                initial="calculated",
+                start=False,
+                reference=len(entries),
+                row=i,
+                derivative_of=i,
+            )
+        )
+    for i, variable in enumerate(model.inputs):
+        add(variable, "input", "continuous", None, column=n + i)
+    for i, (variable, tunable) in enumerate(zip(model.parameters, model.tunable, strict=True)):
+        variability = "tunable" if tunable else "fixed"
+        add(variable, "parameter", variability, "exact", column=n + m + i)
+    for i, variable in enumerate(model.outputs):
+        add(variable, "output", "continuous", "calculated", row=n + i)
+    return entries
+
+
+def _root2(model: StateSpace, token: str, tool: str, sources: Sequence[str]) -> ET.Element:
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=model.name,
+        guid=token,
+        description=model.description,
+        generationTool=tool,
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
+    common = {
+        "modelIdentifier": identifier(model.name),
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
+    exchange = ET.SubElement(root, "ModelExchange", common)
+    simulation = ET.SubElement(
+        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
+    )
+    for kind in (exchange, simulation):
+        files = ET.SubElement(kind, "SourceFiles")
+        for name in sources:
+            ET.SubElement(files, "File", name=name)
+    return root
+
+
+def _root3(model: StateSpace, token: str, tool: str) -> ET.Element:
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=model.name,
+        instantiationToken=token,
+        description=model.description,
+        generationTool=tool,
+        variableNamingConvention="structured",
+    )
+    common = {
+        "modelIdentifier": identifier(model.name),
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    }
+    ET.SubElement(root, "ModelExchange", common)
+    ET.SubElement(
+        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
+    )
+    return root
+
+
+def base_units(unit: str) -> tuple[dict[str, int], float]:
+    """Exponents of the SI base units (and rad) of a Modelica unit, and its factor to them.
+
+    >>> base_units("N.m")
+    ({'kg': 1, 'm': 2, 's': -2}, 1.0)
+    >>> base_units("Ohm")
+    ({'A': -2, 'kg': 1, 'm': 2, 's': -3}, 1.0)
+    """
+    spelled = re.sub(r"([A-Za-z])(-?\d+)", r"\1**\2", unit).replace(".", "*")
+    try:
+        quantity: Any = _REGISTRY.Quantity(spelled).to_base_units()
+    except (pint.errors.PintError, AttributeError, TypeError) as error:
+        raise InputError(
+            where=f"unit '{unit}'",
+            found=f"a unit that is not known ({error})",
+            expected="an SI unit in Modelica's notation, such as N.m or kg.m2",
+            remedy="correct the unit attribute",
+        ) from None
+    exponents = {_BASE_UNITS[str(name)]: int(power) for name, power in quantity.unit_items()}
+    return dict(sorted(exponents.items())), float(quantity.magnitude)
+
+
+def _define_unit(parent: ET.Element, unit: str) -> None:
+    exponents, factor = base_units(unit)
+    element = ET.SubElement(parent, "Unit", name=unit)
+    base = ET.SubElement(element, "BaseUnit", {k: str(v) for k, v in exponents.items()})
+    if factor != 1.0:
+        base.set("factor", repr(factor))
+    if unit in _DISPLAY_UNITS:
+        name, scale = _DISPLAY_UNITS[unit]
+        ET.SubElement(element, "DisplayUnit", name=name, factor=repr(scale))
+
+
+def _rate_unit(unit: str | None) -> str | None:
+    """Unit of a time derivative: rad/s becomes rad/s2."""
+    if unit is None:
+        return None
+    head, slash, tail = unit.partition("/")
+    if not slash:
+        return f"{head}/s"
+    if match := re.fullmatch(r"s(\d*)", tail):
+        return f"{head}/s{int(match[1] or 1) + 1}"
+    return f"{head}/({tail.strip('()')}.s)"
+
+
+def _attributes(entry: _Entry) -> dict[str, str]:
+    attributes = {
+        "name": entry.name,
+        "valueReference": str(entry.reference),
+        "causality": entry.causality,
+        "variability": entry.variability,
+    }
+    derived = entry.derivative_of is not None
+    if entry.initial:
+        attributes["initial"] = entry.initial
+    if derived:
+        attributes["description"] = f"Time derivative of {entry.variable.name}"
+    elif entry.variable.description:
+        attributes["description"] = entry.variable.description
+    return attributes
+
+
+def _real_attributes(entry: _Entry) -> dict[str, str]:
+    attributes: dict[str, str] = {}
+    if entry.unit:
+        attributes["unit"] = entry.unit
+        if entry.unit in _DISPLAY_UNITS:
+            attributes["displayUnit"] = _DISPLAY_UNITS[entry.unit][0]
+    if entry.derivative_of is None:
+        for name, value in (
+            ("min", entry.variable.minimum),
+            ("max", entry.variable.maximum),
+            ("nominal", entry.variable.nominal),
+        ):
+            if value is not None:
+                attributes[name] = repr(value)
+    if entry.start:
+        attributes["start"] = repr(entry.variable.start)
+    return attributes
+
+
+def _variable2(parent: ET.Element, entry: _Entry) -> None:
+    element = ET.SubElement(parent, "ScalarVariable", _attributes(entry))
+    real = ET.SubElement(element, "Real", _real_attributes(entry))
+    if entry.derivative_of is not None:
+        real.set("derivative", str(entry.derivative_of + 1))
+
+
+def _variable3(parent: ET.Element, entry: _Entry) -> None:
+    element = ET.SubElement(parent, "Float64", {**_attributes(entry), **_real_attributes(entry)})
+    if entry.derivative_of is not None:
+        element.set("derivative", str(entry.derivative_of))
+
+
+def _dependencies(entry: _Entry, entries: Iterable[_Entry], code: GeneratedCode) -> list[_Entry]:
+    """The knowns that a row of the Jacobian depends on."""
+    if entry.row is None:
+        return [entry] if entry.column is not None else []
+    width = code.jacobian_xu.size2()
+    known = {e.column: e for e in entries if e.column is not None}
+    columns = _row_columns(code.jacobian_xu, entry.row)
+    columns += [width + c for c in _row_columns(code.jacobian_p, entry.row)]
+    return [known[c] for c in columns]
+
+
+def _row_columns(pattern: ca.Sparsity, row: int) -> list[int]:
+    """Columns with an entry in `row`."""
+    starts, rows = pattern.colind(), pattern.row()
+    return [j for j in range(pattern.size2()) if row in rows[starts[j] : starts[j + 1]]]
+
+
+def _unknowns(entries: Sequence[_Entry]) -> dict[str, list[_Entry]]:
+    outputs = [e for e in entries if e.causality == "output"]
+    derivatives = [e for e in entries if e.derivative_of is not None]
+    initial = [e for e in [*derivatives, *outputs] if e.initial == "calculated"]
+    return {"outputs": outputs, "derivatives": derivatives, "initial": initial}
+
+
+def _structure2(parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode) -> None:
+    names = {"outputs": "Outputs", "derivatives": "Derivatives", "initial": "InitialUnknowns"}
+    for kind, unknowns in _unknowns(entries).items():
+        if not unknowns:
+            continue
+        group = ET.SubElement(parent, names[kind])
+        for entry in sorted(unknowns, key=lambda e: e.reference):
+            knowns = _dependencies(entry, entries, code)
+            if kind != "initial":
+                knowns = [k for k in knowns if k.causality != "parameter"]
+            ET.SubElement(
+                group,
+                "Unknown",
+                index=str(entry.reference + 1),
+                dependencies=" ".join(str(k.reference + 1) for k in knowns),
+            )
+
+
+def _structure3(parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode) -> None:
+    names = {
+        "outputs": "Output",
+        "derivatives": "ContinuousStateDerivative",
+        "initial": "InitialUnknown",
+    }
+    for kind, unknowns in _unknowns(entries).items():
+        for entry in unknowns:
+            knowns = _dependencies(entry, entries, code)
+            if kind != "initial":
+                knowns = [k for k in knowns if k.causality != "parameter"]
+            ET.SubElement(
+                parent,
+                names[kind],
+                valueReference=str(entry.reference),
+                dependencies=" ".join(str(k.reference) for k in knowns),
+            )

@@ -1,0 +1,366 @@
+"""What an FMU says of itself, stage 2: identity, interfaces, platforms, variables."""
+
+import hashlib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import fmpy
+
+from workbench.errors import InputError, closest
+from workbench.models.archive import DESCRIPTION, damaged, opened
+from workbench.runtime.resources import CHECKOUT
+
+MODEL_EXCHANGE = "Model Exchange"
+CO_SIMULATION = "Co-Simulation"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Model Exchange or Co-Simulation, as one FMU offers it; flags as in FMI's description."""
+
+    identifier: str
+    saves_state: bool
+    serialises_state: bool
+    directional_derivatives: bool
+    needs_execution_tool: bool
+    one_instance_per_process: bool
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable; `start` as written, None where the description has none.
+
+    Attributes
+    ----------
+    real : a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0).
+    nominal, minimum, maximum : in `unit`, None where the description has none.
+    """
+
+    name: str
+    reference: int
+    type: str
+    real: bool
+    causality: str
+    variability: str
+    unit: str | None
+    start: str | None
+    nominal: float | None
+    minimum: float | None
+    maximum: float | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Description:
+    """The model description of an FMU and what its archive holds.
+
+    Attributes
+    ----------
+    sha256 : hash of the file, its identity in results.
+    version : of FMI, "2.0" or "3.0".
+    token : GUID or instantiation token.
+    interfaces : by name, MODEL_EXCHANGE and CO_SIMULATION.
+    platforms : those with a binary, in FMI's names.
+    binaries : sizes of the files of all platforms [bytes], by name in the archive.
+    states, rates : names of the continuous states and their derivatives, in FMI's order.
+    dependencies : names of what a derivative or an output depends on, by its name; without those of
+        which the model structure does not say it.
+    event_indicators : their number; 0 for a smooth model.
+    step, stop : of the default experiment [s], None where there is none.
+    """
+
+    path: Path
+    sha256: str
+    version: str
+    name: str
+    text: str
+    tool: str
+    token: str
+    interfaces: Mapping[str, Interface]
+    platforms: tuple[str, ...]
+    binaries: Mapping[str, int]
+    variables: tuple[Variable, ...]
+    states: tuple[str, ...]
+    rates: tuple[str, ...]
+    dependencies: Mapping[str, tuple[str, ...]]
+    event_indicators: int
+    step: float | None
+    stop: float | None
+
+    def names(self, causality: str) -> tuple[str, ...]:
+        """Names of the variables of a causality, in the order of the model description."""
+        return tuple(v.name for v in self.variables if v.causality == causality)
+
+    def renamed(self, names: Mapping[str, str]) -> "Description":
+        """The same description with other names.
+
+        A variable whose own name is given to another one is called `fmu.NAME` from then on.
+
+        Parameters
+        ----------
+        names : new names and the FMU's own, such as {"p": "pressure"}.
+
+        Raises
+        ------
+        InputError
+            If the FMU has no variable of a name.
+        """
+        own = {variable.name for variable in self.variables}
+        for ours, theirs in names.items():
+            if theirs not in own:
+                raise InputError(
+                    where=str(self.path),
+                    found=f"no variable '{theirs}'{closest(theirs, own)}",
+                    expected=f"the variable that is to be '{ours}'",
+                    remedy=f"correct '{ours}' in the mapping of names; 'workbench fmu info' lists "
+                    "the FMU's variables",
+                )
+        mapped = {theirs: ours for ours, theirs in names.items()}
+
+        def new(name: str) -> str:
+            return mapped.get(name, f"fmu.{name}" if name in names else name)
+
+        return replace(
+            self,
+            variables=tuple(replace(v, name=new(v.name)) for v in self.variables),
+            states=tuple(map(new, self.states)),
+            rates=tuple(map(new, self.rates)),
+            dependencies={
+                new(unknown): tuple(map(new, knowns))
+                for unknown, knowns in self.dependencies.items()
+            },
+        )
+
+    def require(self, interface: str) -> Interface:
+        """Interface of a name, with a binary for this machine.
+
+        Raises
+        ------
+        InputError
+            If the FMU has no such interface, or no binary for this machine.
+        """
+        if interface not in self.interfaces:
+            raise InputError(
+                where=str(self.path),
+                found=f"FMI {self.version}, {', '.join(self.interfaces) or 'no interface'} only",
+                expected=f"{interface} of FMI 2.0 or 3.0"
+                + (", whose states an observer can set" if interface == MODEL_EXCHANGE else ""),
+                remedy=f"export the model for {interface}",
+            )
+        if not {fmpy.platform, fmpy.platform_tuple} & set(self.platforms):
+            raise InputError(
+                where=str(self.path),
+                found=f"binaries for {', '.join(self.platforms) or 'no platform'}",
+                expected=f"a binary for this machine ({fmpy.platform_tuple})",
+                remedy="compile the FMU's sources, for instance with 'fmpy compile'",
+            )
+        self.library(interface)
+        return self.interfaces[interface]
+
+    def library(self, interface: str) -> str:
+        """Name in the archive of this machine's binary for an interface.
+
+        Raises
+        ------
+        InputError
+            If there is none, or it is empty.
+        """
+        file = f"{self.interfaces[interface].identifier}{fmpy.sharedLibraryExtension}"
+        names = [f"binaries/{one}/{file}" for one in (fmpy.platform, fmpy.platform_tuple)]
+        if found := next((name for name in names if self.binaries.get(name)), None):
+            return found
+        empty = next((name for name in names if name in self.binaries), None)
+        raise InputError(
+            where=str(self.path),
+            found=f"an empty file {empty}" if empty else f"no file {' or '.join(names)}",
+            expected="the binary that the model description names",
+            remedy="export the model again",
+        )
+
+
+def read_description(path: Path) -> Description:
+    """Read the model description of an FMU.
+
+    Raises
+    ------
+    InputError
+        If the file is no FMU of FMI 2.0 or 3.0.
+    """
+    try:
+        found_one = path.is_file()
+    except OSError:  # of names that no file can have
+        found_one = False
+    if not found_one:
+        raise InputError(
+            where=str(path),
+            found="no such file",
+            expected="an FMU",
+            remedy="give the path of one with --fmu"
+            + ("" if CHECKOUT is None else ", or build the project's with 'make fmus'"),
+        )
+    with opened(path) as archive:
+        files = {entry.filename: entry.file_size for entry in archive.infolist()}
+        if DESCRIPTION not in files:
+            raise damaged(path, f"it holds no {DESCRIPTION}")
+        xml = archive.read(DESCRIPTION)
+    try:
+        _refuse_entities(xml)
+        root = ElementTree.fromstring(xml)
+        with path.open("rb") as stream:  # FMPy leaves a file open that it opened and refused
+            found = fmpy.read_model_description(stream, validate=False)
+    except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
+        raise damaged(path, error) from None
+    if found.fmiVersion not in ("2.0", "3.0"):
+        raise InputError(
+            where=str(path),
+            found=f"FMI {found.fmiVersion}",
+            expected="FMI 2.0 or 3.0",
+            remedy="export the model for one of these versions",
+        )
+    try:
+        return _description(path, found, root, files)
+    except _WrongError as error:
+        raise InputError(
+            where=f"{path}, {DESCRIPTION}",
+            found=str(error),
+            expected="a description as FMI asks for",
+            remedy="export the model again, or report it to the exporter's makers",
+        ) from None
+
+
+class _WrongError(ValueError):
+    """What a model description has and must not, as a noun phrase."""
+
+
+def _refuse_entities(xml: bytes) -> None:
+    """Refuse a document type: FMI has none, and its entities can grow without bound."""
+
+    def refuse(*_: object) -> None:
+        raise ValueError("its model description declares a document type")
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.Parse(xml, True)
+
+
+def _description(
+    path: Path,
+    found: "fmpy.model_description.ModelDescription",
+    root: ElementTree.Element,
+    files: Mapping[str, int],
+) -> Description:
+    offered = {MODEL_EXCHANGE: root.find("ModelExchange"), CO_SIMULATION: root.find("CoSimulation")}
+    experiment = found.defaultExperiment
+    if not found.guid:
+        raise _WrongError("no guid or instantiationToken")
+    places = [name.split("/") for name in files]
+    for element in root.iter():
+        for key in ("index", "derivative"):
+            if (element.get(key) or "1").startswith(("0", "-")) and found.fmiVersion == "2.0":
+                raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
+    variables = tuple(_variable(v) for v in found.modelVariables)
+    _refuse_twice(v.name for v in variables)
+    if any(unknown.variable.derivative is None for unknown in found.derivatives):
+        raise _WrongError("a derivative in the model structure that is the derivative of nothing")
+    return Description(
+        path=path,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        version=found.fmiVersion,
+        name=found.modelName or "",
+        text=found.description or "",
+        tool=found.generationTool or "",
+        token=found.guid,
+        interfaces={name: _interface(tag) for name, tag in offered.items() if tag is not None},
+        platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
+        binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
+        variables=variables,
+        states=tuple(unknown.variable.derivative.name for unknown in found.derivatives),
+        rates=tuple(unknown.variable.name for unknown in found.derivatives),
+        dependencies={
+            unknown.variable.name: tuple(known.name for known in unknown.dependencies)
+            for unknown in (*found.derivatives, *found.outputs)
+            if unknown.dependencies is not None
+        },
+        event_indicators=max(found.numberOfEventIndicators, len(found.eventIndicators)),
+        step=_number(experiment.stepSize, "the step size") if experiment else None,
+        stop=_number(experiment.stopTime, "the stop time") if experiment else None,
+    )
+
+
+def _refuse_twice(names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise _WrongError(f"two variables '{name}'")
+        seen.add(name)
+
+
+def _interface(element: ElementTree.Element) -> Interface:
+    """Read capabilities from the XML, as FMPy 0.3.32 misses some of FMI 3.0."""
+
+    def has(*names: str) -> bool:
+        return any(element.get(name) in ("true", "1") for name in names)
+
+    identifier = element.get("modelIdentifier", "")
+    # It is the name of a file: none outside the folder of binaries.
+    if not re.fullmatch(r"\w[\w.-]*", identifier):
+        raise _WrongError(f"the modelIdentifier '{identifier[:80]}' of <{element.tag}>")
+    return Interface(
+        identifier=identifier,
+        saves_state=has("canGetAndSetFMUstate", "canGetAndSetFMUState"),
+        serialises_state=has("canSerializeFMUstate", "canSerializeFMUState"),
+        directional_derivatives=has(
+            "providesDirectionalDerivative", "providesDirectionalDerivatives"
+        ),
+        needs_execution_tool=has("needsExecutionTool"),
+        one_instance_per_process=has("canBeInstantiatedOnlyOncePerProcess"),
+    )
+
+
+def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
+    declared = variable.declaredType
+    real = variable.type in ("Real", "Float64") and not variable.dimensions
+    name = variable.name
+    if not name:
+        raise _WrongError("a variable without a name")
+    if not 0 <= variable.valueReference < 2**32:
+        raise _WrongError(f"the value reference {variable.valueReference} of '{name}'")
+    if real:
+        _number(variable.start, f"the start value of '{name}'")
+
+    def limit(key: str) -> float | None:
+        text = getattr(variable, key) or (getattr(declared, key) if declared else None)
+        return _number(text, f"{key} of '{name}'", endless=key != "nominal") if real else None
+
+    return Variable(
+        name=name,
+        reference=variable.valueReference,
+        type=variable.type,
+        real=real,
+        causality=variable.causality,
+        variability=variable.variability or "continuous",
+        unit=variable.unit or (declared.unit if declared else None),
+        start=None if variable.start is None else str(variable.start),
+        nominal=limit("nominal"),
+        minimum=limit("min"),
+        maximum=limit("max"),
+        text=variable.description or "",
+    )
+
+
+def _number(text: str | float | None, what: str, *, endless: bool = False) -> float | None:
+    """A number of the description, if there is one; endless ones only where they have a meaning."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if math.isnan(number) or (math.isinf(number) and not endless):
+        raise _WrongError(f"{what} = '{str(text)[:40]}'")
+    return number

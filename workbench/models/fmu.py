@@ -1,0 +1,599 @@
+"""An FMU under an observer's control, stage 2.
+
+The extended-FMI pattern of Brembeck et al. (2014): set and read continuous states, evaluate
+derivatives, linearise, step, save and roll back. Standard Model Exchange offers all of it except
+the step, which is done here: linearly implicit, because machines have
+motions of microseconds beside those of seconds.
+"""
+
+import ctypes
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError, InputError, closest
+from workbench.models.archive import unpack
+from workbench.models.description import (
+    CO_SIMULATION,
+    MODEL_EXCHANGE,
+    Description,
+    read_description,
+)
+from workbench.models.trial import prove
+from workbench.runtime.files import Scratch
+
+_FUNCTIONS = {
+    "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
+    "set_states": {"2.0": "fmi2SetContinuousStates", "3.0": "fmi3SetContinuousStates"},
+    "get_states": {"2.0": "fmi2GetContinuousStates", "3.0": "fmi3GetContinuousStates"},
+    "derivatives": {"2.0": "fmi2GetDerivatives", "3.0": "fmi3GetContinuousStateDerivatives"},
+    "set": {"2.0": "fmi2SetReal", "3.0": "fmi3SetFloat64"},
+    "get": {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"},
+    "directional": {"2.0": "fmi2GetDirectionalDerivative", "3.0": "fmi3GetDirectionalDerivative"},
+    "do_step": {"2.0": "fmi2DoStep", "3.0": "fmi3DoStep"},
+    "save": {"2.0": "fmi2GetFMUstate", "3.0": "fmi3GetFMUState"},
+    "restore": {"2.0": "fmi2SetFMUstate", "3.0": "fmi3SetFMUState"},
+    "release": {"2.0": "fmi2FreeFMUstate", "3.0": "fmi3FreeFMUState"},
+    "size": {"2.0": "fmi2SerializedFMUstateSize", "3.0": "fmi3SerializedFMUStateSize"},
+    "serialise": {"2.0": "fmi2SerializeFMUstate", "3.0": "fmi3SerializeFMUState"},
+    "deserialise": {"2.0": "fmi2DeSerializeFMUstate", "3.0": "fmi3DeserializeFMUState"},
+}
+
+_NEEDED = {
+    MODEL_EXCHANGE: ("time", "set_states", "get_states", "derivatives", "set", "get"),
+    CO_SIMULATION: ("do_step", "set", "get"),
+}
+
+_CLASSES = {
+    (MODEL_EXCHANGE, "2.0"): fmi2.FMU2Model,
+    (MODEL_EXCHANGE, "3.0"): fmi3.FMU3Model,
+    (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
+    (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
+}
+
+
+class Loaded:
+    """An FMU that is unpacked and loaded, with one instance.
+
+    Parameters
+    ----------
+    description : of the FMU.
+    interface : MODEL_EXCHANGE or CO_SIMULATION.
+
+    Attributes
+    ----------
+    version : of FMI.
+
+    Raises
+    ------
+    InputError
+        If the FMU has no such interface for this machine, or its archive or binary is damaged.
+    FMUError
+        If it refuses to be instantiated, or is not known and does not stand being tried.
+    """
+
+    def __init__(self, description: Description, interface: str) -> None:
+        identifier = description.require(interface).identifier
+        self.version = description.version
+        self._description = description
+        self._interface = interface
+        self._log: list[str] = []
+        self._scratch = Scratch()
+        try:
+            library = description.library(interface)
+            folder = self._scratch.path
+            unpack(description.path, folder, str(PurePosixPath(library).parent))
+            prove(description, interface, folder)
+            self._library = str(folder / library)
+            self._load(identifier)
+        except BaseException:
+            self._scratch.close()
+            raise
+
+    def _load(self, identifier: str) -> None:
+        """Load the library and make an instance."""
+        here = os.getcwd()
+        try:
+            self._instance = _CLASSES[self._interface, self.version](
+                guid=self._description.token,
+                unzipDirectory=str(self._scratch.path),
+                modelIdentifier=identifier,
+                instanceName=identifier,
+                libraryPath=self._library,
+            )
+        except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
+            os.chdir(here)  # it looks for the library in its own folder, and stays there
+            raise InputError(
+                where=str(self._description.path),
+                found=f"a binary that cannot be loaded ({error})",
+                expected="one that this machine can load, with the functions of FMI",
+                remedy="export the model again for this machine",
+            ) from None
+        dll = self._instance.dll
+        self._require(dll)
+        # A fresh pointer per function: FMPy's own carry argument types that cost conversions.
+        names = {use: function[self.version] for use, function in _FUNCTIONS.items()}
+        self._call = {use: dll[name] for use, name in names.items() if hasattr(dll, name)}
+        if "time" in self._call:
+            self._call["time"].argtypes = [ctypes.c_void_p, ctypes.c_double]
+        self._instantiate()
+
+    def _require(self, library: ctypes.CDLL) -> None:
+        """Refuse a library without the functions that every use needs."""
+        names = [_FUNCTIONS[use][self.version] for use in _NEEDED[self._interface]]
+        if missing := [name for name in names if not hasattr(library, name)]:
+            raise InputError(
+                where=str(self._description.path),
+                found=f"a binary without the function {missing[0]}",
+                expected=f"all of FMI {self.version}, {self._interface}",
+                remedy="export the model again",
+            )
+
+    def _instantiate(self) -> None:
+        log = self._log
+
+        def note(*arguments: bytes | None) -> None:
+            log.append((arguments[-1] or b"").decode(errors="replace"))
+
+        try:
+            if self.version == "3.0":
+                self._instance.instantiate(logMessage=note)
+            else:
+                callbacks = fmi2.fmi2CallbackFunctions()
+                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
+                callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+                callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+                self._instance.instantiate(callbacks=callbacks)
+        except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
+            raise FMUError(f"{self._description.path.name}: {error}: {self._logged()}") from None
+        self._component = ctypes.c_void_p(self._instance.component)
+        self._used = False
+
+    def close(self) -> None:
+        """Free the instance and the unpacked files."""
+        self._instance.freeInstance()
+        self._scratch.close()
+
+    def renew(self, *, reload: bool) -> None:
+        """Free the instance and make a new one; with `reload` of a library loaded anew."""
+        if reload:
+            self._instance.freeInstance()
+            self._load(self._instance.modelIdentifier)
+            return
+        free = "fmi3FreeInstance" if self.version == "3.0" else "fmi2FreeInstance"
+        getattr(self._instance, free)(self._instance.component)
+        self._instantiate()
+
+    def start(self, prepare: Callable[[], None]) -> None:
+        """Reset and initialise at time 0; in Model Exchange enter continuous-time mode.
+
+        Parameters
+        ----------
+        prepare : sets what differs from the start values.
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses a call.
+        """
+        instance = self._instance
+        try:
+            if self._used:
+                instance.reset()
+            self._used = True
+            if self.version == "2.0":
+                instance.setupExperiment()
+            prepare()
+            instance.enterInitializationMode()
+            instance.exitInitializationMode()
+            if self._interface == MODEL_EXCHANGE:
+                if self.version == "2.0":
+                    instance.newDiscreteStates()
+                else:
+                    instance.updateDiscreteStates()
+                instance.enterContinuousTimeMode()
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
+
+    def call(self, use: str, *arguments: object) -> None:
+        """Call the function for a use such as "get".
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses the call.
+        """
+        status = self._call[use](self._component, *arguments)
+        if status > 1:
+            raise self.refusal(_FUNCTIONS[use][self.version], status)
+
+    @property
+    def address(self) -> int:
+        """Address of the instance, for whoever calls its functions."""
+        return int(self._component.value or 0)
+
+    def function_address(self, use: str) -> int:
+        """Address of the FMU's function for a use such as "get"; 0 if it has none."""
+        call = self._call.get(use)
+        return int(ctypes.cast(call, ctypes.c_void_p).value or 0) if call else 0
+
+    def refusal(self, function: str, status: int) -> FMUError:
+        """The error for a call that returned `status`, with what the FMU logged."""
+        name = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}.get(status, status)
+        return FMUError(
+            f"{self._description.path.name}: {function} returned {name}: {self._logged()}"
+        )
+
+    def _logged(self) -> str:
+        text = "; ".join(self._log[-3:]) or "the FMU logged nothing"
+        self._log.clear()
+        return text
+
+
+References = NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class Variables:
+    """A fixed set of variables of one FMU, with a buffer for their values.
+
+    The buffer and the references stay in place, so that a call into the FMU needs no conversion.
+    """
+
+    names: tuple[str, ...]
+    references: References
+    values: Vector
+
+    @cached_property
+    def arguments(self) -> tuple[ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]:
+        """References, their number and values, as calls into the FMU take them."""
+        return (
+            ctypes.c_void_p(self.references.ctypes.data),
+            ctypes.c_size_t(self.references.size),
+            ctypes.c_void_p(self.values.ctypes.data),
+        )
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """dx/dt ~ A dx + B du, dy ~ C dx + D du; shapes (n, n), (n, m), (l, n), (l, m)."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+
+
+class FMU:
+    """One instance of a Model Exchange FMU, FMI 2.0 or 3.0.
+
+    Parameters
+    ----------
+    path : the FMU file.
+    names : names to use for variables that the FMU names otherwise, {"p": "pressure"}.
+    parameters : values that differ from those of the model description, in the FMU's units.
+
+    Attributes
+    ----------
+    names : as given.
+    states, inputs, outputs, parameters : names, in the order of the model description.
+    units : unit of each variable that has one.
+    defaults : start values, those given or of the model description, in the FMU's units.
+    sha256 : hash of the file, its identity in results.
+
+    Raises
+    ------
+    InputError
+        If the file is no FMU, or has no Model Exchange for this machine.
+    FMUError
+        If the FMU refuses to be instantiated.
+    """
+
+    interface = MODEL_EXCHANGE
+
+    def __init__(
+        self,
+        path: Path,
+        names: Mapping[str, str] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:
+        self.path = path
+        self.names = dict(names or {})
+        self._given = dict(parameters or {})
+        self.description = read_description(path).renamed(self.names)
+        offered = self.description.require(self.interface)
+        self.sha256 = self.description.sha256
+        self.version = self.description.version
+        self.name = self.description.name
+        self.states = self.description.states
+        self.inputs = self.description.names("input")
+        self.outputs = self.description.names("output")
+        self.parameters = self.description.names("parameter")
+        self.units = {v.name: v.unit for v in self.description.variables if v.unit}
+        self.defaults = {
+            v.name: float(v.start)
+            for v in self.description.variables
+            if v.real and v.start is not None
+        } | self._given
+        self._references = {v.name: v.reference for v in self.description.variables}
+        self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
+        self.has_directional_derivatives = offered.directional_derivatives
+        self._x = np.zeros(len(self.states))
+        self._dx = np.zeros(len(self.states))
+        self._state_variables = self.variables(self.states)
+        self._loaded = Loaded(self.description, self.interface)
+        self._variants: list[FMU] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance and the unpacked files, those of variants too."""
+        for one in self._variants:
+            one.close()
+        self._loaded.close()
+
+    def variant(self, parameters: Mapping[str, float]) -> "FMU":
+        """Another instance with some parameters changed, which is closed with this one."""
+        other = type(self)(self.path, self.names, {**self._given, **parameters})
+        self._variants.append(other)
+        return other
+
+    def renew(self, *, reload: bool) -> None:
+        """Free the instance and make a new one; with `reload` of a library loaded anew."""
+        self._loaded.renew(reload=reload)
+
+    # --- variables ---
+
+    def variables(self, names: Sequence[str]) -> Variables:
+        """Look names up once, for many calls of `get` and `set`.
+
+        Raises
+        ------
+        InputError
+            If the FMU has no variable of a name.
+        """
+        for name in names:
+            if name not in self._references:
+                raise InputError(
+                    where=str(self.path),
+                    found=f"no variable '{name}'{closest(name, self._references)}",
+                    expected=f"one of {', '.join(self.inputs + self.outputs)}",
+                    remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
+                )
+        references = np.array([self._references[n] for n in names], np.uint32)
+        return Variables(tuple(names), references, np.zeros(len(names)))
+
+    def get(self, variables: Variables) -> Vector:
+        """Read values; returns (k,) in the FMU's units, the buffer of `variables` itself."""
+        self._real("get", variables)
+        return variables.values
+
+    def set(self, variables: Variables, values: Vector) -> None:
+        """Set values, (k,) in the FMU's units."""
+        variables.values[:] = values
+        self._real("set", variables)
+
+    def _real(self, use: str, variables: Variables) -> None:
+        references, count, values = variables.arguments
+        if not count.value:
+            return
+        tail = (count,) if self.version == "3.0" else ()
+        self._loaded.call(use, references, count, values, *tail)
+
+    @property
+    def rate_references(self) -> NDArray[np.uint32]:
+        """Value references of the derivatives of the states, (n,)."""
+        return self._rates
+
+    @property
+    def instance_address(self) -> int:
+        """Address of the instance, for compiled loops that call the FMU's functions."""
+        return self._loaded.address
+
+    def function_address(self, use: str) -> int:
+        """Address of the FMU's function for a use such as "get"; 0 if it has none."""
+        return self._loaded.function_address(use)
+
+    def refusal(self, function: str, status: int) -> FMUError:
+        """The error for a call that returned `status`, with what the FMU logged."""
+        return self._loaded.refusal(function, status)
+
+    # --- the extended-FMI pattern ---
+
+    def start(
+        self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
+    ) -> None:
+        """Reset and initialise at time 0, then enter continuous-time mode.
+
+        Parameters
+        ----------
+        states : start values of states, in the FMU's units; others keep their defaults.
+        parameters : values of parameters; others keep their defaults.
+        """
+        given = {**self._given, **(parameters or {}), **states}
+        variables = self.variables(list(given))
+        self._loaded.start(lambda: self.set(variables, np.array(list(given.values()))))
+
+    def set_time(self, t: float) -> None:
+        """Set the time [s]."""
+        self._loaded.call("time", t)
+
+    def set_states(self, x: Vector) -> None:
+        """Set the continuous states, (n,)."""
+        self._x[:] = x
+        self._states("set_states", self._x)
+
+    def get_states(self) -> Vector:
+        """Continuous states, (n,)."""
+        self._states("get_states", self._x)
+        return self._x.copy()
+
+    def derivatives(self) -> Vector:
+        """Derivatives of the states, (n,)."""
+        self._states("derivatives", self._dx)
+        return self._dx.copy()
+
+    def _states(self, use: str, buffer: Vector) -> None:
+        if buffer.size:
+            self._loaded.call(
+                use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size)
+            )
+
+    def jacobian(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
+        """Derivatives d(unknowns)/d(knowns), (rows, columns).
+
+        Directional derivatives of the FMU; central differences where it offers none. Knowns are
+        states, inputs or tunable parameters; unknowns are value references.
+        """
+        columns = knowns.references.size
+        result = np.zeros((columns, unknowns.size))
+        if result.size and not self.has_directional_derivatives:
+            return self._difference(unknowns, knowns)
+        seed = np.ones(1)
+        for j in range(columns):
+            known = ctypes.c_void_p(knowns.references[j:].ctypes.data)
+            unknown = ctypes.c_void_p(unknowns.ctypes.data)
+            size, one = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
+            seeds, out = ctypes.c_void_p(seed.ctypes.data), ctypes.c_void_p(result[j].ctypes.data)
+            tail = (seeds, one, out, size) if self.version == "3.0" else (seeds, out)
+            self._loaded.call("directional", unknown, size, known, one, *tail)
+        return result.T
+
+    def _difference(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
+        """Central differences; the step balances truncation and rounding (cube root of eps)."""
+        probe = Variables((), unknowns, np.zeros(unknowns.size))
+        centre = self.get(knowns).copy()
+        columns = []
+        for j, value in enumerate(centre):
+            step = np.finfo(float).eps ** (1 / 3) * max(abs(value), 1e-3)
+            sides = []
+            for side in (step, -step):
+                moved = centre.copy()
+                moved[j] += side
+                self._inject(knowns, moved)
+                sides.append(self.get(probe).copy())
+            columns.append((sides[0] - sides[1]) / (2 * step))
+        self._inject(knowns, centre)
+        return np.column_stack(columns)
+
+    def _inject(self, variables: Variables, values: Vector) -> None:
+        """Set states through the state vector, anything else by reference."""
+        if set(variables.names) <= set(self.states):
+            x = self.get_states()
+            x[[self.states.index(name) for name in variables.names]] = values
+            self.set_states(x)
+        else:
+            self.set(variables, values)
+
+    def state_jacobian(self) -> Matrix:
+        """A = d(dx/dt)/dx at the present point, (n, n)."""
+        return self.jacobian(self._rates, self._state_variables)
+
+    def input_jacobian(self, inputs: Variables) -> Matrix:
+        """B = d(dx/dt)/du at the present point, (n, m)."""
+        return self.jacobian(self._rates, inputs)
+
+    def linearise(self, inputs: Variables, outputs: Variables) -> Linearisation:
+        """Linearise about the present point."""
+        return Linearisation(
+            A=self.state_jacobian(),
+            B=self.input_jacobian(inputs),
+            C=self.jacobian(outputs.references, self._state_variables),
+            D=self.jacobian(outputs.references, inputs),
+        )
+
+    def step(self, h: float) -> Vector:
+        """Advance the states by h [s] with inputs as they are; returns the new states, (n,).
+
+        Linearly implicit Euler, x + (I - h A)^-1 h f(x): L-stable, no iteration, and its result
+        lies on the linearised slow manifold, so that a stiff motion does not disturb the slow ones.
+        Source: Hairer and Wanner (1996), Solving Ordinary Differential Equations II, IV.7.
+        """
+        x = self.get_states()
+        system = np.eye(x.size) - h * self.state_jacobian()
+        x = x + np.linalg.solve(system, h * self.derivatives())
+        self.set_states(x)
+        return x
+
+    def save(self) -> ctypes.c_void_p:
+        """Save the complete state of the instance; hand it to `restore`, then to `release`."""
+        saved = ctypes.c_void_p()
+        self._loaded.call("save", ctypes.byref(saved))
+        return saved
+
+    def restore(self, saved: ctypes.c_void_p) -> None:
+        """Roll the instance back to a saved state."""
+        self._loaded.call("restore", saved)
+
+    def release(self, saved: ctypes.c_void_p) -> None:
+        """Free a saved state."""
+        self._loaded.call("release", ctypes.byref(saved))
+
+    def serialise(self, saved: ctypes.c_void_p) -> bytes:
+        """Turn a saved state into bytes, which outlive the instance."""
+        size = ctypes.c_size_t()
+        self._loaded.call("size", saved, ctypes.byref(size))
+        buffer = ctypes.create_string_buffer(size.value)
+        self._loaded.call("serialise", saved, buffer, size)
+        return buffer.raw
+
+    def deserialise(self, data: bytes) -> ctypes.c_void_p:
+        """Turn bytes from any instance of this FMU back into a saved state."""
+        saved = ctypes.c_void_p()
+        self._loaded.call("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
+        return saved
+
+
+class CoSimulation(FMU):
+    """One instance of a Co-Simulation FMU, which brings its own integrator.
+
+    Everything that works on states needs an FMU that offers it in Co-Simulation too, which the
+    standard does not ask for; values, steps and saved states are standard.
+    """
+
+    interface = CO_SIMULATION
+
+    def start(
+        self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
+    ) -> None:
+        """Reset and initialise at time 0; see `FMU.start`."""
+        super().start(states, parameters)
+        self._t = 0.0
+
+    def set_time(self, t: float) -> None:
+        """Say where the next step begins [s], after `restore`."""
+        self._t = t
+
+    def step(self, h: float) -> Vector:
+        """Advance by h [s] with inputs held; returns the new states, (n,)."""
+        tail: tuple[object, ...] = ()
+        if self.version == "3.0":
+            tail = (
+                *(ctypes.byref(ctypes.c_bool()) for _ in range(3)),
+                ctypes.byref(ctypes.c_double()),
+            )
+        # The zero: the state may be rolled back to before this point.
+        self._loaded.call(
+            "do_step", ctypes.c_double(self._t), ctypes.c_double(h), ctypes.c_int(0), *tail
+        )
+        self._t += h
+        return self.get(self._state_variables).copy()

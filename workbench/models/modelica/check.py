@@ -1,0 +1,365 @@
+"""What a Modelica library says of others that is not so: modifiers, redeclarations, connections.
+
+Front ends differ in what they refuse, and some drop a modifier of an element that does not exist
+without a word. Here each is held against what the class, with all that it inherits and all that is
+redeclared in it, has.
+
+Source: Modelica Language Specification 3.6, sections 4.9 (attributes of predefined types), 5.4
+(inner and outer), 6 (which class may stand for another), 7.2 and 7.3 (modifiers and
+redeclarations) and 9.1 (connections).
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NoReturn
+
+from workbench.errors import InputError, closest
+from workbench.models.modelica.classes import Class, Component, Connection, Modifier
+from workbench.models.modelica.library import Library
+
+_SCALAR = frozenset({"quantity", "min", "max", "start", "fixed"})
+ATTRIBUTES = {
+    "Real": _SCALAR | {"unit", "displayUnit", "nominal", "unbounded", "stateSelect"},
+    "Integer": _SCALAR,
+    "Boolean": frozenset({"quantity", "start", "fixed"}),
+    "String": frozenset({"quantity", "start", "fixed"}),
+    "enumeration": _SCALAR,
+}
+# Predefined, without attributes.
+_OTHERS = frozenset({"StateSelect", "AssertionLevel", "ExternalObject", "Clock"})
+_NOTHING = Modifier()
+
+
+def check(library: Library, model: str = "") -> tuple[str, ...]:
+    """Refuse what a model, or every class of a library, says of others that is not so.
+
+    Parameters
+    ----------
+    model : dotted name. It is held to what it reaches by components and bases, and to have an
+        `inner` for each `outer`. Without it, all classes of the library and of those that it uses
+        are held to what they say, each by itself.
+
+    Returns
+    -------
+    Dotted names of the classes that were held to it.
+
+    Raises
+    ------
+    InputError
+        With file and line: an unknown, protected or final element that is modified, a
+        redeclaration that does not fit its place, a connection of what is no connector or of two
+        kinds, an unknown class, an `outer` that nothing is around.
+    """
+    checker = _Checker(library)
+    waiting = [library.find(model).name] if model else list(library.classes)
+    for name in waiting:
+        waiting += [one for one in checker.reached(name) if one not in waiting]
+    if model:
+        for outer in checker.outside(library.find(model).name, _NOTHING, ()):
+            _refuse(
+                outer.where,
+                f"'outer {outer.name}' in {outer.owner}, which {model} has",
+                f"an 'inner {outer.name}' around it",
+                f"declare 'inner {outer.type} {outer.name}' in {model}",
+            )
+    return tuple(waiting)
+
+
+class _Checker:
+    """Holds classes of a library against each other."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._reached: dict[str, None] = {}
+
+    def reached(self, name: str) -> tuple[str, ...]:
+        """Check what one class says; returns the classes that it names."""
+        self._reached = {}
+        written = self.library.classes[name]
+        for base in written.extends:
+            kind = self._type(base.name, name, base.where)
+            self._modifier(base.modifier, kind, _NOTHING, inherits=True)
+        if written.constraint:
+            self._type(written.constraint, name, written.where)
+        seen: dict[str, str] = {}
+        for one in written.components:
+            if one.name in seen:
+                _refuse(
+                    one.where,
+                    f"a second element '{one.name}' of {name}",
+                    f"one, which is in {seen[one.name]}",
+                    "remove one of the two, or rename it",
+                )
+            seen[one.name] = one.where
+            self._component(one)
+        for connection in written.connections:
+            self._connection(connection, name)
+        return tuple(self._reached)
+
+    def outside(
+        self, kind: str, modifier: Modifier, around: tuple[str, ...]
+    ) -> Iterator[Component]:
+        """Outer components of a class, as modified, for which it has no inner one."""
+        found = self.library.classes.get(kind)
+        if found is None:
+            return
+        if kind in around:
+            _refuse(
+                found.where,
+                f"{kind}, which has a component of its own class",
+                "components that end in predefined types",
+                "remove it",
+            )
+        parts = self._parts(kind, modifier).values()
+        inner = {one.name for one in parts if "inner" in one.prefixes}
+        for one in parts:
+            if "outer" not in one.prefixes:
+                deeper = self.outside(self._kind(one), one.modifier, (*around, kind))
+                yield from (outer for outer in deeper if outer.name not in inner)
+            elif "inner" not in one.prefixes:
+                yield one
+
+    # --- what a class declares ---
+
+    def _component(self, one: Component) -> None:
+        kind = self._type(one.type, one.owner, one.where)
+        self._modifier(one.modifier, kind, _NOTHING, inherits=False)
+        if one.constraint:
+            constraint = self._type(one.constraint, one.owner, one.where)
+            self._modifier(one.constraining, constraint, _NOTHING, inherits=False)
+            self._fits(kind, constraint, one)
+
+    def _type(self, name: str, scope: str, where: str) -> str:
+        """Dotted name of a class that something is of."""
+        found = self.library.resolve(name, scope)
+        if found in self.library.classes:
+            self._reached[found] = None
+        elif found not in ATTRIBUTES.keys() | _OTHERS and name:
+            short = {one.rpartition(".")[2] for one in self.library.classes}
+            _refuse(
+                where,
+                f"no class '{name}'{closest(name.rpartition('.')[2], short)}",
+                f"a class that is known in {scope}",
+                "correct the name, or import it",
+            )
+        return found
+
+    def _parts(self, kind: str, modifier: Modifier) -> Mapping[str, Component]:
+        """Components of a class, as modified."""
+        if kind not in self.library.classes:
+            return {}
+        return self.library.modified(self.library.components(kind), modifier)
+
+    def _predefined(self, kind: str) -> str:
+        """Predefined type that a class extends in the end; empty if none."""
+        while (one := self.library.classes.get(kind)) is not None:
+            if not one.extends:
+                return "enumeration" if one.kind == "type" else ""
+            kind = self.library.bases(kind)[0]
+        return kind
+
+    # --- modifiers ---
+
+    def _modifier(self, modifier: Modifier, kind: str, before: Modifier, *, inherits: bool) -> None:
+        """Check a modifier of something of a class, which has been modified before.
+
+        Where a class inherits, it may modify what is protected.
+        """
+        predefined = self._predefined(kind)
+        if predefined:
+            self._attributes(modifier, predefined, kind, before)
+            return
+        parts = self._parts(kind, before)
+        redeclared = {n: m for n, m in modifier.inner.items() if m.redeclared and n not in parts}
+        parts = self.library.modified(parts, Modifier(inner=redeclared))
+        for name, one in modifier.inner.items():
+            part = parts.get(name)
+            if part is None:
+                self._class(name, one, kind, parts)
+                continue
+            if "protected" in part.prefixes and not inherits:
+                _refuse(
+                    one.where,
+                    f"a modifier of '{name}', which is protected in {part.owner}",
+                    "a public element",
+                    f"make '{name}' public, or set it in a class that extends {kind}",
+                )
+            if "final" in part.prefixes or part.modifier.final:
+                _refuse(
+                    one.where,
+                    f"a modifier of '{name}', which is final in {part.where}",
+                    "an element that may change",
+                    "remove the modifier, or the 'final'",
+                )
+            if one.redeclared is not None:
+                self._redeclaration(part, one.redeclared)
+            else:
+                self._modifier(one, self._kind(part), part.modifier, inherits=False)
+
+    def _attributes(self, modifier: Modifier, predefined: str, kind: str, before: Modifier) -> None:
+        known = ATTRIBUTES.get(predefined, frozenset())
+        for name, one in modifier.inner.items():
+            if name not in known or one.inner or one.redeclared is not None:
+                unfit = f"'{name}'{closest(name, known)}" if name not in known else f"'{name}(...)'"
+                _refuse(
+                    one.where,
+                    f"a modifier {unfit} of {predefined}",
+                    f"one of {', '.join(sorted(known)) or 'none'}",
+                    "correct or remove it",
+                )
+            if self._final(name, kind, before):
+                _refuse(
+                    one.where,
+                    f"a modifier '{name}', which is final in {kind}",
+                    "an attribute that may change",
+                    "remove it, or choose another type",
+                )
+
+    def _final(self, attribute: str, kind: str, before: Modifier) -> bool:
+        """Whether a type, or what modified it before, has fixed an attribute for good."""
+        modifiers = [before]
+        while (one := self.library.classes.get(kind)) is not None and one.extends:
+            modifiers.append(one.extends[0].modifier)
+            kind = self.library.bases(kind)[0]
+        return any(m.inner[attribute].final for m in modifiers if attribute in m.inner)
+
+    # --- redeclarations ---
+
+    def _class(self, name: str, one: Modifier, kind: str, parts: Mapping[str, Component]) -> None:
+        """Check a modifier of a class within another one."""
+        inside = self.library.inside(name, kind)
+        if not inside:
+            _refuse(
+                one.where,
+                f"a modifier of '{name}', but {kind or 'it'} has no such element"
+                f"{closest(name, parts)}",
+                f"one of {', '.join(parts) or 'none'}",
+                "correct the name, or remove the modifier",
+            )
+        if one.redeclared is None:
+            self._modifier(one, inside, _NOTHING, inherits=False)
+            return
+        old = self.library.classes[inside]
+        if "replaceable" not in old.prefixes:
+            _not_replaceable(one.where, name, old.where)
+        new = one.redeclared
+        made = self._type(new.type, new.owner, new.where)
+        self._modifier(new.modifier, made, _NOTHING, inherits=True)
+        wanted = self._type(old.constraint, inside, old.where) if old.constraint else inside
+        self._fits(made, wanted, new)
+
+    def _redeclaration(self, old: Component, new: Component) -> None:
+        if "replaceable" not in old.prefixes:
+            _not_replaceable(new.where, old.name, old.where)
+        self._component(new)
+        wanted = self.library.resolve(old.constraint or old.type, old.owner)
+        self._fits(self._kind(new), wanted, new)
+
+    def _fits(self, made: str, wanted: str, where: Component) -> None:
+        """Check that a class has what another one, in whose place it stands, has."""
+        lacking = self._lacking(made, wanted)
+        if lacking:
+            _refuse(
+                where.where,
+                f"{made} for '{where.name}', without {', '.join(lacking)}",
+                f"a class that has all that {wanted} has",
+                f"extend {wanted}, or choose another class",
+            )
+
+    def _lacking(self, made: str, wanted: str, around: tuple[str, ...] = ()) -> list[str]:
+        """What a class lacks of another one: its public components, with their predefined types."""
+        if made == wanted or wanted in self._lineage(made) or wanted in around:
+            return []
+        if self._predefined(made) != self._predefined(wanted):
+            return [self._predefined(wanted) or wanted]
+        have = self._parts(made, _NOTHING)
+        lacking = []
+        for name, one in self._parts(wanted, _NOTHING).items():
+            if "protected" in one.prefixes:
+                continue
+            mine = have.get(name)
+            if mine is None or self._lacking(self._kind(mine), self._kind(one), (*around, wanted)):
+                lacking.append(f"{one.type} {name}")
+        return lacking
+
+    def _lineage(self, kind: str) -> tuple[str, ...]:
+        return self.library.ancestors(kind) if kind in self.library.classes else ()
+
+    def _kind(self, one: Component) -> str:
+        return self.library.resolve(one.type, one.owner)
+
+    # --- connections ---
+
+    def _connection(self, connection: Connection, owner: str) -> None:
+        left, right = (self._end(names, connection, owner) for names in connection.ends)
+        if left is None or right is None:
+            return  # within an expandable connector, which gets what is connected to it
+        one, other = self._signature(left), self._signature(right)
+        if one != other:
+            ends = " and ".join(".".join(names) for names in connection.ends)
+            _refuse(
+                connection.where,
+                f"a connection of {ends}, which are {left} and {right}",
+                "two connectors of the same variables",
+                "connect what is of one kind",
+            )
+
+    def _end(self, names: tuple[str, ...], connection: Connection, owner: str) -> str | None:
+        """Class of a connector at one end; None for what an expandable connector may get."""
+        kind, modifier, whole = owner, _NOTHING, ".".join(names)
+        for name in names:
+            parts = self._parts(kind, modifier)
+            if name not in parts:
+                if "expandable" in self._prefixes(kind):
+                    return None
+                _refuse(
+                    connection.where,
+                    f"connect with '{whole}', but {kind} has no '{name}'{closest(name, parts)}",
+                    "a connector",
+                    "correct the name",
+                )
+            part = parts[name]
+            if "protected" in part.prefixes and kind != owner:
+                _refuse(
+                    connection.where,
+                    f"connect with '{whole}', but '{name}' is protected in {kind}",
+                    "a public connector",
+                    f"make '{name}' public",
+                )
+            kind, modifier = self._kind(part), part.modifier
+        found = self.library.classes.get(kind)
+        if found is None or not self._connector(found):
+            _refuse(
+                connection.where,
+                f"connect with '{whole}', which is a {kind}",
+                "a connector",
+                "connect connectors; write an equation for anything else",
+            )
+        return kind
+
+    def _connector(self, found: Class) -> bool:
+        lineage = (found.name, *self.library.ancestors(found.name))
+        return any(self.library.classes[one].kind == "connector" for one in lineage)
+
+    def _prefixes(self, kind: str) -> frozenset[str]:
+        found = self.library.classes.get(kind)
+        return found.prefixes if found is not None else frozenset()
+
+    def _signature(self, kind: str) -> object:
+        """What two connectors must share: a predefined type, or names, kinds and what flows."""
+        return self._predefined(kind) or {
+            name: (one.prefixes & {"flow", "stream"}, self._signature(self._kind(one)))
+            for name, one in self._parts(kind, _NOTHING).items()
+        }
+
+
+def _not_replaceable(where: str, name: str, declared: str) -> NoReturn:
+    _refuse(
+        where,
+        f"a redeclaration of '{name}', which is not replaceable in {declared}",
+        "a replaceable element",
+        f"declare '{name}' replaceable, or modify it without 'redeclare'",
+    )
+
+
+def _refuse(where: str, found: str, expected: str, remedy: str) -> NoReturn:
+    raise InputError(where=where, found=found, expected=expected, remedy=remedy)

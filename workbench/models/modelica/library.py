@@ -1,0 +1,248 @@
+"""Libraries of Modelica classes: files and folders, and what a name means.
+
+Source: Modelica Language Specification 3.6, sections 5.3 (lookup of names) and 13.4 (files).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from workbench.errors import InputError, closest
+from workbench.models.modelica.classes import Class, Component, Modifier
+from workbench.models.modelica.files import packages, read
+from workbench.models.modelica.source import Reader
+
+
+class Library:
+    """The classes of a Modelica library and of those that it uses, and what their names mean.
+
+    Parameters
+    ----------
+    file : `package.mo` of the library, or its only file.
+    classes : all, in the order of `package.order` and of the files; those of used libraries last.
+
+    Attributes
+    ----------
+    name : of the library.
+    classes : by dotted name.
+    """
+
+    def __init__(self, file: Path, classes: list[Class]) -> None:
+        self.file = file
+        self.name = classes[0].name
+        self.classes: dict[str, Class] = {}
+        for one in classes:
+            if one.name in self.classes:
+                raise InputError(
+                    where=one.where,
+                    found=f"a second class {one.name}",
+                    expected=f"one, which is in {self.classes[one.name].where}",
+                    remedy="remove one of the two, or rename it",
+                )
+            self.classes[one.name] = one
+        self._bases: dict[str, tuple[str, ...]] = {}
+
+    def find(self, name: str) -> Class:
+        """The class of a name, dotted from the library's name on, or from what follows it.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for dotted in (name, f"{self.name}.{name}"):
+            if dotted in self.classes:
+                return self.classes[dotted]
+        raise InputError(
+            where=str(self.file),
+            found=f"no class '{name}'{closest(f'{self.name}.{name}', self.classes)}",
+            expected=f"a class of {self.name}",
+            remedy="correct the name, or give another library",
+        )
+
+    def resolve(self, name: str, scope: str) -> str:
+        """Dotted name of what `name` means in a class; `name` itself if it is of no class here."""
+        head, *rest = name.removeprefix(".").split(".")
+        scopes = [""] if name.startswith(".") else _outward(scope)
+        found = next((one for at in scopes if (one := self._visible(head, at))), "")
+        if found not in self.classes:
+            return ".".join([found or head, *rest])
+        for part in rest:
+            if not (inside := self.inside(part, found)):
+                hidden = f"; to mean the library {head}, import it" if head != found else ""
+                raise InputError(
+                    where=self.classes[scope].where,
+                    found=f"'{name}', but {found} has no class '{part}'",
+                    expected="a class of the library",
+                    remedy=f"correct the name{hidden}",
+                )
+            found = inside
+        return found
+
+    def bases(self, name: str) -> tuple[str, ...]:
+        """Dotted names of what a class extends directly."""
+        if name not in self._bases:
+            self._bases[name] = ()  # while they are looked up, nothing is inherited from them
+            self._bases[name] = tuple(
+                self.resolve(one.name, name) for one in self.classes[name].extends
+            )
+        return self._bases[name]
+
+    def ancestors(self, name: str) -> tuple[str, ...]:
+        """Dotted names of what a class extends, directly or through others.
+
+        Raises
+        ------
+        InputError
+            If a class extends itself.
+        """
+        found: list[str] = []
+        waiting = list(self.bases(name))
+        while waiting:
+            one = waiting.pop(0)
+            if one == name:
+                raise InputError(
+                    where=self.classes[name].where,
+                    found=f"{name} extends itself",
+                    expected="a class that ends in one without 'extends'",
+                    remedy="correct what it extends",
+                )
+            if one in self.classes and one not in found:
+                found.append(one)
+                waiting += self.bases(one)
+        return tuple(found)
+
+    def components(self, name: str) -> dict[str, Component]:
+        """Components of a class, inherited ones first, with the types and values it gives them."""
+        self.ancestors(name)  # refuses a class that extends itself
+        found: dict[str, Component] = {}
+        for base, dotted in zip(self.classes[name].extends, self.bases(name), strict=True):
+            inherited = self.components(dotted) if dotted in self.classes else {}
+            for key, component in self.modified(inherited, base.modifier).items():
+                modifier = component.modifier
+                if key in found:  # a class may be inherited on two ways
+                    modifier = _merged(found[key].modifier, modifier)
+                found[key] = replace(component, modifier=modifier)
+        return found | {component.name: component for component in self.classes[name].components}
+
+    def modified(
+        self, components: Mapping[str, Component], modifier: Modifier
+    ) -> dict[str, Component]:
+        """Components of a class as a modifier leaves them; what it names and is none is ignored."""
+        found = dict(components)
+        for key, one in modifier.inner.items():
+            new = one.redeclared
+            if key in found and new is None:
+                found[key] = replace(found[key], modifier=_merged(found[key].modifier, one))
+            elif key in found and new is not None:
+                found[key] = self._redeclared(found[key], new)
+            elif new is not None:  # a class, of which components may be
+                for name, old in components.items():
+                    if self.resolve(old.type, old.owner).rpartition(".")[2] == key:
+                        found[name] = replace(found[name], type=self._absolute(new.type, new.owner))
+        return found
+
+    def _redeclared(self, old: Component, new: Component) -> Component:
+        constraint, scope = old.constraint or old.type, old.owner
+        if new.constraint:
+            constraint, scope = new.constraint, new.owner
+        return replace(
+            old,
+            type=self._absolute(new.type, new.owner),
+            prefixes=(old.prefixes - {"replaceable"}) | (new.prefixes - {"redeclare"}),
+            constraint=self._absolute(constraint, scope),
+            modifier=_merged(old.constraining, new.modifier),
+        )
+
+    def _absolute(self, name: str, scope: str) -> str:
+        """A name that means in any scope what `name` means in one."""
+        found = self.resolve(name, scope)
+        return f".{found}" if found in self.classes else name
+
+    def unit(self, component: Component) -> str:
+        """Unit of a component; where it has none, the name of the type that could have one."""
+        modifier, name, scope = component.modifier, component.type, component.owner
+        kind = ""
+        while "unit" not in modifier.inner:
+            name = self.resolve(name, scope)
+            if name not in self.classes or not self.bases(name):
+                return kind or name
+            self.ancestors(name)  # refuses a type that is its own
+            kind, scope, base = name, name, self.classes[name].extends[0]
+            modifier, name = base.modifier, base.name
+        return modifier.inner["unit"].value.strip('"')
+
+    def _visible(self, name: str, scope: str) -> str:
+        """Class of a simple name, by the declarations and imports of one scope; empty if none."""
+        if found := self.inside(name, scope):
+            return found
+        for alias, target in self.classes[scope].imports if scope else ():
+            if alias == name:
+                return target.removeprefix(".")
+            if alias == "*" and (found := self.inside(name, target)):
+                return found
+        return ""
+
+    def inside(self, name: str, of: str) -> str:
+        """Class within another one, or within what that extends; empty if none."""
+        holders = (of, *self.ancestors(of)) if of in self.classes else (of,)
+        inside = (f"{holder}.{name}".removeprefix(".") for holder in holders)
+        return next((one for one in inside if one in self.classes), "")
+
+
+def read_library(file: Path) -> Library:
+    """Read a Modelica library, and those that it uses.
+
+    Parameters
+    ----------
+    file : `package.mo` of a library of folders and files, or a library of one file.
+
+    Raises
+    ------
+    InputError
+        With file and line, if something is not Modelica, or not in its place; if a library that it
+        uses is not found.
+    """
+    return Library(file, [one for package in packages(file) for one in _read(package, "")])
+
+
+def _read(file: Path, enclosing: str) -> Iterator[Class]:
+    """Classes of a file and, of a package.mo, of all files and folders beside it."""
+    classes = Reader(file, read(file)).file(enclosing)
+    name = classes[0].name
+    is_package = file.name == "package.mo"
+    expected = file.parent.name if is_package else file.stem
+    if enclosing and name.rpartition(".")[2] != expected:
+        raise InputError(
+            where=classes[0].where,
+            found=f"class {name}",
+            expected=f"a class named {expected}, as the file or folder is",
+            remedy="rename one of the two",
+        )
+    yield from classes
+    if is_package:
+        children = {path.stem: path for path in file.parent.glob("*.mo") if path != file}
+        children |= {path.parent.name: path for path in file.parent.glob("*/package.mo")}
+        listing = file.with_name("package.order")
+        order = listing.read_text().split() if listing.is_file() else []
+        for child in sorted(children, key=lambda c: (order.index(c) if c in order else 1e9, c)):
+            yield from _read(children[child], name)
+
+
+def _outward(scope: str) -> list[str]:
+    """A class, the classes around it, and the level of the library itself."""
+    parts = scope.split(".")
+    return [".".join(parts[:count]) for count in range(len(parts), -1, -1)]
+
+
+def _merged(old: Modifier, new: Modifier) -> Modifier:
+    inner = dict(old.inner)
+    for name, one in new.inner.items():
+        inner[name] = _merged(inner[name], one) if name in inner else one
+    return Modifier(
+        value=new.value or old.value,
+        inner=inner,
+        where=new.where or old.where,
+        final=new.final or old.final,
+        redeclared=new.redeclared or old.redeclared,
+    )

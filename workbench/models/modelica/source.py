@@ -1,0 +1,367 @@
+"""Reader of Modelica source: the structure of classes alone.
+
+Equations are passed over, and values are kept as text. What cannot be read is refused with its
+file and line.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from workbench.errors import InputError
+from workbench.models.modelica.classes import Class, Component, Connection, Extends, Modifier
+from workbench.models.modelica.tokens import (
+    CLASS_PREFIXES,
+    CLOSING,
+    DEEPEST,
+    KINDS,
+    OPERATORS,
+    PREFIXES,
+    SECTIONS,
+    Cursor,
+)
+
+VENDOR = "__Workbench"
+
+_BLOCKS = frozenset({"if", "for", "when", "while"})
+_PROPAGATION = frozenset({"each", "final"})
+
+
+@dataclass
+class _Body:
+    """What is found in a class while it is read."""
+
+    extends: list[Extends] = field(default_factory=list)
+    imports: list[tuple[str, str]] = field(default_factory=list)
+    components: list[Component] = field(default_factory=list)
+    equations: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
+    vendor: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Reader(Cursor):
+    """Reads one file, by recursive descent."""
+
+    def __init__(self, file: Path, text: str) -> None:
+        super().__init__(file, text)
+        self._found: list[Class] = []
+        self._owner = ""  # class that is being read
+
+    def file(self, enclosing: str) -> list[Class]:
+        """The class of the file and those within it, in order."""
+        within = ""
+        if self.took("within"):
+            within = "" if self.sees(";") else self.name()
+            self.expect(";")
+        if within != enclosing:
+            raise InputError(
+                where=f"{self._file}:1",
+                found=f"'within {within};'" if within else "no 'within'",
+                expected=f"'within {enclosing};'" if enclosing else "no 'within'",
+                remedy="correct it, or move the file to its package",
+            )
+        self.took("final")
+        self._definition(enclosing, frozenset())
+        self.expect(";")
+        if self.token.kind != "end":
+            raise self.refusal("one class in a file, and others within it")
+        return self._found
+
+    # --- classes ---
+
+    def _definition(self, enclosing: str, prefixes: frozenset[str]) -> None:
+        prefixes |= self.words(CLASS_PREFIXES)
+        if enclosing.count(".") > DEEPEST:
+            raise self.refusal(f"at most {DEEPEST} classes within each other")
+        kind = self.one_of(KINDS)
+        if kind == "operator" and self.token.text in ("function", "record"):
+            kind = self.advance().text
+        where, place = self.where, len(self._found)
+        short = self.identifier()
+        name = f"{enclosing}.{short}" if enclosing else short
+        outer, self._owner = self._owner, name
+        if self.took("="):
+            extends = self._alias()
+            description, vendor = self._comment()
+            body = _Body(extends=extends, vendor=vendor)
+        else:
+            description, body = self.string(), _Body()
+            self._composition(name, body)
+        self._owner = outer
+        made = Class(
+            name=name,
+            kind=kind,
+            prefixes=prefixes,
+            constraint=self._constraint()[0],
+            description=description,
+            extends=tuple(body.extends),
+            imports=tuple(body.imports),
+            components=tuple(body.components),
+            equations=frozenset(body.equations),
+            connections=tuple(body.connections),
+            vendor=body.vendor,
+            where=where,
+        )
+        self._found.insert(place, made)
+
+    def _alias(self) -> list[Extends]:
+        """What stands after `type X =`."""
+        if self.took("enumeration") or self.took("der"):
+            self.group()
+            return []
+        self.words(PREFIXES)
+        return [self._extends()]
+
+    def _extends(self) -> Extends:
+        where, base = self.where, self.name()
+        self.subscripts()
+        return Extends(base, Modifier(inner=self._modifiers()), where)
+
+    def _composition(self, name: str, body: _Body) -> None:
+        in_equations, access = False, frozenset[str]()
+        short = name.rpartition(".")[2]
+        while True:
+            word = self.token.text
+            if word == "end" and self.following.text == short:
+                self.advance()
+                self.advance()
+                return
+            if word in ("public", "protected"):
+                access = frozenset({self.advance().text} - {"public"})
+                in_equations = False
+            elif word == "end" and not in_equations:
+                raise self.refusal(f"'end {short}', or more of {short}")
+            elif word in SECTIONS:
+                self.advance()
+                in_equations = True
+            elif word == "annotation":
+                body.vendor = self._annotation()
+                self.expect(";")
+            elif in_equations or word == "external":
+                self._statement(body)
+            else:
+                self._element(name, body, access)
+
+    def _statement(self, body: _Body) -> None:
+        left = self.token
+        if left.kind == "name" and self.following.text == "=":
+            body.equations.append(left.text)
+        while self.before(";"):
+            where = self.where
+            if self.sees("end") and self.following.text not in _BLOCKS:
+                raise self.refusal("';'")
+            if self.took("connect"):
+                body.connections.append(self._connection(where))
+            else:
+                self.step()
+        self.expect(";")
+
+    def _connection(self, where: str) -> Connection:
+        self.expect("(")
+        left = self._reference()
+        self.expect(",")
+        right = self._reference()
+        self.expect(")")
+        return Connection((left, right), where)
+
+    def _reference(self) -> tuple[str, ...]:
+        """Names from component to component, without subscripts."""
+        names = [self.identifier()]
+        self.subscripts()
+        while self.took("."):
+            names.append(self.identifier())
+            self.subscripts()
+        return tuple(names)
+
+    def _element(self, name: str, body: _Body, access: frozenset[str]) -> None:
+        if self.took("import"):
+            body.imports += self._import()
+            self._comment()
+        elif self.took("extends"):
+            body.extends.append(self._extends())
+            self._comment()
+        else:
+            prefixes = self.words(PREFIXES) | access
+            if self.token.text in KINDS | CLASS_PREFIXES:
+                self._definition(name, prefixes)
+            else:
+                body.components += self._components(prefixes)
+        self.expect(";")
+
+    def _import(self) -> list[tuple[str, str]]:
+        target = self.name()
+        if self.took("="):
+            return [(target, self.name())]
+        if self.took(".*"):
+            return [("*", target)]
+        if self.took("."):
+            self.expect("{")
+            names = [self.identifier()]
+            while self.took(","):
+                names.append(self.identifier())
+            self.expect("}")
+            return [(name, f"{target}.{name}") for name in names]
+        return [(target.rpartition(".")[2], target)]
+
+    def _components(self, prefixes: frozenset[str]) -> list[Component]:
+        declared = self.name()
+        self.subscripts()
+        found = [self._component(declared, prefixes)]
+        while self.took(","):
+            found.append(self._component(declared, prefixes))
+        return self._constrained(found)
+
+    def _constrained(self, found: list[Component]) -> list[Component]:
+        constraint, constraining, description = self._constraint()
+        return [
+            replace(
+                one,
+                constraint=constraint,
+                constraining=constraining,
+                description=one.description or description,
+            )
+            for one in found
+        ]
+
+    def _component(self, declared: str, prefixes: frozenset[str]) -> Component:
+        where, name = self.where, self.identifier()
+        self.subscripts()
+        modifier = self._modification(where)
+        if self.took("if"):
+            self._expression()
+        description, _ = self._comment()
+        nothing = Modifier()
+        return Component(
+            name, self._owner, declared, prefixes, modifier, "", nothing, description, where
+        )
+
+    def _constraint(self) -> tuple[str, Modifier, str]:
+        """Constraining class, its modifier, and description; empty where there is none."""
+        if not self.took("constrainedby"):
+            return "", Modifier(), ""
+        where, name = self.where, self.name()
+        modifier = Modifier(inner=self._modifiers(), where=where)
+        return name, modifier, self._comment()[0]
+
+    # --- modifiers and values ---
+
+    def _modification(self, where: str, final: bool = False) -> Modifier:
+        inner = self._modifiers()
+        given = self.took("=") or self.took(":=")
+        return Modifier(self._expression() if given else "", inner, where, final)
+
+    def _modifiers(self) -> dict[str, Modifier]:
+        inner: dict[str, Modifier] = {}
+        if not self.took("(") or self.took(")"):
+            return inner
+        while True:
+            where, prefixes = self.where, self.words(PREFIXES | _PROPAGATION)
+            if prefixes & {"redeclare", "replaceable"}:
+                one = self._redeclaration(prefixes)
+                name, made = one.name, Modifier("", {}, where, "final" in prefixes, one)
+            else:
+                name = self.name()
+                made = self._modification(where, "final" in prefixes)
+                self.string()
+            if name in inner:
+                raise InputError(
+                    where=where,
+                    found=f"a second modifier of '{name}'",
+                    expected=f"one, which is in {inner[name].where}",
+                    remedy="remove one of the two",
+                )
+            inner[name] = made
+            if self.took(")"):
+                return inner
+            self.expect(",")
+
+    def _redeclaration(self, prefixes: frozenset[str]) -> Component:
+        """What is redeclared in a modifier; of a class the prefixes tell its kind."""
+        kind = self.words(CLASS_PREFIXES | KINDS)
+        if kind:
+            where, name = self.where, self.identifier()
+            self.expect("=")
+            (base,) = self._alias() or [Extends("", Modifier(), where)]
+            description, _ = self._comment()
+            nothing = Modifier()
+            one = Component(
+                *(name, self._owner, base.name, prefixes | kind, base.modifier),
+                *("", nothing, description, where),
+            )
+        else:
+            declared = self.name()
+            self.subscripts()
+            one = self._component(declared, prefixes)
+        return self._constrained([one])[0]
+
+    def _expression(self) -> str:
+        """Text up to what cannot be of the same expression."""
+        start, complete = self.token.start, False
+        while True:
+            kind, text = self.token.kind, self.token.text
+            if text in CLOSING:
+                self.group()
+                complete = True
+            elif text in (",", ";", ")", "annotation", "constrainedby") or (
+                complete and (kind == "string" or text == "if")
+            ):
+                break
+            else:
+                self.advance()
+                complete = kind in ("number", "string") or (
+                    kind == "name" and text not in OPERATORS
+                )
+        if not complete:
+            raise self.refusal("the rest of an expression")
+        return self._text[start : self._tokens[self._next - 1].end]
+
+    def _comment(self) -> tuple[str, Mapping[str, Any]]:
+        description = self.string()
+        return description, self._annotation() if self.sees("annotation") else {}
+
+    def _annotation(self) -> Mapping[str, Any]:
+        """Content of the workbench's annotation; others are passed over."""
+        vendor: Mapping[str, Any] = {}
+        self.expect("annotation")
+        self.expect("(")
+        while not self.took(")"):
+            if self.took(VENDOR):
+                vendor = self._tree()
+            else:
+                self.skip(",", ")")
+            if not self.sees(")"):
+                self.expect(",")
+        return vendor
+
+    def _tree(self) -> dict[str, Any]:
+        tree: dict[str, Any] = {}
+        self.expect("(")
+        while True:
+            if (key := self.identifier()) in tree:
+                raise self.refusal(f"one '{key}'")
+            if self.sees("("):
+                tree[key] = self._tree()
+            else:
+                self.expect("=")
+                tree[key] = self._literal()
+            if self.took(")"):
+                return tree
+            self.expect(",")
+
+    def _literal(self) -> Any:
+        if self.token.kind == "string":
+            return self.string()
+        if self.took("{"):
+            values = [self._literal()]
+            while self.took(","):
+                values.append(self._literal())
+            self.expect("}")
+            return tuple(values)
+        for word, value in (("true", True), ("false", False)):
+            if self.took(word):
+                return value
+        sign = -1.0 if self.took("-") else 1.0
+        if self.token.kind != "number":
+            raise self.refusal("a number, a string, true, false or an array of them")
+        return sign * float(self.advance().text)

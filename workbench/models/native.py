@@ -1,0 +1,354 @@
+"""The hot loop's view of an FMU: its own C functions, called from compiled Python.
+
+numba compiles the laws of the observers once; which FMU they run on is an argument, an `Instance`
+with the addresses of the FMU's functions, so that another FMU needs no compilation. Everything here
+may also be called from ordinary Python.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
+from workbench.models.fmu import FMU, CoSimulation, References
+from workbench.models.jit import law
+
+compiled = law()
+inlined = law(inline=True)
+
+OK, REFUSED, SINGULAR = 0, 1, 2
+
+
+@intrinsic
+def _call(typing, address, words):  # type: ignore[no-untyped-def]
+    """Call a C function of whole numbers and doubles, which returns an int; arrays by address."""
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        given = []
+        for kind, value in zip(words.types, cgutils.unpack_tuple(builder, values[1]), strict=True):
+            if isinstance(kind, types.Array):
+                data = context.make_array(kind)(context, builder, value).data
+                given.append(builder.ptrtoint(data, context.get_value_type(types.intp)))
+            elif isinstance(kind, types.Float):
+                given.append(value)
+            else:
+                given.append(context.cast(builder, value, kind, types.intp))
+        function = ir.FunctionType(ir.IntType(32), [word.type for word in given])
+        return builder.call(builder.inttoptr(values[0], function.as_pointer()), given)
+
+    return types.int32(types.intp, words), generate
+
+
+class Instance(NamedTuple):
+    """One FMU instance, its functions and the buffers they read and write.
+
+    Attributes
+    ----------
+    address : of the FMU instance.
+    set_states, derivatives, set_real, get_real, directional : addresses of the FMU's functions.
+        FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is
+        not read.
+    fmi : 2 or 3 with directional derivatives, 0 for differences.
+    x, dx : (n,) states and their derivatives.
+    u, y : (m,) inputs, (l,) outputs.
+    jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
+    seed : (1,) one.
+    inputs, outputs, unknowns, knowns : value references of u and y, of columns and rows of the
+        Jacobian.
+    """
+
+    address: int
+    set_states: int
+    derivatives: int
+    set_real: int
+    get_real: int
+    directional: int
+    fmi: int
+    x: Vector
+    dx: Vector
+    u: Vector
+    y: Vector
+    jacobian: Matrix
+    seed: Vector
+    inputs: References
+    outputs: References
+    unknowns: References
+    knowns: References
+
+
+def instance(
+    fmu: FMU, inputs: Sequence[str], corrections: Sequence[str], outputs: Sequence[str]
+) -> Instance:
+    """Prepare an FMU for compiled loops; the FMU must outlive the result.
+
+    Parameters
+    ----------
+    inputs : measured.
+    corrections : inputs that an observer sets, (q,).
+    outputs : what estimates are made of, (l,).
+    """
+    n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
+    return Instance(
+        address=fmu.instance_address,
+        set_states=fmu.function_address("set_states"),
+        derivatives=fmu.function_address("derivatives"),
+        set_real=fmu.function_address("set"),
+        get_real=fmu.function_address("get"),
+        directional=fmu.function_address("directional"),
+        fmi=int(fmu.version[0]) if fmu.has_directional_derivatives else 0,
+        x=np.zeros(n),
+        dx=np.zeros(n),
+        u=np.zeros(m + q),
+        y=np.zeros(k),
+        jacobian=np.zeros((n + q, n + k)),
+        seed=np.ones(1),
+        inputs=fmu.variables([*inputs, *corrections]).references,
+        outputs=fmu.variables(outputs).references,
+        unknowns=np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
+        knowns=fmu.variables([*fmu.states, *corrections]).references,
+    )
+
+
+class Stepping(NamedTuple):
+    """One instance of a Co-Simulation FMU, as `Instance`.
+
+    Attributes
+    ----------
+    address, set_real, get_real, inputs, outputs, u, y : see `Instance`.
+    do_step : address of the FMU's function.
+    fmi : version, 2 or 3.
+    time : (1,) where the next step begins [s].
+    told, reached : (3,) and (1,) what FMI 3.0 says of a step.
+    """
+
+    address: int
+    set_real: int
+    get_real: int
+    do_step: int
+    fmi: int
+    inputs: References
+    outputs: References
+    u: Vector
+    y: Vector
+    time: Vector
+    told: NDArray[np.bool_]
+    reached: Vector
+
+
+def stepping(fmu: CoSimulation, inputs: Sequence[str], outputs: Sequence[str]) -> Stepping:
+    """Prepare an FMU that was started for compiled loops; it must outlive the result."""
+    return Stepping(
+        address=fmu.instance_address,
+        set_real=fmu.function_address("set"),
+        get_real=fmu.function_address("get"),
+        do_step=fmu.function_address("do_step"),
+        fmi=int(fmu.version[0]),
+        inputs=fmu.variables(inputs).references,
+        outputs=fmu.variables(outputs).references,
+        u=np.zeros(len(inputs)),
+        y=np.zeros(len(outputs)),
+        time=np.zeros(1),
+        told=np.zeros(3, np.bool_),
+        reached=np.zeros(1),
+    )
+
+
+@inlined
+def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
+    """Set `count` inputs from number `first` on to model.u; returns a status."""
+    references, values = model.inputs[first:], model.u[first:]
+    status = _call(model.set_real, (model.address, references, count, values, count))
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def set_states(model):  # type: ignore[no-untyped-def]
+    """Set the states to model.x; returns a status."""
+    n = model.x.size
+    status = _call(model.set_states, (model.address, model.x, n)) if n else 0
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def place(model):  # type: ignore[no-untyped-def]
+    """Put the FMU at the states model.x and the inputs model.u; returns a status."""
+    return set_inputs(model, 0, model.u.size) or set_states(model)
+
+
+@inlined
+def evaluate(model):  # type: ignore[no-untyped-def]
+    """Derivatives of the states into model.dx; returns a status."""
+    status = _call(model.derivatives, (model.address, model.dx, model.dx.size))
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def read(model):  # type: ignore[no-untyped-def]
+    """Outputs into model.y; returns a status."""
+    n = model.y.size
+    status = _call(model.get_real, (model.address, model.outputs, n, model.y, n))
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def do_step(model, h):  # type: ignore[no-untyped-def]
+    """Advance a Co-Simulation FMU by h [s] with inputs held; returns a status."""
+    t = model.time[0]
+    if model.fmi == 2:
+        status = _call(model.do_step, (model.address, t, h, 0))
+    else:
+        told, words = model.told, (model.address, t, h, 0)
+        status = _call(model.do_step, (*words, told, told[1:], told[2:], model.reached))
+    model.time[0] = t + h
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def differentiate(model, row, count):  # type: ignore[no-untyped-def]
+    """One row of the Jacobian, by state or correction `row`, into model.jacobian; a status.
+
+    Where the FMU has no directional derivatives, all rows are written; see `linearise`.
+    """
+    if model.fmi == 0:
+        return _differences(model)
+    known = model.knowns[row:]
+    return direction(model, model.unknowns, count, known, 1, model.seed, model.jacobian[row])
+
+
+@inlined
+def direction(model, unknowns, count, knowns, number, seeds, out):  # type: ignore[no-untyped-def]
+    """Derivatives of the first `count` unknowns along `number` knowns into `out`; a status."""
+    if model.fmi == 2:
+        words = model.address, unknowns, count, knowns, number, seeds, out
+        status = _call(model.directional, words)
+    else:
+        more = model.address, unknowns, count, knowns, number, seeds, number, out, count
+        status = _call(model.directional, more)
+    return REFUSED if status > 1 else OK
+
+
+@inlined
+def linearise(model, count):  # type: ignore[no-untyped-def]
+    """Jacobian at the present point into model.jacobian; returns a status.
+
+    The first `count` columns are written: n for the derivatives, n + l for the outputs too.
+    Afterwards the FMU is where it was; model.dx and model.y are undefined.
+    """
+    if model.fmi == 0:
+        return _differences(model)
+    for j in range(model.jacobian.shape[0]):
+        if differentiate(model, j, count):
+            return REFUSED
+    return OK
+
+
+@compiled
+def _differences(model):  # type: ignore[no-untyped-def]
+    """Central differences; the step balances truncation and rounding (cube root of eps)."""
+    rows, columns = model.jacobian.shape
+    n, m = model.x.size, model.u.size
+    first = m - (rows - n)  # of the corrections
+    for j in range(rows):
+        centre = model.x[j] if j < n else model.u[first + j - n]
+        step = 6e-6 * max(abs(centre), 1e-3)
+        for side in (1.0, -1.0, 0.0):
+            if j < n:
+                model.x[j] = centre + side * step
+            else:
+                model.u[first + j - n] = centre + side * step
+            if place(model):
+                return REFUSED
+            if side == 0.0:
+                continue
+            if evaluate(model) or read(model):
+                return REFUSED
+            for i in range(columns):
+                value = model.dx[i] if i < n else model.y[i - n]
+                if side > 0.0:
+                    model.jacobian[j, i] = value
+                else:
+                    model.jacobian[j, i] = (model.jacobian[j, i] - value) / (2.0 * step)
+    return OK
+
+
+@inlined
+def implicit(model, h, system):  # type: ignore[no-untyped-def]
+    """Write I - h A, of an implicit step, to the first columns; after `linearise`."""
+    n = model.x.size
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = -h * model.jacobian[j, i]
+        system[i, i] += 1.0
+
+
+@compiled
+def solve(a):  # type: ignore[no-untyped-def]
+    """Solve a linear system in place; returns a status.
+
+    Gaussian elimination with partial pivoting; for the few unknowns of an observer it is several
+    times faster than a call into LAPACK. It works along rows, which compilers turn into operations
+    on several numbers at once, and leaves out factors that are zero.
+
+    Parameters
+    ----------
+    a : (n, n + k) the matrix, which is destroyed, and right-hand sides, which become solutions.
+    """
+    return solve_part(a, a.shape[0], a.shape[1])
+
+
+@compiled
+def solve_part(a, n, columns):  # type: ignore[no-untyped-def]
+    """The same for the first n rows and `columns` columns of an array."""
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if not abs(a[pivot, k]) > 0.0:
+            return SINGULAR
+        if pivot != k:
+            for j in range(columns):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] * inverse
+            if factor != 0.0:
+                for j in range(columns):
+                    a[i, j] -= factor * a[k, j]
+    for k in range(n - 1, -1, -1):
+        for i in range(k + 1, n):
+            factor = a[k, i]
+            if factor != 0.0:
+                for j in range(n, columns):
+                    a[k, j] -= factor * a[i, j]
+        for j in range(n, columns):
+            a[k, j] /= a[k, k]
+    return OK
+
+
+def given(values: Matrix) -> Matrix:
+    """What a compiled loop reads of its caller, of one type, so that it is compiled once."""
+    view = np.ascontiguousarray(values).view()
+    view.flags.writeable = False
+    return view
+
+
+def checked(status: int, fmu: FMU) -> None:
+    """Turn a status of a compiled loop into an exception.
+
+    Raises
+    ------
+    FMUError
+        If the FMU refused a call, with what it logged; or an implicit step had no solution.
+    """
+    if status == REFUSED:
+        raise fmu.refusal("a call of the observer's loop", 3)
+    if status == SINGULAR:
+        raise FMUError(f"{fmu.path.name}: the implicit step has no solution at this point")

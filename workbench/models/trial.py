@@ -1,0 +1,240 @@
+"""Whether an FMU can be let into a process at all: its calls are tried in one of their own.
+
+An FMU is foreign code, which may end, stop or fill the process that calls it. One that was compiled
+here is taken as it is; any other is tried before it is loaded, and remembered by its hash.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from workbench.errors import FMUError, InputError
+from workbench.models import fmu_cache, trial_calls
+from workbench.models.archive import unpack
+from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, Description
+from workbench.runtime.files import scratch_folder
+from workbench.runtime.resources import fmus
+
+
+class ContainedError(FMUError):
+    """An FMU ended the process it was tried in; the message says how, when and in which call."""
+
+
+class NoAnswerError(FMUError):
+    """An FMU did not answer in time, while it used little of the processor: nothing is known."""
+
+
+_GRACE = 5.0  # [s] beyond the limit, for the process that watches it to say so
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an FMU may use while it is tried.
+
+    Attributes
+    ----------
+    processor : time of the processor in one call [s]. Calls take microseconds, a start seconds.
+    answer : time until the end of all [s], long enough for a machine that has other work to do.
+    memory : that can be written [bytes]; models hold kilobytes, runtimes that they bring megabytes.
+    file : the largest file that is written [bytes].
+    """
+
+    processor: float = 3.0
+    answer: float = 10.0
+    memory: int = 2 << 30
+    file: int = 100 << 20
+
+    def __str__(self) -> str:
+        return (
+            f"{self.processor:g} s of processor time in one call, {self.answer:g} s in all, "
+            f"{self.memory >> 20} MB of memory, files of {self.file >> 20} MB"
+        )
+
+
+_NAMES = {"processor": 1, "answer": 1, "memory": 1 << 20, "file": 1 << 20}  # and their units
+
+
+def usual_limits() -> Limits:
+    """Limits that hold unless others are given: WORKBENCH_PROOF="processor=20 answer=60".
+
+    The variable of the environment names times in seconds and sizes in MB.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    text = os.environ.get("WORKBENCH_PROOF", "")
+    given: dict[str, Any] = {}
+    for word in text.split():
+        name, _, number = word.partition("=")
+        try:
+            unit = _NAMES[name]
+            value = float(number) * unit
+            given[name] = value if unit == 1 else int(value)
+        except (KeyError, ValueError, OverflowError):
+            value = 0.0
+        if not 0.0 < value < 2.0**62:
+            raise InputError(
+                where="environment, WORKBENCH_PROOF",
+                found=f"'{word[:80]}'",
+                expected=f"some of {', '.join(_NAMES)}, each =NUMBER above 0 (s or MB)",
+                remedy="correct it, for instance to 'processor=20 answer=60'",
+            )
+    return Limits(**given)
+
+
+def prove(description: Description, interface: str, folder: Path) -> None:
+    """Try an FMU in a process of its own, unless it is known to be sound.
+
+    Parameters
+    ----------
+    description : of the FMU.
+    interface : MODEL_EXCHANGE or CO_SIMULATION.
+    folder : that it is unpacked in.
+
+    Raises
+    ------
+    InputError
+        If its library cannot be loaded.
+    ContainedError
+        If it ends the process, or does not return from a call.
+    NoAnswerError
+        If it does not answer.
+    """
+    if description.sha256 in _packaged() or fmu_cache.is_known(*_marks(description, interface)):
+        return
+    attempt(description, interface, folder, usual_limits())
+
+
+@contextmanager
+def unpacked(description: Description, interface: str) -> Iterator[Path]:
+    """Folder with what of an FMU runs here, for as long as the context lasts."""
+    with scratch_folder() as scratch:
+        folder = Path(scratch)
+        unpack(description.path, folder, str(PurePosixPath(description.library(interface)).parent))
+        yield folder
+
+
+def _marks(description: Description, interface: str) -> tuple[str, str]:
+    """Names under which an FMU is remembered, that was built here, and that bore its calls."""
+    # Co-Simulation brings a solver, which Model Exchange does not run.
+    kind = "cs" if interface == CO_SIMULATION else "me"
+    return description.sha256, f"{description.sha256}-{kind}"
+
+
+@cache
+def _packaged() -> frozenset[str]:
+    """Hashes of the FMUs that come with the workbench."""
+    manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
+    return frozenset(one["sha256"] for one in manifest["fmus"].values())
+
+
+def attempt(description: Description, interface: str, folder: Path, limits: Limits) -> str:
+    """Try an FMU in a process of its own, and remember it if it bears that; see `prove`.
+
+    Returns
+    -------
+    The call that the FMU refused, which ended the trial; empty if it bore them all.
+    """
+    task = json.dumps(_task(description, interface, folder, limits)).encode()
+    with subprocess.Popen(
+        [sys.executable, "-I", "-S", trial_calls.__file__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        cwd=folder,
+        start_new_session=True,
+    ) as process:
+        try:
+            report, _ = process.communicate(task, limits.answer + _GRACE)
+            late = False
+        except subprocess.TimeoutExpired as error:
+            report, late = error.stdout or b"", True
+        finally:
+            process.kill()
+            process.stdout.close()  # type: ignore[union-attr]  # a pipe, which others may hold, too
+    lines = [json.loads(line) for line in report.splitlines() if line.endswith(b"}")]
+    end: dict[str, Any] = {"status": process.returncode, "used": 0.0, "late": late}
+    if lines and "status" in lines[-1]:
+        end = lines.pop()
+    last = lines[-1] if lines else {"call": "the start of its process"}
+    where = description.path.name
+    if end["late"]:
+        raise NoAnswerError(
+            f"{where}: did not answer from {last['call']} within {limits.answer:g} s, of which it "
+            f"used the processor for {end['used']:.1f} s, so that nothing is known of it; allow "
+            f'more with WORKBENCH_PROOF="answer={10 * limits.answer:g}"'
+        )
+    if last["call"] == "not loaded":
+        raise InputError(
+            where=str(description.path),
+            found=f"a binary that cannot be loaded ({last['error'][:400]})",
+            expected="one that this machine can load, with the functions of FMI",
+            remedy="export the model again for this machine; see 'workbench fmu info'",
+        )
+    if last["call"] != "end":
+        raise ContainedError(
+            f"{where}: {_ending(end['status'], last['call'], end['used'])}. It was tried in a "
+            f"process of its own, with limits of {limits} (WORKBENCH_PROOF changes them)"
+        )
+    fmu_cache.remember(_marks(description, interface)[1])
+    return str(last["refused"])
+
+
+def _ending(status: int, call: str, used: float) -> str:
+    """Say how the process ended."""
+    if os.name == "posix" and status == -signal.SIGXCPU:
+        return f"did not return from {call} within {used:.1f} s of processor time"
+    if status < 0:
+        name = signal.Signals(-status).name
+        return f"crashed with {name} in {call} after {used:.2f} s of processor time"
+    return f"ended the process with exit status {status} in {call} after {used:.2f} s"
+
+
+def _task(description: Description, interface: str, folder: Path, limits: Limits) -> dict[str, Any]:
+    """What `trial_calls` is asked to do."""
+    offered = description.interfaces[interface]
+    references = {v.name: v.reference for v in description.variables if v.real}
+
+    def known(names: tuple[str, ...]) -> list[int]:
+        return [references[name] for name in names if name in references]
+
+    exchange = interface == MODEL_EXCHANGE
+    inputs, outputs = known(description.names("input")), known(description.names("output"))
+    states, rates = known(description.states), known(description.rates)
+    begin = [
+        (v.reference, float(v.start))
+        for v in description.variables
+        if v.real and v.start is not None and (v.causality == "input" or v.reference in states)
+    ]
+    resources = folder / "resources"
+    wanted = [(rows, columns) for rows in (rates, outputs) for columns in (states, inputs)]
+    return {
+        "library": str((folder / description.library(interface)).resolve()),
+        "resources": resources.as_uri() if description.version == "2.0" else f"{resources}{os.sep}",
+        "version": description.version,
+        "identifier": offered.identifier,
+        "token": description.token,
+        "exchange": exchange,
+        "states": len(description.states),
+        "reals": list(references.values()),
+        "inputs": inputs,
+        "start": begin,
+        "directional": [one for one in wanted if all(one)]
+        if exchange and offered.directional_derivatives
+        else [],
+        "saves": offered.saves_state,
+        "processor": limits.processor,
+        "answer": limits.answer,
+        "memory": limits.memory,
+        "file": limits.file,
+    }

@@ -1,0 +1,1 @@
+"""One file an estimator; a new one is found by itself."""

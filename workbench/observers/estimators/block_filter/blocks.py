@@ -1,0 +1,140 @@
+"""Blocks of unknowns that only unknowns which they share couple, and how a model has them."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from workbench.models.fmu import FMU, References
+from workbench.observers.layout import Layout
+from workbench.system.system import System
+
+# An approximation must be worth it: operations of blocks, of those of all unknowns at once.
+_WORTH = 0.5
+
+Indices = NDArray[np.intp]
+
+
+class Blocks(NamedTuple):
+    """States and estimated quantities (the unknowns of a filter) by blocks, the shared ones last.
+
+    Attributes
+    ----------
+    first : (N + 2,) where in `order` block i begins; the shared unknowns begin at first[N].
+    states : (N + 1,) how many of them are states, which come first.
+    order : (n + q,) number of an unknown among states and quantities.
+    rates : (N, k) value references of the rates of a block's states, then of the shared ones.
+    home : (l,) block of each output that is fed; N: it depends on shared unknowns alone.
+    place : (l,) where in `order` an output that is a state stands, -1: it is none.
+    """
+
+    first: Indices
+    states: Indices
+    order: Indices
+    rates: References
+    home: Indices
+    place: Indices
+
+
+def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
+    """Divide the unknowns of a model by its model structure; one block if that says nothing.
+
+    What an output that is no state depends on stays in one block.
+    """
+    n, said = len(fmu.states), fmu.description.dependencies
+    names = [*fmu.states, *system.corrections]
+    number = {name: i for i, name in enumerate(names)}
+
+    def knowns(name: str) -> list[int]:
+        return [number[one] for one in said.get(name, names) if one in number]
+
+    rates = [knowns(name) for name in fmu.description.rates]
+    fed = {j: knowns(one.name) for j, one in enumerate(system.outputs) if layout.seen[j] < 0}
+    links = [(i, k) for i, row in enumerate(rates) for k in row]
+    links += [(len(names) + j, k) for j, row in enumerate(fed.values()) for k in row]
+    found, shared = divide(n, len(names), len(fed), links)
+    parts = [*found, shared]
+    order = np.array([k for part in parts for k in part], np.intp)
+    block = {k: i for i, part in enumerate(parts) for k in part}
+    where = {int(k): i for i, k in enumerate(order)}
+    states = [sum(k < n for k in part) for part in parts]
+    asked = [
+        [k for k in part[:count] + shared[: states[-1]]]
+        for part, count in zip(found, states, strict=False)
+    ]
+    references = np.zeros((len(found), max(map(len, asked), default=0)), np.uint32)
+    for i, row in enumerate(asked):
+        references[i, : len(row)] = fmu.rate_references[row]
+    return Blocks(
+        first=np.array([0, *accumulate(map(len, parts))], np.intp),
+        states=np.array(states, np.intp),
+        order=order,
+        rates=references,
+        home=np.array(
+            [
+                min((block[k] for k in fed[j]), default=len(found)) if j in fed else block[int(at)]
+                for j, at in enumerate(layout.seen)
+            ],
+            np.intp,
+        ),
+        place=np.array([where[int(at)] if at >= 0 else -1 for at in layout.seen], np.intp),
+    )
+
+
+def divide(
+    states: int, size: int, others: int, links: Iterable[tuple[int, int]]
+) -> tuple[list[list[int]], list[int]]:
+    """Like blocks of `size` unknowns, and those that they share, so that operations are few.
+
+    One unknown after the other is shared, the one with most neighbours first. A block of m unknowns
+    beside s shared ones takes (m + s)^3 operations. All are one block unless that saves half.
+
+    Parameters
+    ----------
+    states : how many of the unknowns are states, the first ones.
+    others : nodes beyond the unknowns which keep those together that they are linked with.
+    links : pairs of nodes.
+    """
+
+    def kind(one: Sequence[int]) -> tuple[int, int]:
+        return sum(k < states for k in one), len(one)
+
+    adjacent = np.zeros((size + others, size + others), bool)
+    for a, b in links:
+        adjacent[a, b] = adjacent[b, a] = a != b
+    left, shared = np.ones(size + others, bool), list[int]()
+    fewest, best = _WORTH * size**3, ([list(range(size))], list[int]())
+    while len(shared) < size - 1 and (len(shared) + 1) ** 3 < fewest:
+        neighbours = np.where(left, adjacent[:, left].sum(axis=1), -1)
+        shared.append(int(neighbours[:size].argmax()))
+        left[shared[-1]] = False
+        nodes = np.flatnonzero(left)
+        found = _components(adjacent[np.ix_(nodes, nodes)], nodes, size)
+        # Few unlike ones are shared: what stands between blocks is known of like ones.
+        most = Counter(map(kind, found)).most_common(1)[0][0]
+        alike = [one for one in found if kind(one) == most]
+        rest = shared + [k for one in found if kind(one) != most for k in one]
+        operations = sum((len(one) + len(rest)) ** 3 for one in alike)
+        if operations < fewest:
+            fewest, best = operations, (alike, sorted(rest))
+    return best
+
+
+def _components(adjacent: NDArray[np.bool_], nodes: Indices, size: int) -> list[list[int]]:
+    """Sets of nodes below `size` that are linked with each other, through any nodes."""
+    _, label = connected_components(adjacent, directed=False)
+    found: dict[int, list[int]] = {}
+    for node, one in zip(nodes, label, strict=True):
+        if node < size:
+            found.setdefault(int(one), []).append(int(node))
+    return list(found.values())
+
+
+def widths(parts: Blocks) -> tuple[int, int]:
+    """Most unknowns and most states that a block has."""
+    sizes: Sequence[int] = np.diff(parts.first)[:-1].tolist()
+    return max(sizes, default=0), max(parts.states[:-1].tolist(), default=0)

@@ -1,0 +1,294 @@
+"""A Kalman filter of like blocks, at a cost that grows with their number and not with its cube.
+
+The Jacobian of a machine that is made of many like parts is an arrow: each part depends on its own
+unknowns and on some that all share, such as the axles of a train on its speed. The covariance of
+the extended Kalman filter is none, as past values of what is shared, known only so well, tie the
+parts to each other. After each step it is replaced by one in which
+
+- the shared unknowns, and each block together with them, have the covariance that the step gives;
+- what two blocks have in common beyond the shared unknowns is the same for all pairs, in units of
+  a root of their own covariances: the mean over the pairs. It is that of a common factor.
+
+Given the shared unknowns and the factor, blocks are independent: a sample is taken exactly, and a
+step is exact but for the mean over pairs; where blocks are alike, that is exact, too. Without the
+factor, the nearest density (Kullback and Leibler) in which blocks are independent given the shared
+unknowns, each step would forget that the same error stands in all blocks, such as one of the speed
+in all radii, and the filter would count the same information again with each sample.
+
+Sources: S. L. Lauritzen, Graphical Models, Oxford 1996 (blocks that are independent given what they
+share); P. S. Maybeck, Stochastic Models, Estimation and Control 2, Academic Press 1982, chapter 12
+(densities of an assumed form).
+"""
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.models.native import compiled, read
+from workbench.observers.estimators.block_filter.block_sample import (
+    absorb,
+    fed_deviation,
+    reported_deviation,
+    scatter,
+)
+from workbench.observers.estimators.block_filter.block_slopes import slope, slopes_of_fed
+from workbench.observers.estimators.block_filter.block_step import predict
+from workbench.observers.estimators.block_filter.blocks import Blocks, blocks, widths
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter, FilterSettings, variance
+from workbench.observers.gains import Gains
+from workbench.observers.layout import Layout, clip, fading, measure, put, report
+from workbench.system.system import System
+
+
+class ArrowSettings(NamedTuple):
+    """Settings of the extended Kalman filter, and how its unknowns fall into blocks."""
+
+    filter: FilterSettings
+    blocks: Blocks
+
+
+class ArrowMemory(NamedTuple):
+    """What the law remembers, and its work space.
+
+    With b unknowns in blocks of at most m, of which k are states, s shared ones, n states in all;
+    w = s + m are the shared unknowns and the factor, by each unknown of a block.
+
+    Attributes
+    ----------
+    z : (n + q,) states and deviations of quantities.
+    P : (w, w) covariance of the shared unknowns, and of the factor, of which no variance need be
+        positive: what blocks have in common whose sum is known is negative.
+    G : (b, w) regression of a block's unknowns on the shared ones and the factor.
+    C : (b, m) covariance of a block given these, in rows of its unknowns.
+    slopes : (b, k + s) derivatives of the rates of a block and of the shared ones, by its unknowns.
+    common : (s, n) of all rates, by the shared unknowns.
+    inverse : (b, m) of a block's part of an implicit step, in rows of its states.
+    passed, tied : (b, s) what the shared unknowns take from a block in a step, and how its unknowns
+        vary with them.
+    system : (s, 2 s + 1) of the step of the shared unknowns, with right-hand sides.
+    step, after : (s, s) that step without them, and the covariance after it.
+    kept, moved : (s, w) what a step leaves of the shared unknowns; times their covariance.
+    known : (s, s) covariance of what a step makes the shared unknowns of, then its inverse.
+    along, against : (2, m, w) and (2, m, s) sums over blocks; between: (m, m) see `liken`.
+    block, left, weighed : (m + k, m), (m, w), (m, w) work space of a block.
+    solved : (k, k + m) step of a block with its right-hand sides.
+    change : (n + q + m,) of the mean, in the order of blocks, and of the factor.
+    column, row, told : (m,), (w,), (w,) work space of an output.
+    measured : (l, m + s) derivatives of the outputs that are no states.
+    reported : (n + q, r) derivatives of reported outputs, in the order of blocks.
+    """
+
+    z: Vector
+    P: Matrix
+    G: Matrix
+    C: Matrix
+    slopes: Matrix
+    common: Matrix
+    inverse: Matrix
+    passed: Matrix
+    tied: Matrix
+    system: Matrix
+    step: Matrix
+    kept: Matrix
+    moved: Matrix
+    known: Matrix
+    after: Matrix
+    along: Any
+    against: Any
+    between: Matrix
+    block: Matrix
+    left: Matrix
+    weighed: Matrix
+    solved: Matrix
+    change: Vector
+    column: Vector
+    row: Vector
+    told: Vector
+    measured: Matrix
+    reported: Matrix
+
+
+@compiled
+def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
+    """Limit the quantities, report the estimate and its standard deviations; returns a status."""
+    z, parts, layout, n = memory.z, settings.blocks, settings.filter.layout, model.x.size
+    q, outputs = layout.nominal.size, layout.seen.size
+    for i in range(q):
+        z[n + i] = clip(z[n + i], layout.low[i], layout.high[i])
+    status = put(model, z) or slopes_of_fed(model, settings, memory)
+    for k in range(z.size):
+        for r in range(layout.reported):
+            status = status or slope(model, n + r, parts.order[k], memory.reported[k, r:])
+    status = status or report(model, layout, row)
+    first = outputs + 2 * q + layout.reported  # of the standard deviations
+    for j in range(outputs):
+        row[first + j] = fed_deviation(settings, memory, j)
+    for i in range(parts.first.size - 1):
+        for k in range(parts.first[i] + parts.states[i], parts.first[i + 1]):
+            at = parts.order[k] - n
+            doubt = layout.doubt[at] * (layout.nominal[at] + z[n + at])
+            known_to = np.sqrt(scatter(memory, parts.first[i], k) + doubt * doubt)
+            row[first + outputs + at] = row[first + outputs + q + at] = known_to
+    for r in range(layout.reported):
+        row[first + outputs + 2 * q + r] = reported_deviation(settings, memory, r)
+    return status
+
+
+@compiled
+def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
+    """Covariance of the first sample; returns a status."""
+    parts, fade = settings.blocks, fading(settings.filter.layout, y)
+    count = parts.first.size - 2
+    for j in range(y.size):
+        place, i = parts.place[j], parts.home[j]
+        if place >= 0 and not np.isnan(y[j]):
+            known = variance(settings.filter, fade, y, j)
+            own = place - parts.first[i]
+            if i == count:
+                memory.P[own, own] = known
+            else:
+                memory.C[place, own] = known
+    return measure(model, u)
+
+
+@compiled
+def arrow_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Predict by the linearised model, correct by the sample."""
+    if h == 0.0:
+        status = begin(model, settings, memory, u, y)
+        return status or finish(model, settings, memory, row)
+    layout = settings.filter.layout
+    fade = fading(layout, y)
+    status = measure(model, u) or predict(model, settings, memory, h, fade)
+    if layout.columns > model.x.size:
+        status = status or put(model, memory.z) or read(model)
+        status = status or slopes_of_fed(model, settings, memory)
+    if status:
+        return status
+    absorb(model, settings, memory, y, fade, row)
+    return finish(model, settings, memory, row)
+
+
+@compiled
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = arrow_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class BlockKalmanFilter(ExtendedKalmanFilter):
+    """Extended Kalman filter whose cost grows with the number of blocks that a model is made of.
+
+    Blocks and what they share follow from the model structure of the FMU, see `blocks`. Step and
+    correction are those of the extended Kalman filter, but for the covariance of two blocks. On a
+    model without like blocks, or whose structure is not said, it is the extended Kalman filter.
+
+    Parameters
+    ----------
+    fmu, gains : see ExtendedKalmanFilter.
+
+    Raises
+    ------
+    InputError
+        If levels are to be learnt of a model that has blocks.
+    """
+
+    name = "arrow"
+    label = "block Kalman filter"
+    rank = 42
+    standard = False
+    tunable = False
+    tuned_as = ExtendedKalmanFilter.name
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        self._blocks = blocks(fmu, self.system, self._layout)
+        if self._blocks.first.size > 3:
+            self._divide()
+
+    def _divide(self) -> None:
+        """Take the law of blocks, and memory for it."""
+        if np.isfinite(self.system.learns):
+            raise InputError(
+                where=f"estimator {self.name}, system {self.system.name}",
+                found="noise levels that are to be learnt (`learns`), of a model of blocks",
+                expected="levels that are held, as they are learnt of all unknowns at once",
+                remedy="leave 'learns' out of the system file, or use the estimator ekf",
+            )
+        self._law, self._loop = arrow_law, _loop
+        self._settings = ArrowSettings(self._settings, self._blocks)
+        self._memory = _memory(self._blocks, self._layout, len(self.fmu.states))
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        if not isinstance(self._memory, ArrowMemory):
+            super()._begin(u, y)
+            return
+        memory, known = self._memory, self._settings.filter.spread[self._blocks.order] ** 2
+        memory.z[:] = self._start_values()
+        memory.G[:] = memory.C[:] = 0.0
+        for begin, end in pairwise(self._blocks.first[:-1]):
+            memory.C[begin:end, : end - begin] = np.diag(known[begin:end])
+        memory.P[:] = 0.0
+        shared = known[self._blocks.first[-2] :]
+        memory.P[: shared.size, : shared.size] = np.diag(shared)
+
+    @property
+    def covariance(self) -> Matrix:
+        """See ExtendedKalmanFilter; of two blocks, by what they share."""
+        if not isinstance(self._memory, ArrowMemory):
+            return super().covariance
+        n = len(self.fmu.states)
+        return self._joint()[n:, n:]
+
+    def _joint(self) -> Matrix:
+        """Covariance of states and quantities, (n + q, n + q)."""
+        memory, order = self._memory, self._blocks.order
+        gain = np.concatenate([memory.G, np.eye(len(memory.known), len(memory.P))])
+        known = np.zeros((order.size, order.size))
+        known[np.ix_(order, order)] = gain @ memory.P @ gain.T
+        for begin, end in pairwise(self._blocks.first[:-1]):
+            own = order[begin:end]
+            known[np.ix_(own, own)] += memory.C[begin:end, : end - begin]
+        return known
+
+
+def _memory(parts: Blocks, layout: Layout, n: int) -> ArrowMemory:
+    """Memory and work space of the law, in which everything is zero."""
+    b, size, (m, k) = int(parts.first[-2]), parts.order.size, widths(parts)
+    s, outputs = size - b, layout.seen.size
+    return ArrowMemory(
+        z=np.zeros(size),
+        P=np.zeros((s + m, s + m)),
+        G=np.zeros((b, s + m)),
+        C=np.zeros((b, m)),
+        slopes=np.zeros((b, k + s)),
+        common=np.zeros((s, n)),
+        inverse=np.zeros((b, m)),
+        passed=np.zeros((b, s)),
+        tied=np.zeros((b, s)),
+        system=np.zeros((s, 2 * s + 1)),
+        step=np.zeros((s, s)),
+        kept=np.zeros((s, s + m)),
+        moved=np.zeros((s, s + m)),
+        known=np.zeros((s, s)),
+        after=np.zeros((s, s)),
+        along=np.zeros((2, m, s + m)),
+        against=np.zeros((2, m, s)),
+        between=np.zeros((m, m)),
+        block=np.zeros((m + k, m)),
+        left=np.zeros((m, s + m)),
+        weighed=np.zeros((m, s + m)),
+        solved=np.zeros((k, k + m)),
+        change=np.zeros(size + m),
+        column=np.zeros(m),
+        row=np.zeros(s + m),
+        told=np.zeros(s + m),
+        measured=np.zeros((outputs, m + s)),
+        reported=np.zeros((size, layout.reported)),
+    )

@@ -1,0 +1,375 @@
+"""The disturbance observer of Schwarz, Brembeck, Heckmann (2018), equations (8) to (10).
+
+The states of the model are joined by the deviations of the estimated quantities, which decay with
+rates T; all are corrected by L [dy; integral of dy], dy = y - y_hat.
+
+Two factors of the rows of L are ours, because recordings also rest: authority (a quantity is
+corrected in proportion to the effect it has) and fading (where measured outputs are noise).
+
+The paper leaves a physical model of g_D open: `target` is where deviations decay to, and a method
+that has such a model moves it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, solve_continuous_are
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.models.native import compiled, evaluate, inlined, linearise, solve
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import (
+    Gains,
+    SearchSpace,
+    feedback_meanings,
+    feedback_space,
+    matrix_names,
+)
+from workbench.observers.layout import (
+    Layout,
+    add_slope,
+    authority,
+    clip,
+    correct,
+    explained,
+    fading,
+    lag,
+    measure,
+    output,
+    report,
+    stick,
+)
+from workbench.observers.operating import (
+    LinearModel,
+    corrected_states,
+    linearised,
+    loops,
+    swinging_states,
+    walks,
+)
+from workbench.system.system import System
+from workbench.system.units import quotient
+
+
+class Settings(NamedTuple):
+    """What the law is given.
+
+    Attributes
+    ----------
+    layout : see Layout.
+    states : (s,) indices of the states that are stepped together: corrected ones, and those that
+        swing.
+    places : (n + q,) index of states and corrections among the unknowns, -1 for other states.
+    L : (s + q, 2 l) gains, zero for states that are not corrected.
+    decay : (q,) rates at which deviations decay [1/s], negative.
+    effect : (q,) d(rate)/d(quantity) from which on a quantity has full authority.
+    """
+
+    layout: Layout
+    states: NDArray[np.intp]
+    places: NDArray[np.intp]
+    L: Matrix
+    decay: Vector
+    effect: Vector
+
+
+class Memory(NamedTuple):
+    """What the law remembers.
+
+    Attributes
+    ----------
+    z : (q,) deviations of the estimated quantities; integral : (l,) of dy.
+    target, drift : (q,) what deviations decay to, and by how much it moved in this step.
+    system : (s + q, s + q + 1) of the step, with its right-hand side.
+    others, innovation : work space.
+    """
+
+    z: Vector
+    integral: Vector
+    target: Vector
+    drift: Vector
+    system: Matrix
+    others: Vector
+    innovation: Vector
+
+
+@inlined
+def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """One linearly implicit Euler step of equation (9); other states each by themselves."""
+    layout, states, z = settings.layout, settings.states, memory.z
+    system, innovation = memory.system, memory.innovation
+    n, s, q, outputs = model.x.size, states.size, z.size, y.size
+    change = system[:, s + q]
+    status = measure(model, u)
+    if h > 0.0:
+        status = status or evaluate(model)
+        for i in range(n):
+            memory.others[i] = h * model.dx[i]
+        for i in range(s):
+            change[i] = h * model.dx[states[i]]
+        for i in range(q):
+            decay = settings.decay[i] * (z[i] - memory.target[i])
+            change[s + i] = h * decay + memory.drift[i]
+        for j in range(outputs):
+            innovation[j] = y[j] - output(model, layout, j)
+        status = status or linearise(model, layout.columns)
+        fade = fading(layout, y)
+        for i in range(s + q):
+            equation, total, share = system[i], change[i], fade
+            if i < s:
+                for k in range(s):
+                    equation[k] = -h * model.jacobian[states[k], states[i]]
+                for k in range(q):
+                    equation[s + k] = -h * model.jacobian[n + k, states[i]]
+                equation[i] += 1.0
+            else:
+                share *= authority(model, layout, settings.effect, i - s)
+                for k in range(s + q):
+                    equation[k] = 0.0
+                equation[i] = 1.0 - h * settings.decay[i - s]
+            for j in range(outputs):
+                # The integral at the end of the step is part of the implicit equation.
+                direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
+                gain = h * (direct + h * integrated)
+                total += gain * innovation[j] + h * integrated * memory.integral[j]
+                add_slope(model, layout, j, gain, settings.places, equation)
+            change[i] = total
+        status = status or solve(system)
+        if status:
+            return status
+        for j in range(outputs):
+            left = innovation[j] - explained(model, layout, j, settings.places, change)
+            memory.integral[j] += h * left
+        before = lag(layout, model.x)
+        for i in range(n):
+            if settings.places[i] < 0:
+                model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
+        for i in range(s):
+            model.x[states[i]] += change[i]
+        for i in range(q):
+            z[i] = clip(z[i] + change[s + i], layout.low[i], layout.high[i])
+        stick(layout, model.x, before)
+    return status or correct(model, z) or report(model, layout, row)
+
+
+@compiled
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class DisturbanceObserver(Estimator):
+    """A model with deviations of quantities as states, corrected by measured outputs.
+
+    A row of L that acts on a quantity is multiplied by its authority: its effect on the rate of a
+    state over the effect at the design point, limited to -1..1. It vanishes where the quantity has
+    no effect, and has the sign of that effect.
+
+    The step is linearly implicit in states and quantities, feedback included, so that any gain
+    keeps a stable step; so are states that are not corrected but swing with each other. States
+    that an extension adds, such as a temperature, step each by themselves, implicit in their own
+    value. Quantities are kept within their physical range.
+
+    Parameters
+    ----------
+    fmu : observer model, also extended by effects with states of their own.
+    gains : L, (s + q, 2 l), rows states and quantities, columns dy and its integral; T, (q,);
+        design: effect, (q,).
+    """
+
+    name = "disturbance_observer"
+    label = "disturbance observer"
+    rank = 20
+    meaning = (
+        "L: rows states, then corrections of quantities; columns dy, integral of dy. T [1/s]: "
+        "rate at which a deviation decays"
+    )
+    sticks = True
+    _law = staticmethod(law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        corrected = corrected_states(fmu, system)
+        names = (*corrected, *swinging_states(fmu, system))
+        s, q, outputs = len(names), len(system.estimated), len(system.outputs)
+        L = np.zeros((s + q, 2 * outputs))
+        given = [*range(len(corrected)), *range(s, s + q)]
+        L[given] = gains.values[: gains.values.size - q].reshape(len(given), 2 * outputs)
+        self._settings = Settings(
+            layout=self._layout,
+            states=np.array([fmu.states.index(name) for name in names], np.intp),
+            places=np.array(
+                [
+                    *(names.index(name) if name in names else -1 for name in fmu.states),
+                    *range(s, s + q),
+                ],
+                np.intp,
+            ),
+            L=L,
+            decay=np.ascontiguousarray(gains.values[gains.values.size - q :]),
+            effect=np.ascontiguousarray(gains.design["effect"]),
+        )
+        self._memory = Memory(
+            z=np.zeros(q),
+            integral=np.zeros(outputs),
+            target=np.zeros(q),
+            drift=np.zeros(q),
+            system=np.zeros((s + q, s + q + 1)),
+            others=np.zeros(len(fmu.states)),
+            innovation=np.zeros(outputs),
+        )
+
+    def _arguments(self) -> tuple[Any, Any]:
+        return self._settings, self._memory
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        memory = self._memory
+        for values in (memory.z, memory.integral, memory.target, memory.drift):
+            values[:] = 0.0
+        self._model.x[:] = self.fmu.get_states()
+
+    @classmethod
+    def acts_on(cls, fmu: FMU, system: System) -> tuple[str, ...]:
+        """See Estimator."""
+        return corrected_states(fmu, system)
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        states = corrected_states(fmu, system)
+        rows = {name: fmu.units.get(name, "1") for name in states}
+        rows |= {one.correction: one.unit for one in system.estimated}
+        rates = {f"rate of {name}": quotient(unit, "s") for name, unit in rows.items()}
+        told = feedback_meanings(rates, {one.name: one.unit for one in system.outputs})
+        decays = {
+            f"T_{one.name}": (f"rate at which {one.correction} decays", "1/s")
+            for one in system.estimated
+        }
+        return told | decays
+
+    @classmethod
+    def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:
+        """Gains of given matrices; see `DisturbanceObserver`."""
+        names = (*matrix_names("L", *L.shape), *(f"T_{one.name}" for one in system.estimated))
+        return Gains(cls.name, names, np.append(L, T), {"effect": np.asarray(effect)}, source)
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """Gains from the linearised model: the stationary Kalman filter of the extended system.
+
+        The model is extended by the quantities as states, and the filter's Riccati equation is
+        solved for the sensors' noise. The gain on the integral of dy is zero: the quantities are
+        integrators already.
+        Source: D. Simon, Optimal State Estimation, Wiley 2006, section 8.4.
+
+        Raises
+        ------
+        InputError
+            If the outputs do not show a state of the model, there is nothing to estimate, or a
+            quantity does not move, which no gain that stays can find.
+        """
+        names = corrected_states(fmu, system)
+        model = linearised(fmu, system).of(names)
+        s, q = model.B.shape
+        if s + q == 0:
+            raise InputError(
+                where=f"{system.source}, {cls.name}",
+                found="a model without states, and no [estimated] quantities",
+                expected="something to estimate",
+                remedy="add a table [estimated.NAME], or run the open loop: --estimator open_loop",
+            )
+        if constant := [one.name for one in system.estimated if one.walk == 0.0]:
+            raise InputError(
+                where=f"{system.source}, [estimated.{constant[0]}] walk, {cls.name}",
+                found="0: a constant, on which a gain that stays must be zero",
+                expected="quantities that walk",
+                remedy="give it a walk, or estimate with a Kalman filter: --estimator ekf",
+            )
+        decay = np.array([-1.0 / one.memory for one in system.estimated])
+        extended = np.block([[model.A, model.B], [np.zeros((q, s)), np.diag(decay)]])
+        of_states = dict(zip(fmu.states, walks(fmu, system), strict=True))
+        process = np.array(
+            [*(of_states[name] for name in names), *(one.walk for one in system.estimated)]
+        )
+        # White noise of a continuous signal that, sampled, has the given variance.
+        noise = np.array([one.noise_at_scale for one in system.outputs])
+        measurement = noise * np.sqrt(system.sample_time)
+        # In units of the noise, both noise matrices are the identity and the equation well scaled.
+        A = extended * process / process[:, None]
+        C = np.hstack([model.C, model.D]) * process / measurement[:, None]
+        try:
+            covariance = solve_continuous_are(A.T, C.T, np.eye(s + q), np.eye(len(C)))
+        except LinAlgError:
+            raise InputError(
+                where=f"{fmu.path}, {cls.name}",
+                found="a state or quantity that the outputs do not show at the design point",
+                expected="a model whose outputs show all that is estimated",
+                remedy="choose another [points.design], or run 'workbench observability'",
+            ) from None
+        gain = process[:, None] * (covariance @ C.T) / measurement
+        L = np.hstack([gain, np.zeros_like(gain)])
+        source = "stationary Kalman gain of the linearised model"
+        return cls.of(L, decay, effects(fmu, system, model), system, source)
+
+    @classmethod
+    def space(
+        cls, fmu: FMU, system: System, gains: Gains, slowest: float, fastest: float
+    ) -> SearchSpace:
+        """Bounds by the loops that gains close; a deviation does not grow by itself."""
+        model = linearised(fmu, system).of(corrected_states(fmu, system))
+        q = len(system.estimated)
+        # A gain of an output on a state: the state's own share in it, or their sizes.
+        sizes = np.abs(model.C) @ model.nominal
+        own = np.abs(model.C).T
+        on_states = np.where(own > 0.0, own, sizes[None, :] / model.nominal[:, None])
+        orders, on_quantities = loops(model)
+        order = np.vstack([np.ones_like(on_states), orders])
+        effect = np.vstack([on_states, on_quantities])
+        orders = np.append(np.hstack([order, order + 1.0]), np.ones(q))
+        found = np.append(np.hstack([effect, effect]), np.ones(q))
+        space = feedback_space(orders, found, slowest, fastest, gains.values)
+        space.upper[space.upper.size - q :] = (
+            0.0  # a deviation that grows by itself is no disturbance model
+        )
+        return space.starting_at(gains.values)
+
+    @classmethod
+    def error_dynamics(
+        cls, A: Matrix, B: Matrix, C: Matrix, gains: Gains
+    ) -> tuple[Matrix, Matrix] | None:
+        """Errors of states, estimated quantities, integrals of dy, true quantities."""
+        (s, q), outputs = B.shape, len(C)
+        L = gains.values[: gains.values.size - q].reshape(s + q, 2 * outputs)
+        direct, integrated = L[:, :outputs] @ C, L[:, outputs:]
+        square, tall = np.zeros((q, q)), np.zeros((outputs, q))
+        dynamics = np.block(
+            [
+                [A - direct[:s], -B, -integrated[:s], B],
+                [
+                    direct[s:],
+                    np.diag(gains.values[gains.values.size - q :]),
+                    integrated[s:],
+                    square,
+                ],
+                [C, tall, np.zeros((outputs, outputs)), tall],
+                [np.zeros((q, s)), square, tall.T, square],
+            ]
+        )
+        error = np.hstack([np.zeros((q, s)), -np.eye(q), tall.T, np.eye(q)])
+        return dynamics, error
+
+
+def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
+    """Effect of each quantity on the rate or output that shows it, at the design point, (q,)."""
+    shown = dict(zip((one.name for one in system.outputs), model.D, strict=True))
+    shown |= dict(zip(model.states, model.B, strict=True))
+    return np.array(
+        [shown[one.acts_on][i] if one.acts_on else 1.0 for i, one in enumerate(system.estimated)]
+    )

@@ -1,0 +1,287 @@
+"""A bank of Kalman filters over the conditions that a system declares, which weigh each other.
+
+What a condition means for the model, such as another law of friction, is one hypothesis of
+several. Each has an extended Kalman filter; samples tell which of them holds, and when it changes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.models.native import compiled, solve
+from workbench.observers.estimators.kalman import (
+    ExtendedKalmanFilter,
+    FilterMemory,
+    FilterSettings,
+    begin,
+    finish,
+    forecast,
+    reset,
+    update,
+)
+from workbench.observers.gains import Gains
+from workbench.system.system import System
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A choice of each condition that means something to the model.
+
+    Attributes
+    ----------
+    choices : by condition.
+    parameters : of the model, that they set.
+    """
+
+    choices: Mapping[str, str]
+    parameters: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """In columns and figures."""
+        return "_".join(f"{condition}_{choice}" for condition, choice in self.choices.items())
+
+
+def hypotheses(system: System) -> tuple[Hypothesis, ...]:
+    """All combinations of choices that set parameters; one without any where none does."""
+    telling = [one for one in system.conditions if one.parameters and not one.count]
+    return tuple(
+        Hypothesis(
+            {one.name: choice for one, choice in zip(telling, chosen, strict=True)},
+            {
+                name: value
+                for one, choice in zip(telling, chosen, strict=True)
+                for name, value in one.parameters[choice].items()
+            },
+        )
+        for chosen in product(*(one.parameters for one in telling))
+    )
+
+
+def changes(system: System) -> Matrix:
+    """Rates at which one hypothesis follows another, (k, k) from row to column [1/s].
+
+    A choice lasts for a mean time, then each of the others is as likely.
+    """
+    rates = np.zeros((1, 1))
+    for one in system.conditions:
+        if one.parameters and not one.count:
+            k = len(one.parameters)
+            # Nothing to change to: a lone choice lasts.
+            each = 1.0 / (one.lasts * (k - 1)) if k > 1 else 0.0
+            own = each * (np.ones((k, k)) - k * np.eye(k))
+            rates = np.kron(rates, np.eye(k)) + np.kron(np.eye(len(rates)), own)
+    return rates
+
+
+class BankSettings(NamedTuple):
+    """Settings of the filters, and rates of change between them, (k, k) [1/s]."""
+
+    members: tuple[FilterSettings, ...]
+    rates: Matrix
+
+
+class BankMemory(NamedTuple):
+    """What the bank remembers: its filters and their probability, (k,); work space."""
+
+    members: tuple[FilterMemory, ...]
+    probability: Vector
+    expected: Vector  # (k,) probability before the sample
+    change: Matrix  # (k, 2 k) on the right transition within a step, on the left shares of mixing
+    z: Matrix  # (k, n + q)
+    P: Matrix  # (k, n + q, n + q)
+    rows: Matrix  # (k, 2 w + 1) estimates of the members
+    evidence: Vector  # (k,) logarithm of the likelihood of a sample
+
+
+@compiled
+def _mix(settings, memory, h):  # type: ignore[no-untyped-def]
+    """Begin each filter at the mixture of where its hypothesis may come from; a status.
+
+    Source: Blom and Bar-Shalom (1988), IEEE Trans. Autom. Control 33, 780-783, equations (3) to
+    (6). The transition is an implicit step, which is stochastic at any h.
+    """
+    change, members = memory.change, memory.members
+    count, size = memory.z.shape
+    for i in range(count):
+        for a in range(size):
+            memory.z[i, a] = members[i].z[a]
+            for b in range(size):
+                memory.P[i, a, b] = members[i].P[a, b]
+        for j in range(count):
+            change[i, j] = -h * settings.rates[i, j]
+            change[i, count + j] = 0.0
+        change[i, i] += 1.0
+        change[i, count + i] = 1.0
+    status = solve(change)
+    for j in range(count):
+        z, P = members[j].z, members[j].P
+        total = 0.0
+        for i in range(count):
+            total += change[i, count + j] * memory.probability[i]
+        memory.expected[j] = total
+        if not total > 0.0:
+            continue  # a hypothesis that is out of the question goes on by itself
+        for i in range(count):
+            change[i, j] = change[i, count + j] * memory.probability[i] / total
+        for a in range(size):
+            z[a] = 0.0
+            for i in range(count):
+                z[a] += change[i, j] * memory.z[i, a]
+        for a in range(size):
+            for b in range(size):
+                P[a, b] = 0.0
+                for i in range(count):
+                    apart = (memory.z[i, a] - z[a]) * (memory.z[i, b] - z[b])
+                    P[a, b] += change[i, j] * (memory.P[i, a, b] + apart)
+    return status
+
+
+@compiled
+def _weigh(memory):  # type: ignore[no-untyped-def]
+    """Probability of the hypotheses after a sample, by Bayes' rule."""
+    best, total = memory.evidence[0], 0.0
+    for j in range(memory.probability.size):
+        best = max(best, memory.evidence[j])
+    for j in range(memory.probability.size):
+        # The likeliest one has weight 1, so that not all of them vanish.
+        memory.probability[j] = memory.expected[j] * np.exp(memory.evidence[j] - best)
+        total += memory.probability[j]
+    for j in range(memory.probability.size):
+        memory.probability[j] /= total
+
+
+@compiled
+def _combine(memory, row):  # type: ignore[no-untyped-def]
+    """Mean and standard deviation of the mixture, its innovation and the probabilities."""
+    rows, probability = memory.rows, memory.probability
+    count, last = rows.shape[0], rows.shape[1] - 1
+    width = last // 2
+    for i in range(width):
+        mean, spread = 0.0, 0.0
+        for j in range(count):
+            mean += probability[j] * rows[j, i]
+        for j in range(count):
+            apart = rows[j, i] - mean
+            spread += probability[j] * (rows[j, width + i] ** 2 + apart * apart)
+        row[i], row[width + i] = mean, np.sqrt(spread)
+    row[row.size - 1] = 0.0
+    for j in range(count):
+        row[2 * width + j] = probability[j]
+        row[row.size - 1] += probability[j] * rows[j, last]
+
+
+@compiled
+def _law(models, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Mix, let each filter take the sample, weigh them."""
+    rows = memory.rows
+    status = 0 if h == 0.0 else _mix(settings, memory, h)
+    for j in range(memory.probability.size):
+        model, own, filter_ = models[j], settings.members[j], memory.members[j]
+        if h == 0.0:
+            reset(filter_.levels)
+            status = status or begin(model, own, filter_, u, y)
+            rows[j, rows.shape[1] - 1] = np.nan
+        else:
+            status = status or forecast(model, own, filter_, h, u, y)
+            if status:
+                return status
+            memory.evidence[j] = update(model, own, filter_, h, y, rows[j])
+        status = status or finish(model, own, filter_, rows[j])
+    if h > 0.0:
+        _weigh(memory)
+    _combine(memory, row)
+    return status
+
+
+@compiled
+def _loop(models, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = _law(models, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class InteractingMultipleModel(ExtendedKalmanFilter):
+    """Extended Kalman filters under one hypothesis each, mixed by their probabilities.
+
+    Hypotheses are the choices of those conditions for which the system file has parameters. Each
+    filter starts at the quantities of its choice. Estimates are those of the mixture, with
+    standard deviations that hold what the filters disagree in.
+    Source: Blom and Bar-Shalom (1988), The interacting multiple model algorithm for systems with
+    Markovian switching coefficients, IEEE Trans. Autom. Control 33, 780-783.
+
+    Parameters
+    ----------
+    fmu : any model with the inputs and outputs of the system, and the parameters of conditions.
+    gains : see ExtendedKalmanFilter.
+    """
+
+    name = "imm"
+    label = "interacting multiple model"
+    rank = 47
+    standard = False
+    tunable = False
+    tuned_as = ExtendedKalmanFilter.name
+    _law = staticmethod(_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        found = hypotheses(system)
+        self.modes = tuple(one.name for one in found)
+        self.finds = frozenset(name for one in found for name in one.choices)
+        super().__init__(fmu, system, gains)
+        names = [one.name for one in system.estimated]
+        filters = [
+            ExtendedKalmanFilter(fmu.variant(_held(one, fmu, names)), system, gains)
+            for one in found
+        ]
+        self._filters = filters
+        self._starts = [
+            np.array([one.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
+            for one in found
+        ]
+        k, size = len(found), len(self._settings.walk)
+        self._model = tuple(one._model for one in filters)
+        self._bank = BankSettings(tuple(one._settings for one in filters), changes(system))
+        self._memory = BankMemory(
+            members=tuple(one._memory for one in filters),
+            probability=np.zeros(k),
+            expected=np.zeros(k),
+            change=np.zeros((k, 2 * k)),
+            z=np.zeros((k, size)),
+            P=np.zeros((k, size, size)),
+            rows=np.zeros((k, 2 * len(self.system.columns) + 1)),
+            evidence=np.zeros(k),
+        )
+
+    @property
+    def models(self) -> tuple[FMU, ...]:
+        """See Estimator."""
+        return tuple(one.fmu for one in self._filters)
+
+    def _arguments(self) -> tuple[Any, Any]:
+        return self._bank, self._memory
+
+    def start(self, u: Vector, y: Vector) -> None:
+        """See Estimator; each hypothesis is as likely."""
+        for one, quantities in zip(self._filters, self._starts, strict=True):
+            one.start(u, y)
+            z, known = one._memory.z[len(one.fmu.states) :], np.isfinite(quantities)
+            z[known] = quantities[known]
+        self._memory.probability[:] = 1.0 / len(self._filters)
+
+
+def _held(hypothesis: Hypothesis, fmu: FMU, estimated: Sequence[str]) -> dict[str, float]:
+    """Parameters that a hypothesis sets for good; what is estimated only starts there."""
+    return {
+        name: value
+        for name, value in hypothesis.parameters.items()
+        if name in fmu.parameters and name not in estimated
+    }

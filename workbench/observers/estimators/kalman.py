@@ -1,0 +1,667 @@
+"""Kalman filters for states and quantities at once, named as open work by Schwarz et al. (2018).
+
+The deviations of the estimated quantities are random walks beside the states of any model that has
+them as inputs. Both filters predict with the linearly implicit step of the model. Where feedback
+fades, the measurement noise grows and the model noise fades.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.models.native import (
+    compiled,
+    evaluate,
+    implicit,
+    inlined,
+    linearise,
+    read,
+    set_inputs,
+    solve,
+)
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import Gains, SearchSpace, noise_space
+from workbench.observers.layout import Layout, clip, fading, lag, measure, put, report, stick
+from workbench.observers.operating import walks
+from workbench.system.system import System
+
+_OUTLYING = 9.0  # three standard deviations, squared: what is larger counts as this
+
+
+_LEVEL_RANGE = 1e4  # of levels, in variance
+
+
+_RATE = 0.3  # change of a level within the filter's memory by its own evidence [1]
+
+
+class Learning(NamedTuple):
+    """How levels are learnt.
+
+    Attributes
+    ----------
+    within : time in which the noise of samples is learnt [s], infinite: no level is.
+    surprise : normalised innovation squared that chance makes once an hour.
+    """
+
+    within: float
+    surprise: float
+
+
+class Levels(NamedTuple):
+    """Variances over those of the settings, and the evidence for them.
+
+    Attributes
+    ----------
+    walk : (s,) of random walks, at most 1: what the settings say is the fastest.
+    sample : (l,) of samples.
+    moved, expected : (s,) corrections within the filter's memory, added up, and their variance.
+    noise : (l,) variance of the last sample that the settings say.
+    scatter : (l,) variance that the last sample speaks for.
+    before : (s, s) covariance before the last sample.
+    surprised : (1,) 1 where the last sample was left out.
+    age : (1,) time for which levels were learnt [s].
+    """
+
+    walk: Vector
+    sample: Vector
+    moved: Vector
+    expected: Vector
+    noise: Vector
+    scatter: Vector
+    before: Matrix
+    surprised: Vector
+    age: Vector
+
+
+def learning(system: System) -> Learning:
+    """How filters of a system learn."""
+    once = system.sample_time / 3600.0
+    return Learning(system.learns, float(chi2.isf(once, len(system.outputs))))
+
+
+def levels(size: int, outputs: int) -> Levels:
+    """Levels of so many states and quantities; see `reset`."""
+    walk, moved, expected = (np.zeros(size) for _ in range(3))
+    sample, noise, scatter = (np.zeros(outputs) for _ in range(3))
+    before = np.zeros((size, size))
+    once = (np.zeros(1) for _ in range(2))
+    return Levels(walk, sample, moved, expected, noise, scatter, before, *once)
+
+
+@compiled
+def reset(levels):  # type: ignore[no-untyped-def]
+    """Levels of the settings, without evidence."""
+    trust(levels)
+    levels.surprised[0] = levels.age[0] = 0.0
+    for j in range(levels.sample.size):
+        levels.sample[j] = 1.0
+
+
+@compiled
+def trust(levels):  # type: ignore[no-untyped-def]
+    """Let everything move as fast as the settings say, as after a jump."""
+    for i in range(levels.walk.size):
+        levels.walk[i] = 1.0
+        levels.moved[i] = levels.expected[i] = 0.0
+
+
+@compiled
+def note(levels, j, innovation, explained, noise):  # type: ignore[no-untyped-def]
+    """Note what a sample of output j speaks for; returns the variance of its noise.
+
+    Parameters
+    ----------
+    innovation : [its unit]; explained: variance of it that is not noise.
+    noise : variance that the settings say.
+    """
+    learnt = levels.sample[j] * noise
+    square = min(innovation * innovation, _OUTLYING * (explained + learnt))
+    levels.scatter[j] = (square - explained) / noise
+    return learnt
+
+
+@compiled
+def learn(settings, memory, fade, h):  # type: ignore[no-untyped-def]
+    """Change the levels by a sample; corrections are in `memory.change`.
+
+    White innovations make corrections whose sum has the variance that they take from P.
+    """
+    levels, P, walk = memory.levels, memory.P, settings.walk
+    levels.age[0] += h
+    part = min(fade * h / settings.learning.within, 1.0)
+    for j in range(levels.sample.size):
+        level = levels.sample[j] + part * (levels.scatter[j] - levels.sample[j])
+        levels.sample[j] = min(max(level, 1.0 / _LEVEL_RANGE), _LEVEL_RANGE)
+    for i in range(walk.size):
+        moves = h * levels.walk[i] * (fade * walk[i]) ** 2
+        if not (moves > 0.0 and P[i, i] > 0.0):
+            continue
+        part = moves / (P[i, i] + moves)  # of the filter's memory
+        levels.moved[i] = (1.0 - part) * levels.moved[i] + memory.change[i]
+        lessened = max(levels.before[i, i] - P[i, i], 0.0)
+        levels.expected[i] = (1.0 - part) ** 2 * levels.expected[i] + lessened
+        if levels.expected[i] > 0.0:
+            ratio = min(levels.moved[i] ** 2 / levels.expected[i], _OUTLYING)
+            level = levels.walk[i] * np.exp(_RATE * part * (ratio - 1.0))
+            levels.walk[i] = min(max(level, 1.0 / _LEVEL_RANGE), 1.0)
+
+
+@compiled
+def surprises(settings, levels, nis):  # type: ignore[no-untyped-def]
+    """Whether a sample is out of the question, once levels are learnt."""
+    learns = settings.learning
+    return levels.age[0] > learns.within and nis > learns.surprise
+
+
+@compiled
+def loosen(memory, F, q, jump):  # type: ignore[no-untyped-def]
+    """Covariance before the sample, with a jump of a quantity within the last two steps.
+
+    Parameters
+    ----------
+    F : (n, s) derivatives of the step, rows of states.
+    q : column of the quantity.
+    jump : its variance.
+    """
+    P, before, way = memory.P, memory.levels.before, memory.change
+    n, size = F.shape
+    for i in range(n):
+        # On average it has acted on one step and a half: on the last, and on half of the first.
+        way[i] = F[i, q]
+        for k in range(n):
+            way[i] += 0.5 * F[i, k] * F[k, q]
+    for i in range(n, size):
+        way[i] = 1.0 * (i == q)
+    for i in range(size):
+        for k in range(size):
+            P[i, k] = before[i, k] + jump * way[i] * way[k]
+
+
+_GROWTH = 4.0  # from one jump that is tried to the next, in variance
+
+
+@compiled
+def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
+    """Covariance after a sample, and the change of the mean, one output after the other.
+
+    The noise of outputs is independent, so that their order does not matter and no matrix is
+    inverted. The innovations are those of one linearisation.
+    Source: D. Simon, Optimal State Estimation, Wiley 2006, section 6.1.
+
+    Returns the logarithm of the determinant of the innovations' covariance.
+    """
+    z, P, layout, v = memory.z, memory.P, settings.layout, memory.column
+    size, n, volume = z.size, model.x.size, 0.0
+    row[row.size - 1] = 0.0
+    for i in range(size):
+        memory.change[i] = 0.0
+    for j in range(y.size):
+        if np.isnan(y[j]):  # not measured: its level stays
+            memory.levels.scatter[j] = memory.levels.sample[j]
+            continue
+        at = layout.seen[j]
+        if at >= 0:
+            innovation = y[j] - z[at] - memory.change[at]
+            for i in range(size):
+                v[i] = P[i, at]
+            total = v[at]
+        else:
+            innovation = y[j] - model.y[-1 - at]
+            total = 0.0
+            for i in range(size):
+                v[i] = 0.0
+                for k in range(size):
+                    v[i] += P[i, k] * model.jacobian[k, n - 1 - at]
+            for i in range(size):
+                total += model.jacobian[i, n - 1 - at] * v[i]
+                innovation -= model.jacobian[i, n - 1 - at] * memory.change[i]
+        total += note(memory.levels, j, innovation, total, memory.levels.noise[j])
+        volume += np.log(total)
+        inverse = 1.0 / total
+        row[row.size - 1] += innovation * innovation * inverse
+        # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
+        for i in range(size):
+            gain = v[i] * inverse
+            memory.change[i] += gain * innovation
+            for k in range(i + 1):
+                P[i, k] -= gain * v[k]
+                P[k, i] = P[i, k]
+    return volume
+
+
+@compiled
+def update(model, settings, memory, h, y, row):  # type: ignore[no-untyped-def]
+    """Correct mean and covariance by a sample; returns the logarithm of its likelihood."""
+    z, levels, surprise = memory.z, memory.levels, settings.learning.surprise
+    fade = fading(settings.layout, y)
+    for i in range(z.size):
+        for k in range(z.size):
+            levels.before[i, k] = memory.P[i, k]
+    volume = absorb(model, settings, memory, y, row)
+    nis = row[row.size - 1]
+    if settings.learning.within == np.inf:
+        for i in range(z.size):
+            z[i] += memory.change[i]
+        return -0.5 * (nis + volume)
+    if not surprises(settings, levels, nis):
+        levels.surprised[0] = 0.0
+        learn(settings, memory, fade, h)
+    elif levels.surprised[0] == 0.0:
+        levels.surprised[0] = 1.0
+        loosen(memory, memory.spread[:, model.x.size :], z.size - 1, 0.0)
+        return -0.5 * (surprise + volume)
+    else:
+        levels.surprised[0] = 0.0
+        trust(levels)
+        volume = follow_jump(model, settings, memory, h, y, row)
+    for i in range(z.size):
+        z[i] += memory.change[i]
+    likelihood = -0.5 * (min(row[row.size - 1], surprise) + volume)
+    row[row.size - 1] = nis
+    return likelihood
+
+
+@compiled
+def follow_jump(model, settings, memory, h, y, row):  # type: ignore[no-untyped-def]
+    """Correct by a sample under the least jump of one quantity that lets it happen.
+
+    At most as far as it may be at the start. Of several quantities, of that under which it is
+    likeliest. Source: A. S. Willsky, H. L. Jones (1976), IEEE Trans. Autom. Control 21, 108-112,
+    with a jump of unknown size.
+
+    Returns the logarithm of the determinant of the innovations' covariance.
+    """
+    n, last, surprise = model.x.size, row.size - 1, settings.learning.surprise
+    F, best, chosen, size = memory.spread[:, n:], np.inf, memory.z.size - 1, 0.0
+    for q in range(n, memory.z.size):
+        if settings.walk[q] == 0.0:
+            continue  # nothing to begin with, and it does not move
+        jump, farthest = h * settings.walk[q] ** 2, settings.spread[q] ** 2
+        row[last] = np.inf
+        while row[last] > surprise and jump < farthest:
+            jump = min(_GROWTH * jump, farthest)
+            loosen(memory, F, q, jump)
+            volume = absorb(model, settings, memory, y, row)
+        if row[last] + volume < best:
+            best, chosen, size = row[last] + volume, q, jump
+    loosen(memory, F, chosen, size)
+    return absorb(model, settings, memory, y, row)
+
+
+@inlined
+def room(settings, P, i):  # type: ignore[no-untyped-def]
+    """Share of a random walk that is left, where levels are learnt.
+
+    Nothing is known less of a quantity than at the start: a walk within a range. States have none.
+    """
+    if settings.learning.within == np.inf or i < P.shape[0] - settings.layout.nominal.size:
+        return 1.0
+    return max(1.0 - P[i, i] / settings.spread[i] ** 2, 0.0)
+
+
+@compiled
+def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
+    """Variances by which noise of the inputs moves the states in a step from z; returns a status.
+
+    What is measured drives the model with its sensor's noise, (h df/du sigma)^2, in `memory.least`.
+    Walks that are learnt hold that too, as far as outputs show it; where two bodies are pressed
+    together, the force between them answers it and no speed does. So states move by what was learnt
+    of them, or by what inputs make of them if that is more; the sum would count it twice.
+    Source: S. Thrun, W. Burgard, D. Fox (2005), Probabilistic Robotics, table 7.2 (noise of inputs
+    as noise of the step).
+    """
+    n, least, low = model.x.size, memory.least, memory.change
+    for i in range(n):
+        least[i] = 0.0
+    status = measure(model, u) or put(model, z)
+    for j in range(u.size):
+        deviation = settings.driven[j] + settings.driven_relative[j] * abs(u[j])
+        if deviation == 0.0:
+            continue
+        model.u[j] = u[j] - deviation
+        status = status or set_inputs(model, j, 1) or evaluate(model)
+        for i in range(n):
+            low[i] = model.dx[i]
+        model.u[j] = u[j] + deviation
+        status = status or set_inputs(model, j, 1) or evaluate(model)
+        for i in range(n):
+            least[i] += (0.5 * h * (model.dx[i] - low[i])) ** 2
+        model.u[j] = u[j]
+        status = status or set_inputs(model, j, 1)
+    return status
+
+
+@inlined
+def process_noise(settings, memory, fade, h, i):  # type: ignore[no-untyped-def]
+    """Variance by which state or quantity i moves in a step, after `drive`.
+
+    Walks fade with feedback; the noise of a sensor does not.
+    """
+    share = room(settings, memory.P, i) * memory.levels.walk[i]
+    moves = h * share * (fade * settings.walk[i]) ** 2
+    return max(moves, memory.least[i]) if i < memory.least.size else moves
+
+
+_FAINTEST = 1e-3  # share of feedback that the noise of measurements is raised for
+
+
+_REACH = 100.0  # a level this far from the sensors' noise means: trust it wholly, or not at all
+
+
+class FilterSettings(NamedTuple):
+    """What the laws of the filters are given.
+
+    Attributes
+    ----------
+    layout : see Layout.
+    relative, floor : (l,) standard deviation of a sample: share of its size, and [its unit].
+    walk : (n + q,) random walks of states and quantities [unit/sqrt(s)].
+    spread : (n + q,) standard deviations at the start.
+    driven, driven_relative : (m,) standard deviation of a sample of each input: [its unit], and
+        share of its size; 0 where levels are held, which then say it all.
+    """
+
+    layout: Layout
+    relative: Vector
+    floor: Vector
+    walk: Vector
+    spread: Vector
+    learning: Learning
+    driven: Vector
+    driven_relative: Vector
+
+
+class FilterMemory(NamedTuple):
+    """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
+
+    `least` holds the variances of a step of the states, (n,), see `drive`.
+    """
+
+    z: Vector
+    P: Matrix
+    system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
+    spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
+    product: Matrix  # (n, n + q), see `carry`
+    least: Vector
+    change: Vector
+    column: Vector
+    levels: Levels
+
+
+@compiled
+def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
+    """Advance z by one linearly implicit step, in which quantities stay; returns a status."""
+    n, system = model.x.size, memory.system
+    status = put(model, z) or evaluate(model)
+    for i in range(n):
+        system[i, n] = h * model.dx[i]
+    status = status or linearise(model, n)
+    implicit(model, h, system)
+    status = status or solve(system)
+    before = lag(settings.layout, z)
+    for i in range(n):
+        z[i] += system[i, n]
+    stick(settings.layout, z, before)
+    return status
+
+
+@compiled
+def transition(model, system, h):  # type: ignore[no-untyped-def]
+    """Derivatives of the step that `predict` took, by states and quantities; returns a status.
+
+    Parameters
+    ----------
+    system : (n, n + n + q) whose last columns take the rows of states, (I - hA)^-1 [I, hB]; the
+        rows of quantities are those of a unit matrix.
+    """
+    n, size = model.x.size, model.jacobian.shape[0]
+    implicit(model, h, system)
+    for i in range(n):
+        for j in range(n):
+            system[i, n + j] = 0.0
+        system[i, n + i] = 1.0
+        for j in range(n, size):
+            system[i, n + j] = h * model.jacobian[j, i]
+    return solve(system)
+
+
+@compiled
+def carry(F, P, work):  # type: ignore[no-untyped-def]
+    """P <- F P F' of states and quantities, (s, s), which stays symmetric; work, (n, s).
+
+    Parameters
+    ----------
+    F : (n, s) rows of states, see `transition`.
+    """
+    n, size = F.shape
+    for i in range(n):
+        for j in range(size):
+            work[i, j] = 0.0
+        for k in range(size):
+            factor = F[i, k]
+            for j in range(size):
+                work[i, j] += factor * P[k, j]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(size):
+                total += work[i, k] * F[j, k]
+            P[i, j] = P[j, i] = total
+        for j in range(n, size):
+            P[i, j] = P[j, i] = work[i, j]
+
+
+@inlined
+def variance(settings, fade, y, j):  # type: ignore[no-untyped-def]
+    """Variance of output j [its unit squared], raised where feedback fades."""
+    deviation = settings.floor[j] + settings.relative[j] * abs(y[j])
+    return (deviation / max(fade, _FAINTEST)) ** 2
+
+
+@compiled
+def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
+    """Limit the quantities, report the estimate and its standard deviations; returns a status."""
+    z, P, layout, n = memory.z, memory.P, settings.layout, model.x.size
+    q, outputs = layout.nominal.size, layout.seen.size
+    for i in range(q):
+        z[n + i] = clip(z[n + i], layout.low[i], layout.high[i])
+    status = put(model, z) or linearise(model, n + model.y.size)
+    status = status or report(model, layout, row)
+    first = outputs + 2 * q + layout.reported  # of the standard deviations
+    for j in range(outputs):
+        at = layout.seen[j]
+        row[first + j] = np.sqrt(P[at, at]) if at >= 0 else deviation(model, P, -1 - at)
+    for i in range(q):
+        doubt = layout.doubt[i] * (layout.nominal[i] + z[n + i])
+        known = np.sqrt(P[n + i, n + i] + doubt * doubt)
+        row[first + outputs + i] = row[first + outputs + q + i] = known
+    for i in range(layout.reported):
+        row[first + outputs + 2 * q + i] = deviation(model, P, i)
+    return status
+
+
+@inlined
+def deviation(model, P, i):  # type: ignore[no-untyped-def]
+    """Standard deviation of the model's output i, to first order."""
+    n, total = model.x.size, 0.0
+    for j in range(P.shape[0]):
+        for k in range(P.shape[0]):
+            total += model.jacobian[j, n + i] * P[j, k] * model.jacobian[k, n + i]
+    return np.sqrt(max(total, 0.0))
+
+
+@compiled
+def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
+    """Covariance of the first sample; returns a status."""
+    layout, fade = settings.layout, fading(settings.layout, y)
+    for j in range(y.size):
+        at = layout.seen[j]
+        if at >= 0 and not np.isnan(y[j]):
+            memory.P[at, at] = variance(settings, fade, y, j)
+    return measure(model, u)
+
+
+@compiled
+def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+    """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
+    layout, P, size = settings.layout, memory.P, memory.z.size
+    status = drive(model, settings, memory, memory.z, u, h)
+    status = status or predict(model, settings, memory, memory.z, h)
+    # Model noise enters before the step, whose implicit form damps it as it damps the state.
+    fade = fading(layout, y)
+    for i in range(size):
+        P[i, i] += process_noise(settings, memory, fade, h, i)
+    for j in range(y.size):
+        memory.levels.noise[j] = variance(settings, fade, y, j)
+    status = status or transition(model, memory.spread, h)
+    carry(memory.spread[:, model.x.size :], P, memory.product)
+    if layout.columns > model.x.size:
+        status = status or put(model, memory.z) or read(model)
+        status = status or linearise(model, layout.columns)
+    return status
+
+
+@compiled
+def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Predict by the linearised model, correct by the sample."""
+    if h == 0.0:
+        reset(memory.levels)
+        status = begin(model, settings, memory, u, y)
+        return status or finish(model, settings, memory, row)
+    status = forecast(model, settings, memory, h, u, y)
+    if status:
+        return status
+    update(model, settings, memory, h, y, row)
+    return finish(model, settings, memory, row)
+
+
+@compiled
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = ekf_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class ExtendedKalmanFilter(Estimator):
+    """Continuous-discrete extended Kalman filter with quantities as random walks.
+
+    Prediction by one linearly implicit step with the FMU's Jacobian, for mean and covariance;
+    correction output by output. Source: D. Simon, Optimal State Estimation, Wiley 2006, chapter 13.
+
+    Parameters
+    ----------
+    fmu : any model with the inputs and outputs of the system.
+    gains : noise levels: standard deviation of a sample of each output, absolute and as a share of
+        its size; random walks of states (`model`: over what the system says) and quantities;
+        what is known of quantities at the start (`initial`: over what the system says).
+    """
+
+    name = "ekf"
+    label = "extended Kalman filter"
+    rank = 40
+    adapts = True
+    aided = True
+    meaning = "standard deviations of samples, and random walks"
+    sticks = True
+    _law = staticmethod(ekf_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        system = self.system
+        n, q = len(fmu.states), len(system.estimated)
+        of_states = gains["model"] * walks(fmu, system)
+        initial = [gains["initial"] * one.spread for one in system.estimated]
+        learns = learning(system)
+        told = float(learns.within < np.inf)
+        self._settings: Any = FilterSettings(
+            layout=self._layout,
+            relative=np.array([_share(gains, one.name) for one in system.outputs]),
+            floor=np.array([gains[one.name] for one in system.outputs]),
+            walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
+            spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
+            learning=learns,
+            driven=told * np.array([one.noise for one in system.inputs]),
+            driven_relative=told * np.array([one.relative_noise for one in system.inputs]),
+        )
+        self._memory: Any = FilterMemory(
+            *buffers(n, q), np.zeros(n + q), levels(n + q, len(system.outputs))
+        )
+
+    def _spreads(self) -> Vector:
+        """What is not known of the states at the start, (n,)."""
+        return np.array([self.system.spreads.get(name, 0.0) for name in self.fmu.states])
+
+    def _arguments(self) -> tuple[Any, Any]:
+        return self._settings, self._memory
+
+    @property
+    def covariance(self) -> Matrix:
+        """Of the estimated quantities after the last sample, (q, q)."""
+        n = len(self.fmu.states)
+        known: Matrix = self._memory.P[n:, n:].copy()
+        return known
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        self._memory.z[:] = self._start_values()
+        self._memory.P[:] = np.diag(self._settings.spread**2)
+
+    def _start_values(self) -> Vector:
+        """States and deviations of the quantities at the start, (n + q,)."""
+        starts = [self._known.get(one.name, one.start) for one in self.system.estimated]
+        begins = np.array(starts) - self._layout.nominal
+        return np.concatenate([self.fmu.get_states(), np.nan_to_num(begins)])
+
+    @classmethod
+    def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
+        """See Estimator."""
+        told = {
+            "model": ("random walk of every state, over what the system says", "1"),
+            "initial": ("what is known of quantities at the start, over what it says", "1"),
+        }
+        for output in cls.fed(system).outputs:
+            told[output.name] = f"scatter of {output.name}", output.unit
+            told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
+        for one in system.estimated:
+            told[one.name] = f"random walk of {one.name}", f"{one.unit}/sqrt(s)"
+        return {name: told[name] for name in gains.names}
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """The noise of the sensors and what the system says of states and quantities."""
+        outputs = cls.fed(system).outputs
+        levels = {one.name: one.noise for one in outputs}
+        levels |= {
+            f"{one.name}_relative": one.relative_error
+            for one in outputs
+            if one.relative_error > 0.0
+        }
+        levels |= {"model": 1.0, **{one.name: one.walk for one in system.estimated}, "initial": 1.0}
+        return Gains(
+            cls.name, tuple(levels), np.array(list(levels.values())), {}, "noise of the sensors"
+        )
+
+    @classmethod
+    def space(
+        cls, fmu: FMU, system: System, gains: Gains, slowest: float, fastest: float
+    ) -> SearchSpace:
+        """A factor of 100 to both sides of each level."""
+        return noise_space(gains.values, _REACH)
+
+
+def _share(gains: Gains, output: str) -> float:
+    name = f"{output}_relative"
+    return gains[name] if name in gains.names else 0.0
+
+
+def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Vector, Vector]:
+    """Memory and work space of a filter with so many states and quantities: z to change."""
+    size = n + q
+    z, change, product = np.zeros(size), np.zeros(size), np.zeros((n, size))
+    spread = np.zeros((n, n + size))
+    return z, np.zeros((size, size)), np.zeros((n, n + 1)), spread, product, np.zeros(n), change

@@ -1,0 +1,1 @@
+"""The moving horizon estimator: least squares over a window of samples."""

@@ -1,0 +1,353 @@
+"""Moving horizon estimation: the best trajectory through the last samples, within bounds."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtri, ndtri
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.models.native import checked, compiled, given, inlined, linearise, read
+from workbench.observers.estimators.kalman import (
+    ExtendedKalmanFilter,
+    FilterMemory,
+    Learning,
+    begin,
+    drive,
+    finish,
+    learn,
+    note,
+    predict,
+    reset,
+    room,
+    transition,
+    trust,
+    variance,
+)
+from workbench.observers.estimators.moving_horizon.window import (
+    Window,
+    assign,
+    assign_rows,
+    end,
+    shift,
+    solve_free,
+    window,
+)
+from workbench.observers.estimators.moving_horizon.window_bounds import bound
+from workbench.observers.estimators.moving_horizon.window_cost import cost, reweigh
+from workbench.observers.gains import Gains
+from workbench.observers.layout import Layout, fading, measure, put
+from workbench.system.system import System
+
+HORIZON = 20  # samples
+ITERATIONS = 1  # of Gauss and Newton for each sample
+# Share of clean samples that are taken for outliers or jumps: one in 80 min at 200 Hz.
+RARE = 1e-6
+_SHORTEST = 0.1  # share of a change that is still tried
+_ROUNDS = 5  # of weights, in each iteration
+ROUNDING = 1e-9  # share of the cost that is not told apart
+
+
+class HorizonSettings(NamedTuple):
+    """As those of the filters, and what is of the window.
+
+    Attributes
+    ----------
+    learning : see Learning; a window notices what surprises by `largest_nis`.
+    iterations : for each sample.
+    limit : deviation of a sample from which it is an outlier [standard deviations].
+    largest_nis : normalised innovation squared from which a quantity has jumped.
+    fading : share of its noise that the next step keeps.
+    """
+
+    layout: Layout
+    relative: Vector
+    floor: Vector
+    walk: Vector
+    spread: Vector
+    learning: Learning
+    driven: Vector
+    driven_relative: Vector
+    iterations: int
+    limit: float
+    largest_nis: float
+    fading: float
+
+
+class HorizonMemory(NamedTuple):
+    """What the law remembers: that of a filter, held (l,) last samples, and the window."""
+
+    filter: FilterMemory
+    held: Vector
+    window: Window
+
+
+@inlined
+def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+    """Add a node where the estimate stands, and the sample that its step leads to."""
+    window, held, levels = memory.window, memory.held, memory.filter.levels
+    if window.filled[0] == window.steps.size:
+        shift(window)
+    k = window.filled[0]
+    window.filled[0] = k + 1
+    for j in range(y.size):
+        if not np.isnan(y[j]):
+            held[j] = y[j]
+    fade = fading(settings.layout, held)
+    window.steps[k] = h
+    assign(window.inputs[k], u)
+    assign(window.samples[k], y)
+    for j in range(y.size):
+        levels.noise[j] = variance(settings, fade, held, j)
+        window.levels[k, j] = levels.sample[j] * levels.noise[j]
+        window.weight[k, j] = 1.0
+    for i in range(memory.filter.z.size):
+        window.nodes[k, i] = memory.filter.z[i]
+        window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
+        window.active[k, i] = 0
+        before = window.wider[k - 1, i] if k > 0 else window.older[i]
+        share = levels.walk[i] * room(settings, memory.filter.P, i)
+        window.wider[k, i] = max(share, settings.fading * before)
+    for i in range(memory.filter.least.size):
+        least = memory.filter.least[i] / window.wider[k, i]
+        window.noise[k, i] = max(window.noise[k, i], least)
+
+
+@inlined
+def expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
+    """Take and linearise the step from a node, and the outputs there; returns a status."""
+    window, layout, n = memory.window, settings.layout, model.x.size
+    arrived, h = window.arrived[k], window.steps[k]
+    for i in range(arrived.size):
+        arrived[i] = window.nodes[k, i]
+    status = measure(model, window.inputs[k])
+    status = status or predict(model, settings, memory.filter, arrived, h)
+    status = status or transition(model, memory.filter.spread, h)
+    for i in range(n):
+        for j in range(arrived.size):
+            window.F[k, i, j] = memory.filter.spread[i, n + j]
+    if layout.columns > n:
+        status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
+    for j in range(layout.seen.size):
+        at = layout.seen[j]
+        if at >= 0:
+            window.errors[k, j] = window.samples[k, j] - arrived[at]
+        else:
+            window.errors[k, j] = window.samples[k, j] - model.y[-1 - at]
+            for i in range(arrived.size):
+                window.slopes[k, j, i] = model.jacobian[i, n - 1 - at]
+    return status
+
+
+@inlined
+def _learn(settings, memory):  # type: ignore[no-untyped-def]
+    """Let noise levels follow the last sample, as those of a filter without a window."""
+    window, levels = memory.window, memory.filter.levels
+    last = window.filled[0] - 1
+    for j in range(levels.sample.size):
+        levels.scatter[j] = levels.sample[j]  # as thought, of a sample that is missing
+        if window.total[last, j] > 0.0:
+            explained = window.total[last, j] - window.levels[last, j]
+            note(levels, j, window.surprise[last, j], explained, levels.noise[j])
+    assign_rows(levels.before, window.before)
+    assign_rows(memory.filter.P, window.P)
+    assign(memory.filter.change, window.moved)
+    learn(settings, memory.filter, fading(settings.layout, memory.held), window.steps[last])
+
+
+@compiled
+def _fill_in(model, settings, memory, k, y):  # type: ignore[no-untyped-def]
+    """Put samples that were missing to node k; returns a status."""
+    for j in range(y.size):
+        if not np.isnan(y[j]):
+            memory.window.samples[k, j] = y[j]
+    return expand(model, settings, memory, k)
+
+
+@compiled
+def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
+    """Best change of the nodes, to first order; the estimate is what the last step leads to.
+
+    Parameters
+    ----------
+    new : whether it is the first time that the last sample is met.
+    """
+    window, seen = memory.window, settings.layout.seen
+    last = window.filled[0] - 1
+    solve_free(window, seen)
+    nis = 0.0
+    for j in range(seen.size):
+        if window.total[last, j] > 0.0:
+            nis += window.surprise[last, j] ** 2 / window.total[last, j]
+    row[row.size - 1] = nis
+    learns, age = settings.learning.within < np.inf, memory.filter.levels.age[0]
+    if nis > settings.largest_nis and not (learns and age < settings.learning.within):
+        window.alert[0] = 1
+        trust(memory.filter.levels)
+    if new and learns and window.alert[0] == 0:
+        _learn(settings, memory)
+    for _ in range(_ROUNDS):
+        if not reweigh(window, settings.limit, settings.fading):
+            break
+        solve_free(window, seen)
+    assign_rows(memory.filter.P, window.P)
+    bound(window, seen)
+    for i in range(memory.filter.z.size):
+        memory.filter.z[i] = end(window, last, i)
+
+
+@compiled
+def move(model, settings, memory, share):  # type: ignore[no-untyped-def]
+    """Move the nodes by a share of their change and take the steps from there; a status."""
+    window, status = memory.window, 0
+    for k in range(window.filled[0]):
+        for i in range(memory.filter.z.size):
+            window.nodes[k, i] += share * window.change[k, i]
+        status = status or expand(model, settings, memory, k)
+    return status
+
+
+@compiled
+def _relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
+    """Move the nodes by the change that was found, as far as it lowers the cost; a status.
+
+    Nodes stay where they were linearised if no part of it does.
+    """
+    before, share = cost(memory.window), 1.0
+    status = move(model, settings, memory, share)
+    while not status and share > 0.0:
+        if cost(memory.window) <= before + ROUNDING * (1.0 + before):
+            break
+        less = 0.5 * share if share > _SHORTEST else 0.0
+        status = move(model, settings, memory, less - share)
+        share = less
+    return status
+
+
+@compiled
+def horizon_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Estimate the last samples anew, with one that is added; returns a status."""
+    window = memory.window
+    if h == 0.0:
+        status = begin(model, settings, memory.filter, u, y)
+        reset(memory.filter.levels)
+        window.filled[0] = 0
+        window.alert[0] = 0
+        for i in range(memory.filter.z.size):
+            window.older[i] = 1.0
+        assign(memory.held, y)
+        assign(window.mean, memory.filter.z)
+        assign_rows(window.covariance, memory.filter.P)
+        return status or finish(model, settings, memory.filter, row)
+    status = drive(model, settings, memory.filter, memory.filter.z, u, h)
+    _append(settings, memory, h, u, y)
+    status = status or expand(model, settings, memory, window.filled[0] - 1)
+    for iteration in range(settings.iterations):
+        _solve(settings, memory, iteration == 0, row)
+        status = status or _relinearise(model, settings, memory)
+    return status or finish(model, settings, memory.filter, row)
+
+
+@compiled
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = horizon_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class MovingHorizonEstimator(ExtendedKalmanFilter):
+    """Best trajectory through the last samples, with the noise levels of the extended filter.
+
+    Multiple shooting, one node for each sample, with the step and its derivatives of the filter;
+    one iteration of Gauss and Newton for each sample unless more are asked for. A sample that
+    leaves the window has its part in mean and covariance of the oldest node, by the recursion about
+    the smoothed trajectory, so that none counts twice and a linear model gives the Kalman filter.
+    Bounds are the ranges of quantities. Samples that are NaN are left out, but for the first.
+    Outliers have Huber's loss, and quantities may jump, see `reweigh`; both where a clean recording
+    would show it in `rare` of its samples.
+    Sources: C. Rao, J. Rawlings, J. Lee (2001), Automatica 37, 1619-1628; M. Tenny, J. Rawlings
+    (2002), Efficient moving horizon estimation, ACC (smoothing update); B. Bell (1994), SIAM J.
+    Optim. 4, 626-636 (smoother and Gauss-Newton); M. Diehl et al. (2005), SIAM J. Control Optim.
+    43, 1714-1736 (one iteration for each sample).
+
+    Parameters
+    ----------
+    fmu : any model with the inputs and outputs of the system.
+    gains : see ExtendedKalmanFilter; `horizon` [samples], `iterations` and `rare` are constants of
+        the design.
+    """
+
+    name = "mhe"
+    label = "moving horizon estimator"
+    rank = 46
+    standard = False
+    _law = staticmethod(horizon_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        n, outputs = len(fmu.states), len(self.system.outputs)
+        samples, iterations, rare = (
+            float(gains.design[name][0]) for name in ("horizon", "iterations", "rare")
+        )
+        of = self._settings
+        self._settings = HorizonSettings(
+            *(of.layout, of.relative, of.floor, of.walk, of.spread, of.learning),
+            *(of.driven, of.driven_relative),
+            iterations=round(iterations),
+            limit=float(ndtri(1.0 - 0.5 * rare)),
+            largest_nis=float(chdtri(outputs, rare)),
+            fading=float(np.exp(-1.0 / samples)),
+        )
+        low = np.concatenate([np.full(n, -np.inf), self._layout.low])
+        high = np.concatenate([np.full(n, np.inf), self._layout.high])
+        self._memory = HorizonMemory(
+            self._memory,
+            held=np.zeros(outputs),
+            window=window(round(samples), n, len(system.inputs), outputs, low, high),
+        )
+
+    @property
+    def window(self) -> Window:
+        """The problem of the last sample and its solution."""
+        window: Window = self._memory.window
+        return window
+
+    def fill_in(self, age: int, y: Vector) -> None:
+        """Take samples that come late; they count from the next step on.
+
+        Parameters
+        ----------
+        age : steps since they were taken, 0 of the last one.
+        y : (l,) measured outputs; NaN where there is none, or it came in time.
+
+        Raises
+        ------
+        InputError
+            If they are older than the horizon, or than the first step.
+        """
+        k = int(self.window.filled[0]) - 1 - age
+        if age < 0 or k < 0:
+            raise InputError(
+                where=f"estimator {self.name}",
+                found=f"samples that are {age} steps old",
+                expected=f"0 to {self.window.filled[0] - 1}, as many as the horizon has",
+                remedy="give a longer horizon in [design] of the gains",
+            )
+        checked(_fill_in(self._model, self._settings, self._memory, k, given(y)), self.fmu)
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        memory, self._memory = self._memory, self._memory.filter
+        super()._begin(u, y)
+        self._memory = memory
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """The noise of the sensors, and a horizon."""
+        levels = super().reasoned(fmu, system)
+        design = {"horizon": HORIZON, "iterations": ITERATIONS, "rare": RARE}
+        constants = {name: np.array([float(value)]) for name, value in design.items()}
+        return Gains(levels.estimator, levels.names, levels.values, constants, levels.source)

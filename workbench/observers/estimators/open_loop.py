@@ -1,0 +1,76 @@
+"""What an observer must beat: the nominal model alone."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.models.native import (
+    compiled,
+    evaluate,
+    implicit,
+    inlined,
+    linearise,
+    set_states,
+    solve,
+)
+from workbench.observers.contract import Estimator
+from workbench.observers.gains import Gains
+from workbench.observers.layout import Layout, measure, report
+from workbench.system.system import System
+
+
+class _Memory(NamedTuple):
+    system: Matrix  # (n, n + 1) of the step, with its right-hand side
+
+
+@inlined
+def _law(model, layout, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """One linearly implicit Euler step of the model; y is not used."""
+    n, system = model.x.size, memory.system
+    status = measure(model, u)
+    if h > 0.0:
+        status = status or evaluate(model)
+        for i in range(n):
+            system[i, n] = h * model.dx[i]
+        status = status or linearise(model, n)
+        implicit(model, h, system)
+        status = status or solve(system)
+        if status:
+            return status
+        for i in range(n):
+            model.x[i] += system[i, n]
+        status = set_states(model)
+    return status or report(model, layout, row)
+
+
+@compiled
+def _loop(model, layout, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = _law(model, layout, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class OpenLoop(Estimator):
+    """The nominal model, driven by measured inputs, without feedback."""
+
+    name = "open_loop"
+    label = "open loop"
+    rank = 0
+    tunable = False
+    _law = staticmethod(_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        n = len(fmu.states)
+        self._memory = _Memory(np.zeros((n, n + 1)))
+
+    def _arguments(self) -> tuple[Layout, Any]:
+        return self._layout, self._memory
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        self._model.x[:] = self.fmu.get_states()

@@ -1,0 +1,286 @@
+"""The square-root unscented Kalman filter, with the noise levels of the extended one."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.models.native import compiled, read
+from workbench.observers.estimators.kalman import (
+    ExtendedKalmanFilter,
+    Levels,
+    begin,
+    buffers,
+    drive,
+    ekf_law,
+    finish,
+    learn,
+    levels,
+    note,
+    predict,
+    process_noise,
+    reset,
+    surprises,
+    variance,
+)
+from workbench.observers.gains import Gains
+from workbench.observers.layout import clip, fading, put
+from workbench.system.system import System
+
+# Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
+# has a wide sigma, and points as far as that would be where the model never is.
+POINT_DISTANCE = 0.2
+
+# Share of feedback below which the filter takes the tangent: the model bends there within a
+# fraction of sigma.
+TANGENT_SHARE = 0.8
+
+
+class PointsMemory(NamedTuple):
+    """As that of the extended filter, and root (upper triangle, P = root' root), points, stack."""
+
+    z: Vector
+    P: Matrix
+    system: Matrix
+    spread: Matrix
+    product: Matrix
+    least: Vector
+    change: Vector
+    column: Vector
+    levels: Levels
+    start: Vector  # z before the step
+    root: Matrix
+    points: Matrix  # (2 size, size)
+    seen: Matrix  # (2 size, l) outputs at the points
+    stack: Matrix  # (2 size + l, size + l)
+    triangle: Matrix  # (size + l, size + l)
+
+
+@compiled
+def triangularise(stack, root):  # type: ignore[no-untyped-def]
+    """Reduce rows, (m, n), to the triangle root, (n, n): root' root = stack' stack."""
+    m, n = stack.shape
+    for k in range(n):
+        norm = 0.0
+        for i in range(k, m):
+            norm += stack[i, k] * stack[i, k]
+        norm = np.sqrt(norm)
+        if norm == 0.0:
+            continue
+        alpha = -norm if stack[k, k] > 0 else norm
+        head = stack[k, k] - alpha
+        square = -alpha * head
+        for j in range(k + 1, n):
+            dot = head * stack[k, j]
+            for i in range(k + 1, m):
+                dot += stack[i, k] * stack[i, j]
+            factor = dot / square
+            stack[k, j] -= factor * head
+            for i in range(k + 1, m):
+                stack[i, j] -= factor * stack[i, k]
+        stack[k, k] = alpha
+    for i in range(n):
+        for j in range(n):
+            root[i, j] = stack[i, j] if j >= i else 0.0
+
+
+@compiled
+def _root_to_covariance(memory):  # type: ignore[no-untyped-def]
+    size = memory.z.size
+    for i in range(size):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(j + 1):
+                total += memory.root[k, i] * memory.root[k, j]
+            memory.P[i, j] = memory.P[j, i] = total
+
+
+@compiled
+def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
+    """Cholesky's root of P; directions that rounding has left without variance get none."""
+    P, root = memory.P, memory.root
+    size = P.shape[0]
+    for i in range(size):
+        for j in range(i, size):
+            total = P[i, j]
+            for k in range(i):
+                total -= root[k, i] * root[k, j]
+            if j == i:
+                root[i, i] = np.sqrt(total) if total > 0.0 else 0.0
+            else:
+                root[i, j] = total / root[i, i] if root[i, i] > 0.0 else 0.0
+
+
+@compiled
+def _spread(model, settings, memory, spread, h):  # type: ignore[no-untyped-def]
+    """Advance all sigma points and read their outputs; leaves their mean in z; a status."""
+    z, root, points, layout = memory.z, memory.root, memory.points, settings.layout
+    size, n, status = z.size, model.x.size, 0
+    for i in range(size):
+        for side in range(2):
+            point = points[2 * i + side]
+            for j in range(size):
+                point[j] = z[j] + (1 - 2 * side) * spread * root[i, j]
+            for j in range(size - n):
+                point[n + j] = clip(point[n + j], layout.low[j], layout.high[j])
+            status = status or predict(model, settings, memory, point, h)
+            if layout.columns > n:
+                status = status or put(model, point) or read(model)
+            for j in range(layout.seen.size):
+                at = layout.seen[j]
+                memory.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
+    for j in range(size):
+        total = 0.0
+        for i in range(2 * size):
+            total += points[i, j]
+        z[j] = total / (2 * size)
+    return status
+
+
+@compiled
+def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-def]
+    """Correct mean and root by a sample, in one triangularisation.
+
+    Rows are the points' deviations of outputs and unknowns, and the noise of the outputs. The
+    triangle holds the root of the innovations' covariance, the gain times it, and the new root.
+    Source: M. Morf, T. Kailath (1975), IEEE Trans. Autom. Control 20, 487-497.
+    """
+    z, stack, triangle, levels = memory.z, memory.stack, memory.triangle, memory.levels
+    size, outputs = z.size, y.size
+    share = np.sqrt(0.5) / spread
+    for j in range(outputs):
+        missing, mean = np.isnan(y[j]), 0.0
+        for i in range(2 * size):
+            mean += memory.seen[i, j]
+        mean /= 2 * size
+        for i in range(2 * size):
+            stack[i, j] = 0.0 if missing else share * (memory.seen[i, j] - mean)
+        for i in range(outputs):
+            stack[2 * size + i, j] = 0.0
+        # What is missing is one that no unknown moves, and nothing is made of it.
+        noise = 1.0 if missing else levels.sample[j] * variance(settings, fade, y, j)
+        stack[2 * size + j, j] = np.sqrt(noise)
+        memory.column[j] = 0.0 if missing else y[j] - mean
+    for j in range(size):
+        memory.change[j] = levels.before[j, j] = 0.0
+        for i in range(2 * size):
+            stack[i, outputs + j] = share * (memory.points[i, j] - z[j])
+            levels.before[j, j] += stack[i, outputs + j] ** 2
+    for i in range(outputs):
+        for j in range(size):
+            stack[2 * size + i, outputs + j] = 0.0
+    triangularise(stack, triangle)
+    row[row.size - 1] = 0.0
+    for j in range(outputs):
+        white = memory.column[j]
+        for i in range(j):
+            white -= triangle[i, j] * memory.column[outputs + i]
+        if np.isnan(y[j]):
+            levels.scatter[j] = levels.sample[j]
+        else:
+            noise = variance(settings, fade, y, j)
+            note(levels, j, white, triangle[j, j] ** 2 - levels.sample[j] * noise, noise)
+        white /= triangle[j, j]
+        memory.column[outputs + j] = white
+        row[row.size - 1] += white * white
+        for i in range(size):
+            memory.change[i] += triangle[j, outputs + i] * white
+    for i in range(size):
+        z[i] += memory.change[i]
+    for i in range(size):
+        for j in range(size):
+            memory.root[i, j] = triangle[outputs + i, outputs + j]
+
+
+@compiled
+def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+    """Square-root unscented filter with 2n points of equal weight."""
+    z, root, stack = memory.z, memory.root, memory.stack
+    size, layout = z.size, settings.layout
+    if h == 0.0:
+        reset(memory.levels)
+        status = begin(model, settings, memory, u, y)
+        _covariance_to_root(memory)
+        return status or finish(model, settings, memory, row)
+    fade = fading(layout, y)
+    if fade < TANGENT_SHARE:
+        status = ekf_law(model, settings, memory, h, u, y, row)
+        _covariance_to_root(memory)
+        return status
+    status = drive(model, settings, memory, z, u, h)
+    for i in range(size):
+        # Model noise enters before the step, whose implicit form damps it as it damps the state.
+        moves = np.sqrt(process_noise(settings, memory, fade, h, i))
+        memory.start[i] = z[i]
+        for j in range(size):
+            stack[i, j] = root[i, j]
+            stack[size + i, j] = moves if j == i else 0.0
+    triangularise(stack[: 2 * size, :size], root)
+    spread = POINT_DISTANCE * np.sqrt(1.0 * size)
+    status = status or _spread(model, settings, memory, spread, h)
+    if status:
+        return status
+    _absorb(settings, memory, spread, fade, y, row)
+    if settings.learning.within < np.inf:
+        if surprises(settings, memory.levels, row[row.size - 1]):
+            for i in range(size):
+                z[i] = memory.start[i]
+            status = ekf_law(model, settings, memory, h, u, y, row)
+            _covariance_to_root(memory)
+            return status
+        memory.levels.surprised[0] = 0.0
+    _root_to_covariance(memory)
+    if settings.learning.within < np.inf:
+        learn(settings, memory, fade, h)
+    return finish(model, settings, memory, row)
+
+
+@compiled
+def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+    for k in range(steps.size):
+        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        if status:
+            return status
+    return 0
+
+
+class UnscentedKalmanFilter(ExtendedKalmanFilter):
+    """Square-root unscented Kalman filter: no derivative of the filter, the same noise levels.
+
+    Sigma points of equal weight, each advanced by the linearly implicit step; the covariance is
+    scaled by their distance, see POINT_DISTANCE. All updates are orthogonal triangularisations,
+    without downdates.
+    Source: R. van der Merwe, E. Wan (2001), The square-root unscented Kalman filter for state and
+    parameter estimation, ICASSP; I. Arasaratnam, S. Haykin (2009), Cubature Kalman filters.
+
+    Parameters
+    ----------
+    fmu : any model with the inputs and outputs of the system.
+    gains : see ExtendedKalmanFilter.
+    """
+
+    name = "ukf"
+    label = "unscented Kalman filter"
+    rank = 45
+    _law = staticmethod(_law)
+    _loop = staticmethod(_loop)
+
+    def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
+        super().__init__(fmu, system, gains)
+        size, outputs = len(self._settings.walk), len(self.system.outputs)
+        self._memory = PointsMemory(
+            *buffers(len(fmu.states), len(system.estimated)),
+            np.zeros(max(size, 2 * outputs)),
+            levels(size, outputs),
+            start=np.zeros(size),
+            root=np.zeros((size, size)),
+            points=np.zeros((2 * size, size)),
+            seen=np.zeros((2 * size, outputs)),
+            stack=np.zeros((2 * size + outputs, size + outputs)),
+            triangle=np.zeros((size + outputs, size + outputs)),
+        )
+
+    def _begin(self, u: Vector, y: Vector) -> None:
+        super()._begin(u, y)
+        self._memory.root[:] = 0.0

@@ -1,0 +1,247 @@
+"""An estimator without a Modelica class to a Co-Simulation FMU: its law in C, sample by sample.
+
+The law is translated from Python (`observers.export.translation`); the compiler makes C of the
+model, and `law.c` takes the place of the integrator. Settings become constants, memory a part of
+the FMU's state, so that nothing is allocated after the start and a saved state has all of it.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import casadi as ca
+
+from workbench.models import native
+from workbench.models.compiler import PLATFORMS, BuiltFMU, SteppingLaw, assemble
+from workbench.models.compiler.explicit import StateSpace
+from workbench.models.compiler.flat import FlatVariable
+from workbench.models.modelica import read_library
+from workbench.observers import Estimator
+from workbench.observers.export.beginning import remembered, said_by_first, usual_sample
+from workbench.observers.export.description import sampled
+from workbench.observers.export.plant import plant_code, plant_of
+from workbench.observers.export.translation import (
+    Array,
+    Data,
+    Number,
+    Primitive,
+    Program,
+    Record,
+    Several,
+)
+from workbench.observers.export.translation.data import contents
+from workbench.observers.export.translation.values import DOUBLE
+
+_HERE = Path(__file__).parent
+_SOURCES = {"integrator.c": _HERE / "law.c", "memory.h": _HERE / "law.h"}
+
+# Functions of the kernel that call the FMU, by the number of their arguments; law.c has them.
+_CALLS = {"set_inputs": 3, "set_states": 1, "place": 1, "evaluate": 1, "read": 1}
+_CALLS |= {"differentiate": 3, "linearise": 2}
+
+
+@dataclass(frozen=True)
+class EstimatorLaw:
+    """What an FMU of an estimator is made of.
+
+    Attributes
+    ----------
+    estimator : with its gains, on its FMU, which is started anew.
+    gains_file : text of gains.toml, kept in the FMU.
+    """
+
+    estimator: Estimator
+    gains_file: str
+
+    @property
+    def model(self) -> str:
+        """Dotted name of the FMU."""
+        library = read_library(self.estimator.system.library)
+        return f"{library.name}.{type(self.estimator).__name__}"
+
+
+def build_law(
+    law: EstimatorLaw,
+    fmu: Path,
+    fmi: int,
+    report: Callable[[str], None],
+    platforms: Sequence[str] = tuple(PLATFORMS),
+) -> BuiltFMU:
+    """Compile an estimator with its gains to a Co-Simulation FMU.
+
+    Parameters
+    ----------
+    fmu : file to write; written whole or not at all.
+    fmi : 2 or 3.
+    report : called with the name of each platform when it is about to be compiled.
+    platforms : names from `archive.PLATFORMS`.
+
+    Raises
+    ------
+    InputError
+        If the law has what is not translated, with file and line; its memory has no fixed size, or
+        does not follow the first sample linearly; its FMU is not of the system's library.
+    """
+    estimator = law.estimator
+    plant = plant_of(estimator)
+    stepped = SteppingLaw(
+        sources=_SOURCES,
+        tables={**plant_code(plant, estimator), **_law_code(estimator)},
+        described=lambda description: sampled(description, estimator.system.sample_time),
+        resources={"gains.toml": law.gains_file},
+    )
+    shell = replace(_shell(estimator), name=law.model, experiment=plant.experiment)
+    return assemble(shell, law.model, fmu, fmi, platforms, stepped, report)
+
+
+def _law_code(estimator: Estimator) -> dict[str, str]:
+    """Text of law_data.h, sizes and structs, and of law_code.h, contents and functions."""
+    begin, parts = remembered(estimator, usual_sample(estimator)), estimator.parts
+    data = Data(f"estimator {estimator.name}")
+    of_settings = data.type_of(parts.settings, "settings")
+    of_memory = data.type_of(begin.memory, "memory")
+    models = data.type_of(begin.model, "model")
+    assert isinstance(of_settings, Record)
+    assert isinstance(of_memory, Record)
+    assert isinstance(models, Several)
+    sizes = _sizes(estimator)
+    measured = [
+        Array(DOUBLE, (sizes[name],), (1,), constant=True) for name in ("INPUTS", "OUTPUTS")
+    ]
+    row = Array(DOUBLE, (sizes["ROW"],), (1,), constant=False)
+    program = Program(
+        {
+            getattr(native, name).py_func: Primitive(f"plant_{name}", count)
+            for name, count in _CALLS.items()
+        }
+    )
+    step = program.add(
+        parts.law,
+        [
+            models if parts.several else models.of,
+            replace(of_settings, constant=True),
+            of_memory,
+            Number(DOUBLE),
+            *measured,
+            row,
+        ],
+    )
+    named = f"typedef {of_settings.name} LawSettings_;\ntypedef {of_memory.name} LawMemory_;\n"
+    header = [
+        f"/* Sizes and structs of the law of {estimator.name}. */",
+        *(f"#define LAW_{name} {size}" for name, size in sizes.items()),
+        *("", data.definitions(), named),
+    ]
+    code = [
+        f"/* The law of {estimator.name}, translated from Python. */",
+        f"static const LawSettings_ law_settings = {contents(parts.settings)};",
+        "",
+        f"static const Law law_start = {contents(begin)};",
+        "",
+        f"static const double law_bands[] = {contents(estimator.bands)};",
+        "",
+        program.text(step),
+        "static void estimator_begin(Law *law, const double *sample) {",
+        "    *law = law_start;",
+        *(f"    {one.text}" for one in said_by_first(estimator)),
+        "}",
+        "",
+        "static int estimator_step(Law *law, double h, const double *sample, double *row) {",
+        "    const double *const y = sample + LAW_INPUTS;",
+        f"    int status = {step}(law->model, &law_settings, &law->memory, h, sample, y, row);",
+        f"    for (int k = 0; k < {estimator.bands.size}; k++) {{",
+        f"        row[{estimator.bands.size} + k] *= law_bands[k];",
+        "    }",
+        "    return status;",
+        "}",
+        "",
+    ]
+    return {"law_data.h": "\n".join(header), "law_code.h": "\n".join(code)}
+
+
+def _sizes(estimator: Estimator) -> dict[str, int]:
+    """Sizes that law.c asks for."""
+    system, parts = estimator.system, estimator.parts
+    instance = parts.models[0]
+    knowns, unknowns = instance.jacobian.shape
+    return {
+        "MODELS": len(parts.models),
+        "INPUTS": len(system.inputs),
+        "OUTPUTS": len(system.outputs),
+        "ROW": parts.width,
+        "SET": instance.u.size,
+        "READ": instance.y.size,
+        "KNOWNS": knowns,
+        "UNKNOWNS": unknowns,
+    }
+
+
+def _shell(estimator: Estimator) -> StateSpace:
+    """The FMU as other tools see it: samples are inputs, entries of an estimate are its states."""
+    system, defaults = estimator.system, estimator.fmu.defaults
+    inputs = [
+        _variable(one.name, one.unit, f"Measured: {one.label}", defaults.get(one.name, 0.0))
+        for one in (*system.inputs, *system.outputs)
+    ]
+    states = _entries(estimator)
+    x, u = (ca.vertcat(ca.SX(0, 1), *(one.symbol for one in group)) for group in (states, inputs))
+    nothing = ca.SX(0, 1)
+    return StateSpace(
+        name="",
+        description=f"{estimator.label[0].upper()}{estimator.label[1:]}: {system.title}",
+        experiment={},
+        t=ca.SX.sym("time"),
+        x=x,
+        u=u,
+        p=nothing,
+        f=ca.SX.zeros(len(states), 1),
+        w=nothing,
+        assertions=nothing,
+        assertion_texts=[],
+        states=states,
+        inputs=inputs,
+        parameters=[],
+        tunable=[],
+        outputs=[],
+        state_outputs=[one.name for one in states],
+    )
+
+
+def _entries(estimator: Estimator) -> list[FlatVariable]:
+    """Entries of an estimate: values, standard deviations, probabilities, and the innovation."""
+    system, defaults = estimator.system, estimator.fmu.defaults
+    seen = {one.name: f"{one.name}Estimate" for one in system.outputs}
+    ranges = {one.name: (_finite(one.low), _finite(one.high)) for one in system.estimated}
+    values = [
+        _variable(
+            seen.get(name, name),
+            unit,
+            f"Estimate of {name}",
+            defaults.get(name, 0.0),
+            ranges.get(name, (None, None)),
+        )
+        for name, unit in system.columns.items()
+    ]
+    deviations = [
+        _variable(f"sigma_{name}", unit, f"Standard deviation of {name}")
+        for name, unit in system.columns.items()
+    ]
+    modes = [
+        _variable(f"probability_{one}", "1", f"Probability of {one}") for one in estimator.modes
+    ]
+    return [*values, *deviations, *modes, _variable("nis", "1", "Normalised innovation squared")]
+
+
+def _finite(limit: float) -> float | None:
+    return limit if math.isfinite(limit) else None
+
+
+def _variable(
+    name: str,
+    unit: str,
+    description: str,
+    start: float = 0.0,
+    limits: tuple[float | None, float | None] = (None, None),
+) -> FlatVariable:
+    return FlatVariable(name, ca.SX.sym(name), start, unit, description, *limits, nominal=None)

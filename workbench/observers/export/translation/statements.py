@@ -1,0 +1,332 @@
+"""Statements of laws in C."""
+
+import ast
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from workbench.observers.export.translation.expressions import Expressions
+from workbench.observers.export.translation.names import names_of
+from workbench.observers.export.translation.values import (
+    DOUBLE,
+    INT,
+    Array,
+    Number,
+    Results,
+    Value,
+    c_number,
+    common,
+    declaration,
+    name_in_c,
+    number,
+)
+
+
+class Statements(Expressions):
+    """The body of one function of Python in C.
+
+    Parameters
+    ----------
+    kinds : of variables and of what is returned, by name, as far as they are known; extended.
+
+    Attributes
+    ----------
+    acts : whether it changes memory or the model.
+    changed : whether a kind turned out wider than was known, so that the text is not right yet.
+    declared : declarations at the top.
+    returned : how many numbers it returns, None: not known yet.
+    """
+
+    def __init__(
+        self,
+        function: ast.FunctionDef,
+        where: Callable[[ast.AST], str],
+        names: dict[str, Any],
+        kinds: dict[str, str],
+    ) -> None:
+        super().__init__(where, names)
+        self.names = names_of(function)
+        self.own = {*self.names.assigned, *self.names.counters}
+        self.kinds = kinds
+        self.acts = False
+        self.changed = False
+        self.declared: list[str] = []
+        self.returned: int | None = None
+        self._open: set[str] = set()  # variables that are declared
+        self._here: set[str] = set()  # arrays and records that were named in this block
+
+    @property
+    def result(self) -> Results:
+        """What is returned."""
+        return Results(tuple(self.kinds[f"return {k}"] for k in range(self.returned or 0)))
+
+    def argument(self, name: str, value: Value) -> None:
+        """Give an argument its value."""
+        self.env[name] = value
+        if isinstance(value.type, Number):
+            self.kinds.setdefault(name, value.type.kind)
+            self._open.add(name)
+
+    # --- blocks ---
+
+    def block(self, statements: Sequence[ast.stmt]) -> list[str]:
+        """Lines of a block."""
+        outer, self.lines = self.lines, []
+        env, opened, here = dict(self.env), set(self._open), self._here
+        self._here = set()
+        for statement in statements:
+            self.statement(statement)
+        lines, self.lines, self._here = self.lines, outer, here
+        # What is declared in a block ends with it.
+        at_top = self._open - self.names.local
+        self.env = {name: one for name, one in self.env.items() if name in at_top} | env
+        self._open = opened | at_top
+        return lines
+
+    def statement(self, node: ast.stmt) -> None:
+        """Translate one statement."""
+        method = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if method is None:
+            raise self.refused(node, "a statement that is not translated")
+        method(node)
+
+    def _pass(self, node: ast.Pass) -> None:
+        pass
+
+    def _break(self, node: ast.Break) -> None:
+        self.lines.append("break;")
+
+    def _continue(self, node: ast.Continue) -> None:
+        self.lines.append("continue;")
+
+    def _expr(self, node: ast.Expr) -> None:
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            return
+        value = self.value(node.value)
+        if value.acts:
+            self.lines.append(f"{value.text};")
+
+    def _if(self, node: ast.If) -> None:
+        test = self.test(node.test)
+        self.branch(test.text, self.block(node.body), self.block(node.orelse))
+
+    def _while(self, node: ast.While) -> None:
+        if node.orelse:
+            raise self.refused(node, "a loop with an else")
+        ((test, before),) = self.tests_apart([node.test])
+        head = f"while ({test.text}) {{"
+        leave: list[str] = []
+        if before or test.known:
+            head = "for (;;) {"
+            leave = (
+                before if test.known else [*before, f"if (!({test.text})) {{", "    break;", "}"]
+            )
+        self.lines += [head, *_indented([*leave, *self.block(node.body)]), "}"]
+
+    def _for(self, node: ast.For) -> None:
+        call, target = node.iter, node.target
+        if not (isinstance(call, ast.Call) and self.object(call.func) is range) or node.orelse:
+            raise self.refused(node, "a loop that is not over a range")
+        if not isinstance(target, ast.Name) or target.id in {*self.names.assigned, *self.env}:
+            raise self.refused(node, "a counter that has a value elsewhere, or no name")
+        ends = [self._index(one) for one in call.args]
+        if len(ends) == 1:
+            ends = [number(0), *ends]
+        first, last = ends[0], self.temporary(ends[1]) if self._moves(ends[1]) else ends[1]
+        step = ends[2].known if len(ends) == 3 else 1
+        if not isinstance(step, int) or step == 0:
+            raise self.refused(node, "a range with a step that is not known in advance")
+        name = name_in_c(target.id)
+        advance = {1: f"{name}++", -1: f"{name}--"}.get(step, f"{name} += {step}")
+        low = last.known is not None and last.known >= -1
+        self.env[target.id] = Value(Number(INT), name, natural=first.natural if step > 0 else low)
+        body = self.block(node.body)
+        del self.env[target.id]
+        stays = f"{name} {'<' if step > 0 else '>'} {last.operand}"
+        self.lines.append(f"for (int {name} = {first.text}; {stays}; {advance}) {{")
+        self.lines += [*_indented(body), "}"]
+
+    def _moves(self, end: Value) -> bool:
+        """Whether a loop may change its own end."""
+        within = set(re.findall(r"[A-Za-z_]\w*", end.text))
+        changing = {name_in_c(one) for one, count in self.names.assigned.items() if count > 1}
+        return end.known is None and (end.reads or bool(within & changing))
+
+    def _return(self, node: ast.Return) -> None:
+        found = () if node.value is None else self.found(node.value)
+        values = found if isinstance(found, tuple) else (found,)
+        if not all(isinstance(one.type, Number) for one in values):
+            raise self.refused(node, "a result that is no number")
+        if self.returned not in (None, len(values)):
+            raise self.refused(node, "a result of another size than before")
+        self.returned = len(values)
+        for k, one in enumerate(values):
+            self._widen(f"return {k}", one.kind)
+        if len(values) > 1:
+            listed = ", ".join(one.text for one in values)
+            self.lines.append(f"return ({self.result.name}){{{listed}}};")
+        else:
+            self.lines.append(f"return {values[0].text};" if values else "return;")
+
+    # --- assignments ---
+
+    def _assign(self, node: ast.Assign) -> None:
+        (first, *others) = node.targets
+        if isinstance(first, ast.Tuple):
+            if others:
+                raise self.refused(node, "a tuple that is assigned twice")
+            self._assign_several(node, first)
+            return
+        if not others and self._decide(first, node.value):
+            return
+        value = self.value(node.value)
+        if others and value.known is None and isinstance(value.type, Number):
+            value = self.temporary(value)
+        for target in node.targets:
+            self._store(target, value)
+
+    def _decide(self, target: ast.expr, value: ast.expr) -> bool:
+        """`status = status or ...`, without a second variable; whether it was that."""
+        if not isinstance(target, ast.Name) or not isinstance(value, ast.BoolOp):
+            return False
+        first, *later = value.values
+        used = {n.id for one in later for n in ast.walk(one) if isinstance(n, ast.Name)}
+        if target.id in used:
+            return False
+        ((start, before),), rest = self.apart([first]), self.apart(later)
+        if {INT} != {one.kind for one, _ in [(start, before), *rest]}:
+            return False
+        self.lines += before
+        name = self._give(target.id, start, constant=False)
+        self.decide(value.op, name, rest)
+        return True
+
+    def _give(self, name: str, value: Value, constant: bool) -> str:
+        """Give a variable a value, and declare it where that is due; its name in C."""
+        kind, written = self._widen(name, value.kind), name_in_c(name)
+        if name in self.names.local and name not in self._open:
+            fixed = "const " * (constant and self.names.assigned[name] == 1)
+            self.lines.append(f"{fixed}{c_number(kind)} {written} = {value.text};")
+        elif value.text != written:
+            self.lines.append(f"{written} = {value.text};")
+        if name not in self.names.local and name not in self._open:
+            self.declared.append(f"{c_number(kind)} {written} = 0;")
+        self._open.add(name)
+        self.env[name] = Value(Number(kind), written)
+        return written
+
+    def _widen(self, name: str, kind: str) -> str:
+        known = self.kinds.get(name)
+        wider = kind if known is None else common(known, kind)
+        self.kinds[name] = wider
+        self.changed = self.changed or known not in (None, wider)
+        return wider
+
+    def _assign_several(self, node: ast.Assign, target: ast.Tuple) -> None:
+        found = self.found(node.value)
+        values = list(found) if isinstance(found, tuple) else self._parts(node, found)
+        if len(values) != len(target.elts):
+            raise self.refused(node, "another number of values than of names")
+        written = {one.id for one in target.elts if isinstance(one, ast.Name)}
+        read = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
+        if len(written) < len(target.elts) or written & read:
+            # A later value may stand where an earlier one goes.
+            values = [self.temporary(one) if self._is_open(one) else one for one in values]
+        for one, value in zip(target.elts, values, strict=True):
+            self._store(one, value)
+
+    @staticmethod
+    def _is_open(value: Value) -> bool:
+        return isinstance(value.type, Number) and value.known is None
+
+    def _parts(self, node: ast.Assign, found: Value) -> list[Value]:
+        """Numbers of a call that gives several."""
+        if not isinstance(found.type, Results):
+            raise self.refused(node, "one value for several names")
+        self._temporaries += 1
+        name = f"given{self._temporaries}"
+        self.lines.append(f"{declaration(found.type, name)} = {found.text};")
+        return [Value(Number(kind), f"{name}.part{k}") for k, kind in enumerate(found.type.kinds)]
+
+    def _store(self, target: ast.expr, value: Value) -> None:
+        if isinstance(target, ast.Name):
+            self._name_it(target, value)
+        elif isinstance(target, ast.Subscript) and isinstance(value.type, Number):
+            value = self.temporary(value) if value.acts else value
+            place = self._place(target)
+            self.lines.append(f"{place.text} = {_converted(place, value)};")
+        else:
+            raise self.refused(target, "what is not assigned to, or no number that is assigned")
+
+    def _place(self, target: ast.Subscript) -> Value:
+        """An element that is assigned to."""
+        of, place = self.found(target.value), self.value(target)
+        if isinstance(of, tuple) or not isinstance(of.type, Array):
+            raise self.refused(target, "what is no array")
+        if not isinstance(place.type, Number):
+            raise self.refused(target, "a part of an array that is assigned to")
+        if of.type.constant:
+            raise self.refused(target, "what the law may only read, but is assigned to")
+        self.acts = True
+        return place
+
+    def _name_it(self, target: ast.Name, value: Value) -> None:
+        if isinstance(value.type, Results):
+            raise self.refused(target, "no number, or several, under one name")
+        if not isinstance(value.type, Number):
+            self._alias(target, value)
+        elif self.names.assigned[target.id] == 1 and value.known is not None:
+            self.env[target.id] = value
+        else:
+            self._give(target.id, value, constant=True)
+            if self.names.assigned[target.id] == 1:
+                self.env[target.id] = replace(self.env[target.id], natural=value.natural)
+
+    def _alias(self, target: ast.Name, value: Value) -> None:
+        """A name for an array or a record."""
+        name = name_in_c(target.id)
+        if target.id in self._here:
+            self._temporaries += 1
+            name = f"{name}_{self._temporaries}"
+        elif target.id in self.env or target.id in self._open:
+            raise self.refused(
+                target, "an array whose name has another meaning outside of a branch"
+            )
+        sizes = tuple(
+            self.temporary(size) if size.known is None and self._moves(size) else size
+            for size in value.sizes
+        )
+        self._here.add(target.id)
+        self.lines.append(f"{declaration(value.type, name)} = {value.address};")
+        self.env[target.id] = Value(value.type, name, sizes=sizes)
+
+    def _augassign(self, node: ast.AugAssign) -> None:
+        value = self.number(node.value)
+        if isinstance(node.target, ast.Name):
+            place = self.number(ast.copy_location(ast.Name(node.target.id, ast.Load()), node))
+        elif isinstance(node.target, ast.Subscript):
+            place = self._place(node.target)
+        else:
+            raise self.refused(node, "what cannot be assigned to")
+        sign = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}.get(type(node.op))
+        before = place
+        if value.acts:
+            before, value, sign = self.temporary(place), self.temporary(value), None
+        after = self._operation(node, node.op, before, value)
+        if isinstance(node.target, ast.Name):
+            kind = self._widen(node.target.id, after.kind)
+            place = self.env[node.target.id] = Value(Number(kind), place.text)
+        if sign is None or place.kind != DOUBLE:
+            self.lines.append(f"{place.text} = {_converted(place, after)};")
+        else:
+            self.lines.append(f"{place.text} {sign} {value.text};")
+
+
+def _converted(place: Value, value: Value) -> str:
+    whole = place.kind != DOUBLE and value.kind == DOUBLE
+    return f"(int){value.operand}" if whole else value.text
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]

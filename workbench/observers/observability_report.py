@@ -1,0 +1,474 @@
+"""Observability of states and estimated quantities: figure, files and table."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from workbench.observers.observability import (
+    STRIDE,
+    WINDOW,
+    CaseObservability,
+    LinearTest,
+    WindowTest,
+    prior,
+)
+from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.figures import STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.pages.measures import percentage, unit_suffix, whole_percent
+from workbench.pages.parts import Cell, Heading, Part, Rows, number, write_parts
+from workbench.pages.recordings import placed
+from workbench.pages.views import called, capital, named, per_shown, shown_unit
+from workbench.runtime.files import write_json, write_whole
+from workbench.system.system import System
+
+_COLOURS = ("#0072B2", "#D55E00")
+
+
+_LINES = ("-", "--")
+
+
+def draw_observability(one: CaseObservability, path: Path) -> None:
+    """Draw one recording to `path` (PNG): an input and an output, then the bounds of quantities.
+
+    Bounds are drawn at the end of their window and shaded where the first model's are useful.
+    """
+    system, case = one.system, one.case
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+        top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
+        figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
+        for first in system.inputs[:1]:
+            values = case[first.name] / per_shown(system, first.name, first.shown)
+            top.plot(case.time, values, color="#D55E00", label=first.name)
+            top.set_ylabel(f"{first.name} [{first.shown}]")
+        beside = _beside(system)
+        other = top.twinx()
+        other.plot(case.time, one.run.signal(beside), color="#0072B2", label=beside)
+        other.set_ylabel(f"{called(system, beside)} [{system.unit(beside)}]")
+        other.grid(visible=False)
+        other.spines["right"].set_visible(True)
+        handles = [*top.get_lines(), *other.get_lines()]
+        top.legend(handles, [str(h.get_label()) for h in handles], loc="upper right", ncols=2)
+        for j, axes in enumerate(rows):
+            _draw_bounds(one, j, axes)
+        rows[-1].set_xlabel("time [s]")
+        figure.align_ylabels()
+        save_figure(figure, [path])
+
+
+def _beside(system: System) -> str:
+    """What shows the state of the machine beside its first input: what the model reports last."""
+    return [*(one.name for one in system.outputs), *system.reported][-1]
+
+
+def _draw_bounds(one: CaseObservability, j: int, axes: Any) -> None:
+    """Bounds of quantity j by all models."""
+    quantity, known = one.system.estimated[j], float(prior(one.system)[j])
+    for test, colour, line in zip(one.tests, _COLOURS, _LINES, strict=False):
+        axes.semilogy(test.time, test.bound[:, j], line, color=colour, label=test.model)
+    first = one.tests[0]
+    axes.fill_between(
+        first.time,
+        0.0,
+        1.0,
+        where=list(first.useful()[:, j]),
+        transform=axes.get_xaxis_transform(),
+        color=_COLOURS[0],
+        alpha=0.08,
+        linewidth=0,
+    )
+    axes.axhline(
+        quantity.useful, color="black", linewidth=0.8, label=f"useful below {quantity.useful:g}"
+    )
+    axes.axhline(known, color="#999999", linewidth=0.8, linestyle=":", label="known beforehand")
+    axes.set_ylabel(f"bound of {quantity.correction} [{quantity.unit}]")
+    # Room for the legend above the prior.
+    axes.set_ylim(3e-4 * known, 20.0 * known)
+    axes.legend(loc="upper center", ncols=4, fontsize=7)
+
+
+def write_windows(one: CaseObservability, path: Path) -> None:
+    """Write one CSV of a recording: end of the window, bounds and remaining shares by model."""
+    system, first = one.system, one.tests[0]
+    at = np.searchsorted(one.case.time, first.time)
+    columns: dict[str, Any] = {"time [s]": first.time}
+    for signal in system.inputs:
+        factor = per_shown(system, signal.name, signal.shown)
+        columns[f"{signal.name} [{signal.shown}]"] = one.case[signal.name][at] / factor
+    for name in (*system.reported, *(quantity.name for quantity in system.estimated)):
+        columns[f"{name} [{system.unit(name)}]"] = one.run.signal(name)[at]
+    columns["judged [1]"] = one.judged.astype(int)
+    for test in one.tests:
+        for j, quantity in enumerate(system.estimated):
+            columns[f"{test.model}.bound_{quantity.correction} [{quantity.unit}]"] = test.bound[
+                :, j
+            ]
+        for j, name in enumerate(test.states):
+            columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
+    write_whole(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
+
+
+def write_observability(
+    system: System,
+    linear: Sequence[LinearTest],
+    done: Sequence[CaseObservability],
+    provenance: Mapping[str, Any],
+    path: Path,
+) -> None:
+    """Write observability.json: the linear test of each model, shares of each recording."""
+    point = system.tested
+    summary = {
+        "provenance": provenance,
+        "operating_point": {
+            "inputs": dict(point.inputs),
+            "held": {name: formula.text for name, formula in point.held.items()},
+            "quantities": dict(point.quantities),
+        },
+        "noise": {
+            one.name: {"absolute": one.noise, "relative": one.relative_noise}
+            for one in (*system.inputs, *system.outputs)
+        },
+        "window_s": WINDOW,
+        "stride_s": STRIDE,
+        "prior": dict(zip(system.corrections, prior(system).tolist(), strict=True)),
+        "useful": {one.correction: one.useful for one in system.estimated},
+        "linear": {test.model: _linear(test) for test in linear},
+        "cases": {
+            one.case.name: {
+                "title": one.case.title,
+                "judged_windows": int(one.judged.sum()),
+                **{f"median_{name}": value for name, value in _medians(one).items()},
+                "models": {test.model: _shares(test, one) for test in one.tests},
+            }
+            for one in done
+        },
+    }
+    write_json(path, with_answer(observed(system, summary), summary))
+
+
+def _linear(test: LinearTest) -> dict[str, Any]:
+    return {
+        "observable": test.observable,
+        "rank": test.rank,
+        "states": {
+            name: {"at": float(x), "scale": float(scale), "remaining": float(remaining)}
+            for name, x, scale, remaining in zip(
+                test.states, test.x, test.scale, test.remaining, strict=True
+            )
+        },
+        "information": test.information.tolist(),
+        "unobservable": test.unobservable,
+        "invisible": test.invisible,
+    }
+
+
+def _medians(one: CaseObservability) -> dict[str, float | None]:
+    """Quantities of the trajectory, on which their bounds depend; None if nothing is judged."""
+    at = np.searchsorted(one.case.time, one.tests[0].time[one.judged])
+    names = [quantity.name for quantity in one.system.estimated]
+    return {n: float(np.median(one.run.signal(n)[at])) if at.size else None for n in names}
+
+
+def _shares(test: WindowTest, one: CaseObservability) -> dict[str, Any]:
+    """Shares of the judged windows; None for a recording without."""
+    if not one.judged.any():
+        return {"useful": None, "median_bound": None, "states_observable": None}
+    useful = test.useful()[one.judged].mean(axis=0)
+    median = np.median(test.bound[one.judged], axis=0)
+    observable = test.states_observable()[one.judged].mean(axis=0)
+    names = one.system.corrections
+    return {
+        "useful": dict(zip(names, useful.tolist(), strict=True)),
+        "median_bound": dict(zip(names, median.tolist(), strict=True)),
+        "states_observable": dict(zip(test.states, observable.tolist(), strict=True)),
+    }
+
+
+def format_observability(
+    system: System, linear: Sequence[LinearTest], done: Sequence[CaseObservability]
+) -> str:
+    """Table for the terminal: linear test by model and state, shares of judged time by case."""
+    return "\n".join(
+        [
+            *_linear_lines(system, linear),
+            "",
+            *_case_lines(system, done),
+            "Bounds are floors, for a right model at the estimated quantities (their medians), "
+            "which are constant within\nthe window. An estimate may err by far more where the "
+            "model differs.",
+        ]
+    )
+
+
+def _linear_lines(system: System, linear: Sequence[LinearTest]) -> list[str]:
+    lines = [
+        f"Linear test: one second at {_point(system)}; left = standard deviation after it over "
+        "before it"
+    ]
+    for test in linear:
+        verdict = "observable" if test.observable else "not observable"
+        information = ", ".join(f"{value:.2g}" for value in test.information[::-1])
+        lines.append(f"{test.model}: rank {test.rank} of {len(test.states)}, {verdict}")
+        lines.append(f"  information by direction, observable above 1: {information}")
+        for name, scale, left in zip(test.states, test.scale, test.remaining, strict=True):
+            strength = "invisible" if name in test.invisible else "weak"
+            remark = f"  {strength}" if name in test.unobservable else ""
+            lines.append(f"  {name:<10} scale {scale:8.3g}   left {100 * left:6.2f} %{remark}")
+    return lines
+
+
+def _point(system: System) -> str:
+    """The operating point in the units of people."""
+    parts = []
+    for name, value in system.tested.inputs.items():
+        unit = shown_unit(system, name)
+        parts.append(f"{name} {value / per_shown(system, name, unit):g} {unit}")
+    parts += [f"{name} {formula.text}" for name, formula in system.tested.held.items()]
+    parts += [f"{name} {value:g}" for name, value in system.tested.quantities.items()]
+    return ", ".join(parts) or "rest"
+
+
+def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
+    first, last = done[0].tests[0], done[0].tests[-1]
+    width = max([len("case"), *(len(one.case.name) for one in done)])
+    header = f"{'case':<{width}}" + "".join(
+        f"{one.name:>9}{f'{one.correction} < {one.useful:g}':>16}{'median':>10}"
+        for one in system.estimated
+    )
+    hidden = [name for name in last.states if name not in first.states]
+    header += "".join(f"{name:>11}" for name in hidden)
+    lines = [
+        f"Share of time {system.objective.when or 'that is judged'} in which {WINDOW:g} s of "
+        f"samples tell: {', '.join(system.corrections)} ({first.model})"
+        + (f", states ({last.model})" if hidden else ""),
+        header,
+        "-" * len(header),
+    ]
+    for one in done:
+        row = f"{one.case.name:<{width}}"
+        shares, states = _shares(one.tests[0], one), _shares(one.tests[-1], one)
+        if shares["useful"] is None:
+            lines.append(f"{row}  nothing is judged")
+            continue
+        medians = _medians(one)
+        for quantity in system.estimated:
+            row += f"{medians[quantity.name]:>9.2g}"
+            row += f"{100 * shares['useful'][quantity.correction]:>14.0f} %"
+            row += f"{shares['median_bound'][quantity.correction]:>10.2g}"
+        row += "".join(f"{100 * states['states_observable'][name]:>9.0f} %" for name in hidden)
+        lines.append(row)
+    return lines
+
+
+_STYLES = ("2", "1")  # of the models
+
+
+_REACH = 3.0  # times the bound from which on an estimate serves: what is far above tells nothing
+
+
+def write_observability_page(
+    summary: Mapping[str, Any], done: Sequence[CaseObservability], planned: int, out: Path
+) -> Path:
+    """Write the page into the folder; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to observability.json.
+    planned : number of cases that were asked for.
+    """
+    system = done[0].system
+    figures = [_figure(one) for one in sorted(done, key=_share)]
+    drawn = placed(figures, summary, out)
+    names = ", ".join(capital(one.label) for one in system.estimated) or "States"
+    parts = [
+        Part("shown", "Where the samples tell least", (_EXPLAINED,), recordings=tuple(drawn[:1])),
+        Part("cases", "Recordings", tables=(_cases(system, summary),), printed=True),
+        Part("linear", "Linear test of the models", (_LINEAR,), tables=tuple(_states(summary))),
+        Part("definitions", "Definitions", terms=_terms(summary)),
+    ]
+    if drawn[1:]:
+        parts.insert(2, Part("others", "The other recordings", recordings=tuple(drawn[1:])))
+    missing = planned - len(done)
+    warnings = [f"Incomplete: {len(done)} of {planned} recordings, interrupted."] * bool(missing)
+    path = out / "index.html"
+    write_parts(
+        f"What the measurements can tell: {names}",
+        summary,
+        parts,
+        path,
+        file="observability.json",
+        warnings=warnings,
+    )
+    return path
+
+
+_EXPLAINED = (
+    "For each quantity the smallest standard deviation that any estimator can reach with the "
+    "samples of one window; where it stays under the line, an estimate serves. Curves that leave a "
+    "panel say that the samples tell nothing. A bound holds for a right model: an estimate may err "
+    "by more where the model differs."
+)
+
+
+_LINEAR = (
+    "One second about one operating point: what is left of the standard deviation of a state after "
+    "it, over that before it. A state that keeps nearly all of it cannot be observed there."
+)
+
+
+def _share(one: CaseObservability) -> float:
+    """Share of the judged windows in which all quantities can be told."""
+    useful = one.tests[0].useful()
+    return float(useful[one.judged].mean()) if one.judged.any() and useful.size else 1.0
+
+
+def _figure(one: CaseObservability) -> CaseFigure:
+    """An input, and the bounds of each quantity by model, at the ends of the windows."""
+    system, time = one.system, one.tests[0].time
+    at = np.searchsorted(one.case.time, time)
+    panels = []
+    for signal in system.inputs[:1]:
+        unit = shown_unit(system, signal.name)
+        values = one.case[signal.name][at] / per_shown(system, signal.name, unit)
+        low, high = float(values.min()), float(values.max())
+        room = 0.08 * (high - low) or 1.0
+        title = f"{capital(named(system, signal.name))} [{unit}]"
+        panels.append(
+            Panel(title, unit, low - room, high + room, 0.6, (Curve("measured", values),))
+        )
+    for j, quantity in enumerate(system.estimated):
+        line = Curve("raw", np.full(time.size, quantity.useful))
+        curves = [
+            Curve(style, np.interp(time, test.time, test.bound[:, j]))
+            for test, style in zip(one.tests, _STYLES, strict=False)
+        ]
+        title = f"Bound of {called(system, quantity.name)} {quantity.name} [{quantity.unit}]"
+        reach = _REACH * quantity.useful
+        panels.append(Panel(title, quantity.unit, 0.0, reach, 1.0, (line, *curves)))
+    legend = [("raw", "an estimate serves below")]
+    legend += [(style, t.model) for t, style in zip(one.tests, _STYLES, strict=False)]
+    share = f"All quantities can be told in {100.0 * _share(one):.0f} % of the judged time."
+    return CaseFigure(
+        name=one.case.name,
+        title=one.case.title,
+        finding=share if one.judged.any() else "Nothing is judged here.",
+        time=time,
+        window=None,
+        legend=(("measured", "measured"), *legend),
+        panels=tuple(panels),
+    )
+
+
+def _cases(system: System, summary: Mapping[str, Any]) -> Rows:
+    columns = [Heading("recording", number=False), Heading("conditions", number=False)]
+    for one in system.estimated:
+        unit = "" if one.unit == "1" else f" [{one.unit}]"
+        columns += [
+            Heading(f"{one.name}, median{unit}"),
+            Heading(
+                f"{one.name} can be told [%]", meaning=f"time with a bound below {one.useful:g}"
+            ),
+            Heading(f"bound of {one.name}, median{unit}"),
+        ]
+    rows = []
+    for name, case in summary["cases"].items():
+        first = next(iter(case["models"].values()))
+        cells = [Cell(case["title"])]
+        for one in system.estimated:
+            share = None if first["useful"] is None else first["useful"][one.correction]
+            bound = None if first["median_bound"] is None else first["median_bound"][one.correction]
+            cells += [
+                number(case[f"median_{one.name}"], "{:.3g}".format),
+                number(None if share is None else 100.0 * share, "{:.0f}".format, share),
+                number(bound, "{:.2g}".format),
+            ]
+        rows.append((name, tuple(cells)))
+    caption = (
+        f"How well windows of {summary['window_s']:g} s know each quantity, over the judged time "
+        "of each recording, by the first model."
+    )
+    return Rows("case-table", caption, tuple(columns), tuple(rows))
+
+
+def _states(summary: Mapping[str, Any]) -> list[Rows]:
+    tables = []
+    for model, test in summary["linear"].items():
+        rows = tuple(
+            (
+                name,
+                (
+                    number(100.0 * one["remaining"], "{:.2f}".format, one["remaining"]),
+                    number(one["scale"], "{:.3g}".format),
+                    Cell(_verdict(name, test)),
+                ),
+            )
+            for name, one in test["states"].items()
+        )
+        columns = (
+            Heading("state", number=False),
+            Heading("left after a second [%]"),
+            Heading("scale [unit of the state]"),
+            Heading("verdict", number=False),
+        )
+        seen = "observable" if test["observable"] else "not observable"
+        caption = f"{model}: rank {test['rank']} of {len(test['states'])}, {seen}."
+        tables.append(Rows(f"linear-{model}", caption, columns, rows))
+    return tables
+
+
+def _verdict(name: str, test: Mapping[str, Any]) -> str:
+    if name not in test["unobservable"]:
+        return "observable"
+    return "invisible" if name in test["invisible"] else "weakly seen"
+
+
+def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "Bound": "Cramer-Rao: no unbiased estimator has a smaller standard deviation, given the "
+        f"noise of the sensors and {WINDOW:g} s of samples, with what is known beforehand.",
+        "Can be told": "The bound is below the value from which on an estimate serves, which the "
+        "system file gives for each quantity ("
+        + ", ".join(f"{name} {value:g}" for name, value in summary["useful"].items())
+        + ").",
+        "Rank": "Number of directions in the space of states that one second of outputs shows "
+        "beyond their noise.",
+    }
+
+
+def observed(system: System, summary: Mapping[str, Any]) -> Answer:
+    """The answer of `observability`."""
+    headline, details = {}, {}
+    cases = summary["cases"]
+    words = []
+    for one in system.estimated:
+        shares, bounds = {}, {}
+        for case, values in cases.items():
+            first = next(iter(values["models"].values()))
+            if first["useful"] is not None:
+                shares[case] = first["useful"][one.correction]
+                bounds[case] = first["median_bound"][one.correction]
+        for case, share in shares.items():
+            details[f"{case}: time in which {one.name} can be told"] = percentage(share, "higher")
+            details[f"{case}: bound of {one.name}"] = Measure(bounds[case], one.unit, "lower")
+        if shares:
+            middle = float(np.median(list(shares.values())))
+            headline[f"time in which {one.name} can be told, median"] = percentage(middle, "higher")
+            low, high = min(shares.values()), max(shares.values())
+            between = f" ({whole_percent(low)} to {whole_percent(high)})" if len(shares) > 1 else ""
+            words.append(
+                f"{one.label} {one.name} to {one.useful:g}{unit_suffix(one.unit)} in "
+                f"{whole_percent(middle)} of the judged time{between}"
+            )
+    first, test = next(iter(summary["linear"].items()))
+    seen = "can" if test["observable"] else "cannot"
+    window = f"{summary['window_s']:g} s of samples"
+    said = f"{window} can tell {'; '.join(words)}. " if words else ""
+    states = f"All states of {first} {seen} be observed in the linear test."
+    if not test["observable"]:
+        states = f"Not all states of {first} can be observed: {', '.join(test['unobservable'])}."
+    return Answer(f"{said[:1].upper()}{said[1:]}{states}", headline, details)

@@ -1,0 +1,147 @@
+"""An estimator beside a recording, stage 4."""
+
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
+from workbench.observers import Estimate, Estimator, Gains
+from workbench.observers.gains_file import usual_gains
+from workbench.observers.run import Ending, Run
+from workbench.recordings.case import Case
+from workbench.system.registry import companion_part, open_model
+from workbench.system.system import System
+
+if TYPE_CHECKING:
+    pass
+
+
+SURE = 0.95  # probability, that of a band
+
+
+def observed(case: Case, system: System, kind: type[Estimator], gains: Gains | None = None) -> Run:
+    """Feed a recording to an estimator on the system's model, with its usual gains unless given.
+
+    Raises
+    ------
+    InputError
+        If the model is not fit for it.
+    """
+    with open_model(system, kind.role) as fmu:
+        return replay(case, kind(fmu, system, gains or usual_gains(kind, fmu, system)))
+
+
+def replay(case: Case, estimator: Estimator) -> Run:
+    """Feed a recording to an estimator, sample by sample; a failure is a value of the run."""
+    begin = time.perf_counter()
+    system = estimator.system
+    blank = np.full((case.time.size, len(system.columns)), np.nan)
+    estimate = Estimate(
+        blank, blank, blank[:, 0], np.full((len(blank), len(estimator.modes)), np.nan)
+    )
+    claimed: dict[str, NDArray[np.bool_]] = {}
+    ending, message = Ending.OK, ""
+    try:
+        estimator.tell(case.conditions)
+        estimate = estimator.run(case.time, case.u, case.y)
+        seconds = time.perf_counter() - begin
+        values = np.asarray(estimate.values)
+        given = np.isfinite(values[0])  # what the method estimates at all
+        if not given.any():
+            ending, message = Ending.NOT_FINITE, "from the start"
+        elif (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
+            ending = Ending.NOT_FINITE
+            message = f"at t = {case.time[lost[0]]:.3f} s"
+        claimed = _claims(case, estimator, values, np.asarray(estimate.probability))
+    except FMUError as error:
+        seconds = time.perf_counter() - begin
+        ending, message = Ending.FMU_FAILED, str(error)
+    told = np.asarray(estimate.values), np.asarray(estimate.sigma)
+    values, sigma = with_indirect(system.under(case.conditions), *told)
+    return Run(
+        case=case.name,
+        estimator=estimator.name,
+        columns={**system.columns, **{n: one.unit for n, (one, _) in system.indirect.items()}},
+        time=case.time,
+        estimate=values,
+        sigma=sigma,
+        nis=np.asarray(estimate.nis),
+        ending=ending,
+        message=message,
+        seconds=seconds,
+        claimed=claimed or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
+        probability=dict(zip(estimator.modes, np.asarray(estimate.probability).T, strict=True)),
+    )
+
+
+def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix, Matrix]:
+    """Estimates and standard deviations, (n, w + d), with those of `System.indirect` behind them.
+
+    Standard deviations to first order: by what a formula changes over both of its column's.
+    """
+    more, deviations = [values], [sigma]
+    for one, name in system.indirect.values():
+        at = list(system.columns).index(name)
+        value, reach = values[:, at], sigma[:, at]
+        middle, high, low = (
+            system.evaluate(one.formula, {name: column})
+            for column in (value, value + reach, value - reach)
+        )
+        more.append(middle[:, None])
+        deviations.append(0.5 * np.abs(high - low)[:, None])
+    return np.hstack(more), np.hstack(deviations)
+
+
+def _rules(estimator: Estimator) -> Mapping[str, object]:
+    """Rules of the system's companion on when a quantity is shown, by its name."""
+    part = companion_part(estimator.system.companion, "claims")
+    return part.CLAIMS if part else {}
+
+
+def _doubted(estimator: Estimator) -> list[str]:
+    """Estimated quantities that are not always shown."""
+    rules = _rules(estimator)
+    return [one.name for one in estimator.system.estimated if one.claimed or one.name in rules]
+
+
+def _claims(
+    case: Case, estimator: Estimator, values: Matrix, probability: Matrix
+) -> dict[str, NDArray[np.bool_]]:
+    """Where quantities may be claimed; of several models, by those that are hardly wrong.
+
+    A rule judges by the estimate itself, which may pass through what the rule asks for: where a
+    linearised filter first sees a quantity, a noisy sample may lead it far off, and makes it sure.
+    So the rule must be met for as long as the quantity takes to walk as far as is useful.
+    """
+    rules, system = _rules(estimator), estimator.system
+    claimed = {}
+    for name in _doubted(estimator):
+        one = next(one for one in system.estimated if one.name == name)
+        met = all(
+            key in estimator.finds or case.conditions[key] == value
+            for key, value in one.claimed.items()
+        )
+        if met and name in rules:
+            shares = [rules[name](fmu, system, values) for fmu in estimator.models]  # type: ignore[operator]
+            weights = probability if estimator.modes else np.ones((case.time.size, 1))
+            sure = (np.column_stack(shares) * weights).sum(axis=1) > SURE
+            span = (one.useful / one.walk) ** 2 if one.walk > 0.0 else 0.0
+            claimed[name] = lasting(sure, case.time, span)
+        else:
+            claimed[name] = np.full(case.time.size, met)
+    return claimed
+
+
+def lasting(met: NDArray[np.bool_], time: Vector, span: float) -> NDArray[np.bool_]:
+    """Where a condition has been met for so long [s], (n,).
+
+    >>> lasting(np.array([1, 0, 1, 1, 1], bool), np.arange(5.0), 2.0).tolist()
+    [False, False, False, True, True]
+    """
+    unmet = np.maximum.accumulate(np.where(met, time[0], time))
+    kept: NDArray[np.bool_] = met & (time - unmet >= span)
+    return kept

@@ -1,0 +1,137 @@
+"""How well a run fits its recording, stage 5: errors of what is judged, and z of the paper."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from workbench.arrays import Vector
+from workbench.models.native import compiled
+from workbench.observers.run import Ending, Run
+from workbench.recordings.case import Case
+from workbench.system.system import Objective, System
+
+# Two equal poles at a corner are down by 3 dB at this share of it.
+_CORNER = 2 * np.pi / np.sqrt(np.sqrt(2) - 1)
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of one run; None where they cannot be judged, and why.
+
+    Attributes
+    ----------
+    rms : rms error of the judged signal in the window, below the bandwidth [its unit].
+    nrmse : the same over the mean of its size [1].
+    z : objective z_k of equation (12), over the whole recording, of deviations below the
+        bandwidth [1].
+    reason : why a value is missing; empty if none is.
+    """
+
+    rms: float | None
+    nrmse: float | None
+    z: float | None
+    reason: str
+
+
+def judged_window(case: Case, system: System) -> slice:
+    """Samples in which the judged signal counts; empty where the recording has none."""
+    first, last = 0, case.time.size - 1
+    if (begins := system.objective.begins) is not None:
+        above = np.flatnonzero(system.signal(begins.signal, case.signals) > begins.level)
+        if not above.size:
+            return slice(0, 0)
+        first = int(above[0])
+    if (ends := system.objective.ends) is not None:
+        above = np.flatnonzero(np.abs(system.signal(ends.signal, case.signals)) > ends.level)
+        if not above.size:
+            return slice(0, 0)
+        last = int(above[-1])
+    return slice(first, max(last + 1, first))
+
+
+def low_pass(time: Vector, signal: Vector, bandwidth: float) -> Vector:
+    """Low-pass a sampled signal without phase shift (Butterworth, order 2, forward and backward).
+
+    Uneven samples are brought to an even grid of their mean step and back. A signal sampled too
+    slowly to hold more than the bandwidth [Hz] is returned as it is.
+
+    >>> t = np.arange(0, 2, 0.005)
+    >>> ringing = low_pass(t, np.sin(2 * np.pi * 21.6 * t), 5.0)
+    >>> float(np.abs(ringing[100:-100]).max().round(3))
+    0.002
+    """
+    step = (time[-1] - time[0]) / (time.size - 1)
+    if 2 * bandwidth * step >= 1.0:
+        return signal
+    even = time[0] + step * np.arange(time.size)
+    sections = butter(2, 2 * bandwidth * step, output="sos")
+    smooth: Vector = sosfiltfilt(sections, np.interp(even, time, signal))
+    return np.interp(time, even, smooth)
+
+
+def samples(time: Vector) -> tuple[Vector, Vector]:
+    """Step [s] from the sample before, and share [1] in the time average, of each sample, (n,)."""
+    steps = np.diff(time, prepend=time[0])
+    return steps, 0.5 * (steps + np.append(steps[1:], 0.0)) / (time[-1] - time[0])
+
+
+def corner(objective: Objective) -> float:
+    """Poles of the low-pass through which deviations count [rad/s]."""
+    return float(_CORNER * objective.bandwidth)
+
+
+@compiled
+def integrate(z, memory, deviations, weights, steps, shares, corner):  # type: ignore[no-untyped-def]
+    """Add a piece of recording to z_k, equation (12) of Schwarz et al. (2018).
+
+    Deviations count below the bandwidth, where an estimate can follow; above, a recording holds the
+    noise of its sensors and the modes of its machine, which would reward slow gains. The low-pass
+    has two equal real poles. z only grows, sample by sample, so that pieces do not change the sum.
+
+    Parameters
+    ----------
+    memory : (2, w) of the low-pass, written; zeros at the beginning.
+    deviations : (n, w) of estimated from measured signals.
+    weights : (w,) of these signals.
+    steps, shares : (n,) as of `samples`.
+    corner : as of `corner` [rad/s].
+    """
+    for i in range(steps.size):
+        # The first sample has no step before it and stands for all the past.
+        gain = 1.0 - np.exp(-corner * steps[i]) if steps[i] > 0.0 else 1.0
+        for j in range(weights.size):
+            memory[0, j] += gain * (deviations[i, j] - memory[0, j])
+            memory[1, j] += gain * (memory[0, j] - memory[1, j])
+            z += shares[i] * weights[j] * abs(memory[1, j])
+    return z
+
+
+def weights(objective: Objective) -> Vector:
+    """Weights of the weighed signals, (w,)."""
+    return np.array(list(objective.weights.values()))
+
+
+def score(case: Case, run: Run, system: System) -> Score:
+    """Judge a run against its recording."""
+    objective = system.objective
+    if run.ending is not Ending.OK:
+        return Score(None, None, None, f"{run.ending.value} {run.message}".strip())
+    if missing := [name for name in (objective.judged, *objective.weights) if name not in case]:
+        return Score(None, None, None, f"the recording has no {missing[0]} to judge by")
+    # A method that takes a signal as measured makes no error in it.
+    deviations = np.column_stack(
+        [np.nan_to_num(run.signal(name) - case[name]) for name in objective.weights]
+    )
+    steps, shares = samples(case.time)
+    memory = np.zeros((2, len(objective.weights)))
+    z = float(
+        integrate(0.0, memory, deviations, weights(objective), steps, shares, corner(objective))
+    )
+    window = judged_window(case, system)
+    if window.stop - window.start < 2:
+        return Score(None, None, z, "the recording holds nothing that is judged")
+    error = run.signal(objective.judged) - case[objective.judged]
+    measured = low_pass(case.time, case[objective.judged], objective.bandwidth)
+    rms = float(np.sqrt(np.mean(low_pass(case.time, error, objective.bandwidth)[window] ** 2)))
+    return Score(rms, rms / float(np.mean(np.abs(measured[window]))), z, "")

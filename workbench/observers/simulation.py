@@ -1,0 +1,454 @@
+"""Estimators on recordings, a stage after the objective: results case by case, made in parallel."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from itertools import cycle
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.observers import Estimator, Gains, label
+from workbench.observers.estimators.smoother import Smoother
+from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.replay import observed, replay
+from workbench.observers.run import Ending, Run, _band, _claimed, _probabilities, _range
+from workbench.observers.score import Score, judged_window, low_pass, score
+from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
+from workbench.pages.views import (
+    below,
+    called,
+    per_shown,
+    percent,
+    rounded,
+    shown_unit,
+    titled,
+    views,
+)
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.system.registry import open_model
+from workbench.system.system import System, View
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# A 95 % band of deviations that are too small by the root of this covers 93 %.
+OVERCONFIDENT = (1.960 / 1.812) ** 2
+
+
+# [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
+_MOST = 5e8
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """All estimators on one case: runs and scores by estimator name.
+
+    Attributes
+    ----------
+    reference : the smoother's estimate, where no sensor is only there to judge by; else None.
+    """
+
+    system: System
+    case: Case
+    runs: Mapping[str, Run]
+    scores: Mapping[str, Score]
+    reference: Run | None
+
+    def measured(self) -> Vector | None:
+        """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
+        judged, bandwidth = self.system.objective.judged, self.system.objective.bandwidth
+        if judged not in self.case:
+            return None
+        return low_pass(self.case.time, self.case[judged], bandwidth)
+
+    def error(self, name: str) -> Vector | None:
+        """Estimated minus measured signal below the bandwidth, (n,); None if not measured."""
+        judged, bandwidth = self.system.objective.judged, self.system.objective.bandwidth
+        if judged not in self.case:
+            return None
+        error = self.runs[name].signal(judged) - self.case[judged]
+        return low_pass(self.case.time, error, bandwidth)
+
+    def surprise(self, name: str) -> float:
+        """Variance of innovations over what a method says, where judged; 0 for one without."""
+        window, run = judged_window(self.case, self.system), self.runs[name]
+        nis = run.nis[window]
+        if not (nis.size and np.isfinite(nis).all()):
+            return 0.0
+        fed = [one in run.columns for one in (*self.case.outputs, *self.case.aids)]
+        return float(nis.mean() / np.isfinite(self.case.y[window][:, fed]).sum(axis=1).mean())
+
+    def to_frame(self) -> pd.DataFrame:
+        """All that the figure of the case shows: time, then `source.signal [unit]`.
+
+        The source is `measured` or an estimator. Signals that a method does not estimate are left
+        out; `..._5Hz` and `..._error` are the judged signal and its error below the bandwidth,
+        `sigma_...` are standard deviations, `..._claimed` is 1 where a quantity may be claimed.
+        """
+        system, case = self.system, self.case
+        judged, bandwidth = system.objective.judged, system.objective.bandwidth
+        columns: dict[str, Any] = {"time [s]": case.time}
+        for name, one in system.signals.items():
+            if name in case:
+                columns[f"measured.{name} [{one.unit}]"] = case[name]
+        unit, measured = system.unit(judged), self.measured()
+        if measured is not None and np.isfinite(bandwidth):
+            columns[f"measured.{judged}_{bandwidth:g}Hz [{unit}]"] = measured
+        for name, run in self.runs.items():
+            columns |= {f"{name}.{key}": values for key, values in run.to_columns().items()}
+            if (error := self.error(name)) is not None:
+                columns[f"{name}.{judged}_error [{unit}]"] = error
+        if (best := self.reference) is not None:
+            columns |= {f"{best.estimator}.{key}": one for key, one in best.to_columns().items()}
+        return pd.DataFrame(columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Title and doubts of the case, and scores by estimator, as plain numbers and texts."""
+        judged = self.system.objective.judged
+        unit = self.system.unit(judged)
+        return {
+            "title": self.case.title,
+            "doubts": list(self.case.doubts),
+            "reference": None if self.reference is None else self.reference.estimator,
+            "estimators": {
+                name: {
+                    f"{judged}_rms_{unit}": one.rms,
+                    f"{judged}_nrmse": one.nrmse,
+                    "z": one.z,
+                    "outcome": self.runs[name].ending.name,
+                    "reason": one.reason,
+                    "seconds": round(self.runs[name].seconds, 4),
+                }
+                for name, one in self.scores.items()
+            },
+        }
+
+    def summary(self) -> str:
+        """Scores by estimator, for people."""
+        table = pd.DataFrame(self.to_dict()["estimators"]).T
+        return f"{self.case.name}: {self.case.title}\n{table.to_string(na_rep='n/a')}"
+
+    def plot(self) -> "Figure":
+        """Figure of all that was measured and estimated."""
+        from workbench.pages.figures import sheet
+
+        return sheet(case_figure(self))
+
+    def _repr_html_(self) -> str:
+        """The table of scores, for notebooks."""
+        table = pd.DataFrame(self.to_dict()["estimators"]).T
+        return str(table.to_html(na_rep="n/a"))
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What runs on every case; travels to the processes.
+
+    Attributes
+    ----------
+    kinds, gains : of the estimators by name, in the order of the results.
+    """
+
+    system: System
+    kinds: Mapping[str, type[Estimator]]
+    gains: Mapping[str, Gains]
+
+    @contextmanager
+    def estimators(self) -> Iterator[dict[str, Estimator]]:
+        """The estimators, by name, while their models are open."""
+        with ExitStack() as stack:
+            models = _models(stack, self.system, self.kinds)
+            yield {
+                name: kind(models[kind.role], self.system, self.gains[name])
+                for name, kind in self.kinds.items()
+            }
+
+    def meanings(self) -> dict[str, dict[str, tuple[str, str]]]:
+        """What each gain of each estimator does, and its unit."""
+        with ExitStack() as stack:
+            models = _models(stack, self.system, self.kinds)
+            return {
+                name: kind.meanings(models[kind.role], self.system, self.gains[name])
+                for name, kind in self.kinds.items()
+            }
+
+    def run(self, case: Case) -> CaseResult:
+        """All estimators on one case, in this process."""
+        with self.estimators() as estimators:
+            runs = {name: replay(case, one) for name, one in estimators.items()}
+        scores = {name: score(case, run, self.system) for name, run in runs.items()}
+        return CaseResult(self.system, case, runs, scores, self._reference(case, runs))
+
+    def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
+        """The smoother's estimate, where a recording has nothing that is only there to judge by."""
+        kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
+        if any(one.name in case for one in self.system.judged) or kept > _MOST:
+            return None
+        return runs.get(Smoother.name) or smoothed(case, self.system)
+
+
+def hidden(system: System) -> tuple[str, ...]:
+    """What an estimate says that no sensor feeds it: quantities, and outputs that are reported."""
+    fed = {*system.corrections, *(one.name for one in system.outputs)}
+    return tuple(name for name in system.columns if name not in fed)
+
+
+def smoothed(case: Case, system: System) -> Run | None:
+    """The best estimate of a recording that is over; None where nothing is hidden.
+
+    And where the model is not fit for it, or it fails.
+    """
+    if not hidden(system):
+        return None
+    try:
+        run = observed(case, system, Smoother)
+    except InputError:
+        return None
+    return run if run.ending is Ending.OK else None
+
+
+def prepare(
+    system: System,
+    kinds: Mapping[str, type[Estimator]],
+    file: Path | None = None,
+    tuned: bool = True,
+) -> Simulation:
+    """Estimators with their gains.
+
+    Parameters
+    ----------
+    file : of tuned gains, for the estimator that it names.
+    tuned : whether the others have the gains that were tuned for the system, where there are any.
+
+    Raises
+    ------
+    InputError
+        If an estimator cannot run on the system's models, or the file cannot be read.
+    """
+    with ExitStack() as stack:
+        models = _models(stack, system, kinds)
+        gains = {
+            name: gains_for(kind, models[kind.role], system, tuned) for name, kind in kinds.items()
+        }
+    if file is not None:
+        gains |= _given(kinds, gains, file)
+    return Simulation(system, kinds, gains)
+
+
+def gains_for(kind: type[Estimator], fmu: FMU, system: System, tuned: bool) -> Gains:
+    """Gains of an estimator, tuned or reasoned; the FMU is left at an operating point."""
+    return usual_gains(kind, fmu, system) if tuned else kind.reasoned(fmu, system)
+
+
+def _given(
+    kinds: Mapping[str, type[Estimator]], gains: Mapping[str, Gains], file: Path
+) -> dict[str, Gains]:
+    """Gains of a file, by each estimator that takes them."""
+    takers: dict[str, list[str]] = {}
+    for name, kind in kinds.items():
+        if kind.tunable or kind.tuned_as:
+            takers.setdefault(kind.tuned_as or name, []).append(name)
+    given = read_gains(file, {owner: gains[names[0]] for owner, names in takers.items()})
+    return next(
+        {name: replace(given, estimator=name) for name in names}
+        for names in takers.values()
+        if given.estimator in names
+    )
+
+
+def simulate(
+    simulation: Simulation,
+    cases: Sequence[Case],
+    workers: int = 1,
+    note: Callable[[CaseResult], None] | None = None,
+) -> Iterator[CaseResult]:
+    """All cases, in the order they end; who leaves the loop drops the others.
+
+    Parameters
+    ----------
+    workers : processes; 1: this one.
+    note : called with each result where it was made, such as to write files.
+    """
+    with Pool(min(workers, len(cases)), nullcontext, (simulation, note)) as pool:
+        try:
+            for _, result in pool.completed(_work, cases):
+                yield result
+        except KeyboardInterrupt:
+            pool.finish()
+            raise
+
+
+def _work(given: tuple[Simulation, Callable[[CaseResult], None] | None], case: Case) -> CaseResult:
+    simulation, note = given
+    result = simulation.run(case)
+    if note is not None:
+        note(result)
+    return result
+
+
+def _models(
+    stack: ExitStack, system: System, kinds: Mapping[str, type[Estimator]]
+) -> dict[str, FMU]:
+    roles = dict.fromkeys(kind.role for kind in kinds.values())
+    return {role: stack.enter_context(open_model(system, role)) for role in roles}
+
+
+_REFERENCE = "raw"  # style
+
+
+def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseFigure:
+    """Describe the figure of a case.
+
+    Residuals are shown as they are judged: below the bandwidth. Bands hold 95 %.
+
+    Parameters
+    ----------
+    styles : of the estimators, in turn.
+    """
+    system, case = result.system, result.case
+    chosen = dict(zip(result.runs, cycle(styles), strict=False))
+    window = judged_window(case, system)
+    judged, panels = case.time[window], []
+    for view in views(system):
+        panels.append(_seen(result, chosen, view))
+        if system.objective.judged in view.signals:
+            panels.append(_residual(result, chosen, window))
+    panels.append(_probabilities(result.runs.values()))
+    return CaseFigure(
+        name=case.name,
+        title=case.title,
+        finding=_finding(result),
+        time=case.time,
+        window=(float(judged[0]), float(judged[-1])) if judged.size else None,
+        legend=tuple(_legend(result, chosen)),
+        panels=tuple(panel for panel in panels if panel.curves),
+    )
+
+
+def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
+    """One panel: what was measured of its signals, and what was estimated.
+
+    Of the judged signal, what was measured sets the range: an estimator may start or end with a
+    spike, and a sensor may ring.
+    """
+    system, case = result.system, result.case
+    unit = shown_unit(system, view.signals[0])
+    fed = {one.name for one in (*system.inputs, *system.outputs)}
+    known = [(styles[name], run) for name, run in result.runs.items()]
+    best = [] if result.reference is None else [(_REFERENCE, result.reference)]
+    curves: list[Curve] = []
+    measured, here = None, system.under(case.conditions)
+    for number, name in enumerate(view.signals):
+        factor, judged = per_shown(system, name, unit), name == system.objective.judged
+        if judged or name not in fed:
+            for style, run in known if name in fed else known + best:
+                curves += _estimated(run, style, name, factor)
+        if judged and (measured := result.measured()) is not None:
+            measured = measured / factor
+            if below(system):
+                curves.insert(0, Curve("raw", case[name] / factor))
+            curves.append(Curve("measured", measured))
+        elif name in case or _is_fed(system, name):
+            values = here.signal(name, case.signals) / factor
+            curves.append(Curve("measured", values, dashed=number > 0))
+    signals = [curve.values for curve in curves]
+    low, high = _range(signals) if measured is None else _range([measured], margin=0.25)
+    return Panel(
+        titled(view, unit),
+        unit,
+        low if view.low is None else view.low,
+        high if view.high is None else view.high,
+        view.height,
+        tuple(curves),
+    )
+
+
+def _is_fed(system: System, name: str) -> bool:
+    """Whether a signal is derived from what is fed; a sensor that only judges has its own panel."""
+    judged = {one.name for one in system.judged}
+    return any(one.name == name and not one.formula.names & judged for one in system.derived)
+
+
+def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
+    """Error of the judged signal by estimator."""
+    system = result.system
+    judged = system.objective.judged
+    unit = shown_unit(system, judged)
+    curves = [
+        Curve(styles[name], error / per_shown(system, judged, unit))
+        for name in result.runs
+        if (error := result.error(name)) is not None
+    ]
+    reach = _reach([np.abs(curve.values[window]) for curve in curves])
+    within = f", {below(system)}" if below(system) else ""
+    title = f"Error of {judged}, estimated - measured{within} [{unit}]"
+    return Panel(title, unit, -reach, reach, 1.1, tuple(curves))
+
+
+def _estimated(run: Run, style: str, signal: str, factor: float) -> list[Curve]:
+    """Curves of an estimator that knows the signal, with its band."""
+    if signal not in run.columns or not np.isfinite(run.signal(signal)).any():
+        return []
+    curve = Curve(style, run.signal(signal) / factor, _band(run, signal, factor))
+    return _claimed(curve, run, signal)
+
+
+def _reach(errors: Sequence[Vector]) -> float:
+    """Half the axis of the residual: shows all of the best two, and cuts an open loop.
+
+    Parameters
+    ----------
+    errors : magnitudes where they count, one array for each estimator, NaN where it failed.
+    """
+    peaks = sorted(float(e.max()) for e in errors if e.size and np.isfinite(e).all())
+    return 1.1 * peaks[min(1, len(peaks) - 1)] if peaks else 1.0
+
+
+def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]:
+    """Style and text of each entry."""
+    system, judged = result.system, result.system.objective.judged
+    entries = [("measured", "measured")]
+    if judged in result.case and below(system):
+        entries = [
+            ("measured", f"measured ({judged} {below(system)})"),
+            ("raw", f"measured {judged}, unfiltered"),
+        ]
+    for name, style in styles.items():
+        share, text = result.scores[name].nrmse, label(name, system)
+        entries.append((style, text if share is None else f"{text} ({percent(share)})"))
+    if result.reference is not None:
+        best = label(result.reference.estimator, system)
+        entries.append((_REFERENCE, f"reference, as no sensor reads it: {best}"))
+    return entries
+
+
+def _finding(result: CaseResult) -> str:
+    """Errors of the estimators, the least first."""
+    system, signal = result.system, result.system.objective.judged
+    judged = sorted(
+        (score.nrmse, label(name, system), score.rms)
+        for name, score in result.scores.items()
+        if score.nrmse is not None and score.rms is not None
+    )
+    if not judged:
+        reasons = sorted({score.reason for score in result.scores.values()})
+        return f"Estimated, not judged: {'; '.join(reasons)}."
+    share, first, rms = judged[0]
+    others = ", ".join(f"{name} {percent(value)}" for value, name, _ in judged[1:])
+    trust = "".join(
+        f" The {label(name, system)} is overconfident: its innovations have {ratio:.1f} times the "
+        "variance that it says."
+        for name in result.runs
+        if (ratio := result.surprise(name)) > OVERCONFIDENT
+    )
+    return (
+        f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "
+        f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".") + trust
+    )

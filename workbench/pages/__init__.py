@@ -1,0 +1,1 @@
+"""The kit of figures and pages; knows no result."""

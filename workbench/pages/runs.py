@@ -1,0 +1,324 @@
+"""Runs in a folder, by what they say of themselves, and two of them side by side."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from workbench.errors import InputError
+from workbench.pages.answer import SUMMARIES, Measure
+from workbench.recordings.channels import listed
+from workbench.runtime.files import read_text
+
+Verdict = Literal["better", "worse", "changed", "unclear", "unchanged", "gone", "new"]
+_ANEW = "make the results anew with this version"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """One run, as its summary tells it.
+
+    Attributes
+    ----------
+    place : of its folder in the one that was asked for.
+    run : see `provenance.run_of`.
+    headline, details : numbers by what they are.
+    files : beside the summary and below, by suffix: how many.
+    provenance : all that made it.
+    """
+
+    folder: Path
+    place: str
+    summary: str
+    run: Mapping[str, Any]
+    sentence: str
+    headline: Mapping[str, Measure]
+    details: Mapping[str, Measure]
+    files: Mapping[str, int]
+    provenance: Mapping[str, Any]
+
+    @property
+    def commit(self) -> str:
+        """Commit of the workbench, shortened as git does."""
+        commit = self.run["commit"]
+        return "" if commit is None else commit[:9] + "-dirty" * commit.endswith("-dirty")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain numbers and texts."""
+        return {
+            "folder": str(self.folder),
+            "summary": self.summary,
+            "run": dict(self.run),
+            "sentence": self.sentence,
+            "headline": {name: vars(one) for name, one in self.headline.items()},
+            "files": dict(self.files),
+        }
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number before and after.
+
+    Attributes
+    ----------
+    before, after : None where there is none.
+    verdict : "unchanged" where both are the same in four digits; "unclear" where the 95 %
+        intervals of both overlap; "changed" where neither way is better.
+    """
+
+    name: str
+    before: Measure | None
+    after: Measure | None
+    verdict: Verdict
+
+    @property
+    def unit(self) -> str:
+        """Unit of both."""
+        return (self.after or self.before or Measure(None, "1")).unit
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain numbers and texts."""
+        ends = {"before": self.before, "after": self.after}
+        told = {key: None if one is None else vars(one) for key, one in ends.items()}
+        return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **told}
+
+
+def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) -> list[Ran]:
+    """All runs in a folder and below, by their place.
+
+    Parameters
+    ----------
+    warn : told of a summary that cannot be read, where others can; by default that is an error.
+
+    Raises
+    ------
+    InputError
+        If there is none, or a summary cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(
+            where=str(folder),
+            found="a file" if folder.exists() else "no such folder",
+            expected="a folder of results, such as results/simulate",
+            remedy="correct the path",
+        )
+    paths = sorted(path for name in SUMMARIES for path in folder.rglob(name))
+    found, wrong = [], []
+    for path in paths:
+        try:
+            found.append(_read(path, folder))
+        except InputError as problem:
+            wrong.append(problem)
+    if wrong and (warn is None or not found):
+        raise wrong[0]
+    if warn is not None:
+        for one in wrong:
+            warn(one)
+    if not found:
+        raise InputError(
+            where=str(folder),
+            found=f"none of {', '.join(SUMMARIES)}",
+            expected="what a command wrote with --out",
+            remedy="name a folder of results",
+        )
+    return found
+
+
+def _read(path: Path, folder: Path) -> Ran:
+    try:
+        content = json.loads(read_text(path, _ANEW))
+        run, answer = content["provenance"]["run"], content["answer"]
+        headline, details = (
+            {name: Measure(**one) for name, one in answer[key].items()}
+            for key in ("headline", "details")
+        )
+        _check(run, [*headline.values(), *details.values()])
+        return Ran(
+            folder=path.parent,
+            place=path.parent.relative_to(folder).as_posix(),
+            summary=path.name,
+            run=run,
+            sentence=str(answer["sentence"]),
+            headline=headline,
+            details=details,
+            files=_files(path.parent),
+            provenance=content["provenance"],
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            where=str(path),
+            found="a summary that does not say what made it and what it found",
+            expected="one of this version",
+            remedy=_ANEW,
+        ) from None
+
+
+def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
+    """Refuse what no command writes."""
+    texts = [run[key] for key in ("command", "date", "workbench", "system")]
+    commit, data = run["commit"] or "", dict(run["data"])
+    numbers = [end for one in measures for end in (one.value, one.low, one.high)]
+    if (
+        not all(isinstance(text, str) for text in (*texts, commit, *data))
+        or not all(end is None or isinstance(end, int | float) for end in numbers)
+        or not all(isinstance(one.unit, str) for one in measures)
+    ):
+        raise TypeError
+
+
+def _files(folder: Path) -> dict[str, int]:
+    """How many files of each kind there are beside a summary."""
+    counts: dict[str, int] = {}
+    for path in sorted(folder.iterdir()):
+        if path.is_file():
+            kind = path.suffix.removeprefix(".") or path.name
+            counts[kind] = counts.get(kind, 0) + 1
+    return counts
+
+
+def compare_runs(before: Ran, after: Ran) -> list[Change]:
+    """All numbers of two runs of one command: the headline, then the details.
+
+    Raises
+    ------
+    InputError
+        If they are of different commands.
+    """
+    if before.run["command"] != after.run["command"] or before.summary != after.summary:
+        raise InputError(
+            where=str(after.folder),
+            found=f"a run of '{after.run['command']}' ({after.summary})",
+            expected=f"one of '{before.run['command']}' ({before.summary}), as {before.folder}",
+            remedy="compare two runs of the same command",
+        )
+    changes = []
+    for key in ("headline", "details"):
+        old, new = getattr(before, key), getattr(after, key)
+        for name in dict.fromkeys((*old, *new)):
+            first, last = old.get(name), new.get(name)
+            if first is None or last is None or first.unit == last.unit:
+                changes.append(Change(name, first, last, _verdict(first, last)))
+            else:
+                changes += [Change(name, first, None, "gone"), Change(name, None, last, "new")]
+    return changes
+
+
+def _verdict(before: Measure | None, after: Measure | None) -> Verdict:
+    first, last = (None if one is None else one.value for one in (before, after))
+    if last is None or after is None:
+        return "unchanged" if first is None and before is not None else "gone"
+    if first is None or before is None:
+        return "new"
+    if f"{first:.4g}" == f"{last:.4g}":
+        return "unchanged"
+    if _overlap(before, after):
+        return "unclear"
+    if not after.better:
+        return "changed"
+    return "better" if (last < first) == (after.better == "lower") else "worse"
+
+
+def _overlap(one: Measure, other: Measure) -> bool:
+    if one.low is None or one.high is None or other.low is None or other.high is None:
+        return False
+    return one.low <= other.high and other.low <= one.high
+
+
+def differences(before: Ran, after: Ran) -> list[str]:
+    """What else is not the same, so that a change may come from it."""
+    found = []
+    for key, text in (("system", "system"), ("workbench", "version"), ("commit", "commit")):
+        if before.run[key] != after.run[key]:
+            found.append(f"{text}: {before.run[key]} and {after.run[key]}")
+    old, new = dict(before.run["data"]), dict(after.run["data"])
+    for text, names in (
+        ("recordings only in the first", [name for name in old if name not in new]),
+        ("recordings only in the second", [name for name in new if name not in old]),
+        (
+            "recordings with other content",
+            [name for name in old if name in new and old[name] != new[name]],
+        ),
+    ):
+        if names:
+            found.append(f"{text}: {listed(names)}")
+    settings = dict(_leaves(before.provenance)), dict(_leaves(after.provenance))
+    names = [
+        name
+        for name in dict.fromkeys((*settings[0], *settings[1]))
+        if settings[0].get(name) != settings[1].get(name)
+    ]
+    if names:
+        found.append(f"settings: {listed(names)}")
+    return found
+
+
+def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Single values of nested tables, without what is told by itself."""
+    if not isinstance(content, Mapping):
+        yield path, content
+        return
+    for key, one in content.items():
+        if path or key not in ("run", "workbench", "commit", "meanings"):
+            yield from _leaves(one, f"{path}.{key}" if path else key)
+
+
+def format_runs(found: list[Ran]) -> str:
+    """What a folder holds, for people."""
+    return "\n\n".join("\n".join(_told(one)) for one in found)
+
+
+def _told(one: Ran) -> Iterator[str]:
+    date = str(one.run["date"]).replace("T", " ").replace("+00:00", " UTC")
+    version = f"workbench {one.run['workbench']}" + f" ({one.commit})" * bool(one.commit)
+    count = len(one.run["data"])
+    data = f", {count} recording{'s' * (count != 1)}" if count else ""
+    yield f"{one.folder}: {one.run['command']}, {date}, {version}, {one.run['system']}{data}"
+    yield f"  {one.sentence}"
+    width = max(map(len, one.headline), default=0)
+    for name, measure in one.headline.items():
+        yield f"  {name:<{width}}  {_value(measure)}"
+    kinds = ", ".join(f"{count} {kind}" for kind, count in one.files.items())
+    yield f"  files: {kinds}"
+
+
+def format_changes(before: Ran, after: Ran, changes: list[Change]) -> str:
+    """Two runs side by side, for people: what got worse first, numbers of one unit together."""
+    lines = [f"{before.run['command']}: {before.folder} -> {after.folder}"]
+    lines += [f"not the same, {one}" for one in differences(before, after)]
+    order: tuple[Verdict, ...] = ("worse", "better", "changed", "unclear", "gone", "new")
+    shown = [one for one in changes if one.verdict != "unchanged"]
+    shown.sort(key=lambda one: (order.index(one.verdict), one.unit))
+    width = max((len(one.name) for one in shown), default=0)
+    for one in shown:
+        ends = " -> ".join(
+            "none" if end is None else _value(end) for end in (one.before, one.after)
+        )
+        lines.append(f"{one.verdict:<8} {one.name:<{width}}  {ends}{_relative(one)}")
+    counts = {verdict: sum(one.verdict == verdict for one in changes) for verdict in order}
+    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    same = sum(one.verdict == "unchanged" for one in changes)
+    lines.append(
+        f"of {len(changes)} numbers: " + ", ".join(filter(None, (told, f"{same} unchanged")))
+    )
+    if counts["unclear"]:
+        lines.append("unclear: the 95 % intervals of both overlap")
+    return "\n".join(lines)
+
+
+def _relative(one: Change) -> str:
+    if one.before is None or one.after is None or not one.before.value or one.after.value is None:
+        return ""
+    return f" ({100.0 * (one.after.value / one.before.value - 1.0):+.1f} %)"
+
+
+def _value(one: Measure) -> str:
+    if one.value is None:
+        return "none"
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    interval = ""
+    if one.low is not None and one.high is not None:
+        interval = f" ({one.low:.4g} to {one.high:.4g})"
+    return f"{one.value:.4g}{interval}{unit}"

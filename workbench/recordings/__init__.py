@@ -1,0 +1,1 @@
+"""Recordings of a machine: files of loggers, matching of channels, case folders."""

@@ -1,0 +1,501 @@
+"""Stage 1: a recording, its conditions and its units become a `Case` in SI units."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.recordings.channels import (
+    Told,
+    has_own_names,
+    read_measured,
+    read_named,
+    stored_columns,
+)
+from workbench.recordings.csv import read_columns
+from workbench.recordings.formats import is_foreign
+from workbench.recordings.plausibility import Origin, doubts, shown_by
+from workbench.system.system import Condition, System
+from workbench.system.tables import Table, read_table, shown
+from workbench.system.units import quantity, si_factor
+
+Value = float | int | str | tuple[Any, ...]
+
+
+UNKNOWN = "unknown"  # a condition that nobody knows any more
+
+
+def read_conditions(table: Table, system: System) -> dict[str, Value]:
+    """Conditions of a recording, as the system declares them.
+
+    What nobody knows any more is written as "unknown", and is UNKNOWN then; what sets a parameter
+    of the model may be missing, and is so then.
+
+    Raises
+    ------
+    InputError
+        If one is missing, none of the system, or none of its choices; or the sign of the signals
+        is unknown.
+    """
+    table.refuse_unknown(one.name for one in system.conditions)
+    signs = [f"'{one.name}' holds the sign" for one in system.conditions if one.sign]
+    remedy = "; ".join(["give the magnitude", *signs])
+    said = [one for one in system.conditions if one.name in table or not one.sets]
+    return {one.name: _condition(table, one, remedy) for one in said}
+
+
+def _condition(table: Table, one: Condition, remedy: str) -> Value:
+    """One condition; `remedy` for a quantity that is too small."""
+    if table.content.get(one.name) == UNKNOWN and not one.sign:
+        return UNKNOWN
+    if one.count:
+        items = table.take(one.name, list)
+        if len(items) != one.count:
+            raise InputError(
+                where=f"{table.where} {one.name}",
+                found=f"{len(items)} entries",
+                expected=str(one.count),
+                remedy=f"write one of {_either(one)} for each",
+            )
+        return tuple(
+            _choice(one, item, f"{table.where} {one.name}[{i}]") for i, item in enumerate(items)
+        )
+    if one.choices:
+        value: object = table.take(one.name, type(one.choices[0]))
+        return _choice(one, value, f"{table.where} {one.name}")
+    where = f"{table.where} {one.name}"
+    text = table.take(one.name, str)
+    number = quantity(text, one.unit, where)
+    if number < one.least or (one.exclusive and number == one.least):
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"{'above' if one.exclusive else 'no less than'} {one.least:g} {one.unit}",
+            remedy=remedy,
+        )
+    return number
+
+
+def _choice(one: Condition, value: object, where: str) -> str | int:
+    for choice in one.choices:
+        if type(value) is type(choice) and value == choice:
+            return choice
+    raise InputError(
+        where=where, found=shown(value), expected=_either(one), remedy="write one of them"
+    )
+
+
+def _either(one: Condition) -> str:
+    return " or ".join(map(repr, one.choices))
+
+
+def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str, Any]:
+    """Conditions that a recording shows, as `read_conditions` takes them.
+
+    They are what the system file says that tells them (`agrees`); a choice only where it is one of
+    its choices.
+
+    Parameters
+    ----------
+    signals : (n,) each, SI.
+    """
+    found: dict[str, Any] = {}
+    for one in system.conditions:
+        value = shown_by(one, signals, system)
+        if value is None or not np.isfinite(value):
+            continue
+        if not one.choices:
+            if value > one.least or (value == one.least and not one.exclusive):
+                found[one.name] = f"{value:.6g} {one.unit}"
+        elif value in one.choices:
+            found[one.name] = next(choice for choice in one.choices if choice == value)
+    return found
+
+
+_NOTHING = Told()
+
+
+KEYS = ("title", "date", "conditions", "measurement", "model")  # of case.toml
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One recording in SI units; its arrays are read-only.
+
+    Attributes
+    ----------
+    name : of the folder.
+    title : one line for reports.
+    conditions : what was set before, by name: quantities in SI, words, whole numbers, tuples.
+    time : (n,) s, strictly increasing, not necessarily in even steps.
+    signals : (n,) each, by name; what only judges or aids may be missing, an aid in samples (NaN).
+    inputs, outputs, aids : names of those that drive a model, correct it, and do so where measured.
+    source : the CSV file.
+    names : the model's own name of each variable that it names otherwise.
+    date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
+    counts_from : s, time before which samples only lead a simulation to those that are compared.
+    doubts : what is unlikely in the recording, in words.
+    """
+
+    name: str
+    title: str
+    conditions: Mapping[str, Value]
+    time: Vector
+    signals: Mapping[str, Vector]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    source: Path
+    names: Mapping[str, str] = field(default_factory=dict)
+    date: str = ""
+    counts_from: float = -np.inf
+    doubts: tuple[str, ...] = ()
+    aids: tuple[str, ...] = ()
+
+    def __getitem__(self, signal: str) -> Vector:
+        """One signal, (n,) SI."""
+        return self.signals[signal]
+
+    def __contains__(self, signal: str) -> bool:
+        return signal in self.signals
+
+    @property
+    def u(self) -> Matrix:
+        """(n, m) measured inputs, SI."""
+        return self._table(self.inputs)
+
+    @property
+    def y(self) -> Matrix:
+        """(n, l) measured outputs and aids, SI."""
+        return self._table((*self.outputs, *self.aids))
+
+    def _table(self, names: Sequence[str]) -> Matrix:
+        """Some signals as columns, also none."""
+        table = np.empty((self.time.size, len(names)))
+        for j, name in enumerate(names):
+            table[:, j] = np.nan if name in self.aids and name not in self else self[name]
+        return read_only(table)
+
+    def with_signals(self, signals: Mapping[str, Vector]) -> "Case":
+        """The same case with some signals replaced."""
+        return replace(self, signals={**self.signals, **signals})
+
+    def without(self, names: Sequence[str]) -> "Case":
+        """The same case without some signals."""
+        kept = {name: values for name, values in self.signals.items() if name not in names}
+        return replace(self, signals=kept)
+
+    def part(self, samples: slice) -> "Case":
+        """A piece of the recording."""
+        cut = {name: values[samples] for name, values in self.signals.items()}
+        return replace(self, time=self.time[samples], signals=cut)
+
+
+def sign(case: Case, system: System) -> float:
+    """Sign of the recording's signals, by the condition that says so; 1 without one."""
+    for condition in system.conditions:
+        if condition.sign:
+            return float(case.conditions[condition.name])  # type: ignore[arg-type]
+    return 1.0
+
+
+def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> list[Case]:
+    """Read case folders, folders of case folders, and files of recorders.
+
+    A folder that holds `case.toml` is a case. Of any other folder the sub-folders are read,
+    sorted by name: those that hold `case.toml`, and those named `NN_...`, which ought to. A file is
+    a recording by itself.
+
+    Parameters
+    ----------
+    told : conditions and channels of files that have no `case.toml`.
+
+    Raises
+    ------
+    InputError
+        If a path holds no case, two cases have one name, or a case cannot be read.
+    """
+    folders: dict[str, Path] = {}
+    for folder in (folder for path in paths for folder in _case_folders(path)):
+        name = _name(folder)
+        if any("\ud800" <= character <= "\udfff" for character in name):
+            raise InputError(  # as Python reads bytes of a name that are none of a character
+                where=str(folder),
+                found="a name that is no UTF-8",
+                expected="one that files and pages can hold",
+                remedy="rename the folder",
+            )
+        if name in folders:
+            raise InputError(
+                where=str(folder),
+                found=f"a second case '{name}' beside {folders[name]}",
+                expected="a different name for each case, because results are kept by name",
+                remedy="rename one of the folders, or give it once",
+            )
+        folders[name] = folder
+    if told != _NOTHING and not any(folder.is_file() for folder in folders.values()):
+        raise InputError(
+            where=", ".join(map(str, paths)),
+            found="conditions, columns or a rate for recordings that have a case.toml",
+            expected="a file without one",
+            remedy="write them into case.toml",
+        )
+    return [
+        read_file(path, system, told) if path.is_file() else read_case(path, system)
+        for path in folders.values()
+    ]
+
+
+def _name(path: Path) -> str:
+    """Name of a case: of its folder, or of a file without what tells its format."""
+    name = path.resolve().name
+    return re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", name) if path.is_file() else name
+
+
+def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
+    """Read a file of a recorder; conditions that it shows need not be told.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, its channels are neither confirmed nor certain, or a condition is
+        missing.
+    """
+    measured = read_measured(path, system, told, stored_columns(path.parent, system))
+    shown = conditions_shown(measured.signals, system)
+    where = "command line, --condition"
+    conditions = read_conditions(Table({**shown, **told.conditions}, where), system)
+    check_recording(measured.time, system, f"{path}, time", None)
+    signals = {name: read_only(values) for name, values in measured.signals.items()}
+    origin = Origin(str(path), None, {}, where, measured.doubts)
+    return Case(
+        name=_name(path),
+        title=path.name,
+        conditions=conditions,
+        time=read_only(measured.time),
+        signals=signals,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=tuple(one.name for one in system.outputs),
+        aids=tuple(one.name for one in system.aids),
+        source=path,
+        doubts=doubts(measured.time, signals, conditions, system, origin),
+    )
+
+
+def read_case(folder: Path, system: System) -> Case:
+    """Read `case.toml` of a folder and the recording it names.
+
+    Raises
+    ------
+    InputError
+        At the first problem, with the file and the line, column or key; also where the recording
+        cannot be what it says it is.
+    """
+    toml = folder / "case.toml"
+    document = read_table(
+        toml,
+        "give a folder that holds case.toml and the recording",
+        'title = "..."',
+    )
+    document.refuse_unknown(KEYS)
+    title = document.take("title", str)
+    if system.conditions:
+        document.take("conditions", dict)
+    conditions = read_conditions(document.table("conditions"), system)
+    document.take("measurement", dict)
+    measurement = document.table("measurement")
+    measurement.refuse_unknown(("file", "columns", "counts_from"))
+    source = folder / measurement.take("file", str)
+    time, signals, origin = _recorded(source, measurement, system)
+    origin = replace(origin, conditions=f"{toml}, [conditions]")
+    model = document.table("model")
+    model.refuse_unknown(("names",))
+    names = model.table("names")
+    return Case(
+        name=folder.resolve().name,
+        title=title,
+        conditions=conditions,
+        time=time,
+        signals=signals,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=tuple(one.name for one in system.outputs),
+        aids=tuple(one.name for one in system.aids),
+        source=source,
+        names=check_names(names.content, f"{toml}, [model.names]", system),
+        date=document.date("date"),
+        counts_from=_counts_from(measurement, time),
+        doubts=doubts(time, signals, conditions, system, origin),
+    )
+
+
+def _recorded(
+    source: Path, measurement: Table, system: System
+) -> tuple[Vector, dict[str, Vector], Origin]:
+    """Time and signals of a case's recording, SI, and where they stand.
+
+    A CSV whose columns have names and units as the workbench writes them is read to the letter; any
+    other file is that of a recorder.
+    """
+    own = measurement.table("columns")
+    stored = stored_columns(source.parent.parent, system) | stored_columns(source.parent, system)
+    as_named = not any(isinstance(name, dict) for name in own.content.values())
+    if not is_foreign(source) and as_named and (not stored or has_own_names(source, system)):
+        columns = _column_names(measurement, system)
+        time, signals = _read_signals(source, columns, system)
+        return time, signals, Origin(str(source), 2, columns, "")
+    told = Told(columns=read_named(own, system))
+    measured = read_measured(source, system, told, stored)
+    check_recording(measured.time, system, f"{source}, time", None)
+    signals = {name: read_only(values) for name, values in measured.signals.items()}
+    return read_only(measured.time), signals, Origin(str(source), None, {}, "", measured.doubts)
+
+
+def _counts_from(measurement: Table, time: Vector) -> float:
+    """Time from which samples are compared with a model [s]."""
+    if "counts_from" not in measurement:
+        return -np.inf
+    begin = measurement.number("counts_from", "s")
+    if begin >= time[-1]:
+        raise measurement.wrong("counts_from", f"a time before the last sample, {time[-1]:.9g} s")
+    return begin
+
+
+def check_names(names: Mapping[str, Any], where: str, system: System) -> dict[str, str]:
+    """Check a mapping of a system's variables to a model's own names, as a user wrote it.
+
+    Parameters
+    ----------
+    where : place for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If a variable is none that estimators ask for, or two have one name.
+    """
+    table = Table(names, where)
+    table.refuse_unknown(system.variables)
+    checked = {ours: table.take(ours, str) for ours in names}
+    _refuse_shared(checked, where, "variable")
+    return checked
+
+
+def check_recording(time: Vector, system: System, where: str, first_line: int | None = 2) -> None:
+    """Refuse time that does not increase, or too little of it.
+
+    Parameters
+    ----------
+    where : place for the message of an error.
+    first_line : line of the first sample in a file, None without one.
+
+    Raises
+    ------
+    InputError
+        If samples are out of order, or too few or too short to tell signal from noise.
+    """
+    steps = np.diff(time)
+    if not (steps > 0).all():
+        late = int(np.argmin(steps > 0)) + 1
+        path, _, column = where.partition(", ")
+        line = f", line {late + first_line}" if first_line is not None else ""
+        raise InputError(
+            where=f"{path}{line}, {column}",
+            found=f"{time[late]:.9g} s after {time[late - 1]:.9g} s",
+            expected="strictly increasing time",
+            remedy="export with more digits, or remove the repeated or misplaced samples",
+        )
+    if time.size < system.fewest or time[-1] - time[0] < system.shortest:
+        raise InputError(
+            where=where,
+            found=f"{time.size} samples over {time[-1] - time[0]:.3g} s",
+            expected=f"at least {system.fewest} samples, which tell signal from noise"
+            + (f", over {system.shortest:g} s" if system.shortest else ""),
+            remedy="export the whole recording, from before it begins to its end",
+        )
+
+
+def _case_folders(path: Path) -> list[Path]:
+    try:
+        return _found_folders(path)
+    except OSError as error:
+        raise InputError(
+            where=str(path),
+            found=f"a folder that cannot be read ({error.strerror})",
+            expected="a case folder or a folder of case folders",
+            remedy="correct the path, or the permissions of the folder",
+        ) from None
+
+
+def _found_folders(path: Path) -> list[Path]:
+    if path.is_file() and path.suffix != ".toml":
+        return [path]
+    if not path.is_dir():
+        raise InputError(
+            where=str(path),
+            found="a file" if path.exists() else "no such folder",
+            expected="a case folder, a folder of case folders, or a recording",
+            remedy="correct the path",
+        )
+    if (path / "case.toml").exists():
+        return [path]
+    below = sorted((one for one in path.iterdir() if one.is_dir()), key=lambda one: one.name)
+    folders = [one for one in below if re.match(r"\d+_", one.name) or (one / "case.toml").exists()]
+    if not folders:
+        raise InputError(
+            where=str(path),
+            found="no case.toml, neither here nor one folder below",
+            expected="a case folder or a folder of case folders",
+            remedy="correct the path, or write a case.toml beside the recording",
+        )
+    return folders
+
+
+def _column_names(measurement: Table, system: System) -> dict[str, str]:
+    """Return the column of each signal."""
+    named = measurement.table("columns")
+    named.refuse_unknown(("time", *system.signals))
+    columns = {signal: named.text(signal, signal) for signal in ("time", *system.signals)}
+    _refuse_shared(columns, named.where, "column")
+    return columns
+
+
+def _refuse_shared(names: Mapping[str, str], where: str, kind: str) -> None:
+    taken: dict[str, str] = {}
+    for ours, name in names.items():
+        if name in taken:
+            raise InputError(
+                where=f"{where} {ours}",
+                found=f"{kind} '{name}', which is already {taken[name]}",
+                expected=f"a different {kind} for each",
+                remedy=f"correct the name of one of the two {kind}s",
+            )
+        taken[name] = ours
+
+
+def _read_signals(
+    source: Path, columns: dict[str, str], system: System
+) -> tuple[Vector, dict[str, Vector]]:
+    """Time and signals in SI units; what only judges or aids may be missing under its own name."""
+    spare = [one.name for one in (*system.judged, *system.aids)]
+    optional = [name for name in spare if columns[name] == name]
+    required = [column for signal, column in columns.items() if signal not in optional]
+    recorded = read_columns(source, required, optional, [columns[one.name] for one in system.aids])
+    units = {"time": "s", **{name: one.unit for name, one in system.signals.items()}}
+    signals = {}
+    for signal, column in columns.items():
+        if column in recorded:
+            where = f"{source}, line 1, column '{column}'"
+            factor = si_factor(recorded[column].unit, units[signal], where)
+            signals[signal] = read_only(recorded[column].values * factor)
+    time = signals.pop("time")
+    check_recording(time, system, f"{source}, column '{columns['time']}'")
+    return time, signals
+
+
+def read_only(array: Matrix) -> Matrix:
+    """The array, which nobody may change from here on."""
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,208 @@
+"""Channels that may be signals: by name, by unit, and by what values are plausible."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.recordings.channels.names import EXACT, WITHIN, WORDS, NamedChannel, alike, is_asked
+from workbench.recordings.channels.units import conversion_to, fitting_units, unit_in_name
+from workbench.recordings.formats import FileChannel, Group
+from workbench.recordings.formats.spelling import is_unit
+from workbench.system.parts import Signal
+from workbench.system.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Assigned:
+    """A channel that is taken for a signal.
+
+    Attributes
+    ----------
+    file : it stands in, counted from 0.
+    group : in that file, counted from 0.
+    label : the channel's name, with its group where several have it.
+    unit : that its values are in.
+    factor, zero : SI value is `factor*value + zero`.
+    formula : what the recorder has in place of the signal; empty: the signal itself.
+    reason : why this one, for people.
+    certain : whether name and unit are the system's own, so that nobody need be asked.
+    concluded : whether the file does not say the unit.
+    doubt : what somebody must confirm before it is taken, in words; empty: nothing.
+    """
+
+    file: int
+    group: int
+    channel: FileChannel
+    label: str
+    unit: str
+    factor: float
+    zero: float
+    formula: str
+    reason: str
+    certain: bool
+    concluded: bool = False
+    doubt: str = ""
+
+    @property
+    def values(self) -> Vector:
+        """(n,) SI, not finite in gaps."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
+            return self.factor * self.channel.values + self.zero
+
+    @property
+    def named(self) -> NamedChannel:
+        """As it is stored; what the file says of the unit is left to it."""
+        unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
+        return NamedChannel(self.label, unit, self.factor < 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedChannel:
+    """Where a channel stands: file and group, and a name that no other channel has."""
+
+    file: int
+    group: int
+    holder: Group
+    channel: FileChannel
+    label: str
+
+    @property
+    def full(self) -> str:
+        """Name with that of its group, whether or not others have the same."""
+        return f"{self.holder.name}/{self.channel.name}"
+
+
+def unconfirmed(signal: str, channel: str, unit: str) -> str:
+    """That nobody has said a unit, and how to."""
+    return f"no unit in the file, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
+
+
+def unit_reason(reason: str, unit: str, concluded: bool) -> str:
+    """Why a channel is taken, with what was concluded of its unit."""
+    return f"{reason}; no unit in the file, only {unit} fits" if concluded else reason
+
+
+def match(
+    named: Mapping[str, Assigned], places: Sequence[PlacedChannel], system: System
+) -> tuple[dict[str, Assigned], dict[str, str]]:
+    """Channels by signal, those that are named and those that names and units tell; and doubts.
+
+    Doubts say why a signal has no channel. One that a recording may be without is not assigned by
+    its unit alone: its doubt says what it may be.
+    """
+    assigned, doubts = dict(named), dict[str, str]()
+    _by_name(assigned, doubts, places, system)
+    assigned |= _by_unit((*system.inputs, *system.outputs), assigned, doubts, places, system)
+    for name, one in _by_unit(system.judged, assigned, doubts, places, system).items():
+        doubts[name] = f"it may be '{one.label}'; {one.doubt}"
+    return assigned, doubts
+
+
+def _candidate(
+    place: PlacedChannel, signal: Signal, system: System, likeness: int
+) -> tuple[Assigned | None, str]:
+    """A channel as a signal, or None and why it cannot be."""
+    channel = place.channel
+    unit = stated = channel.unit or unit_in_name(channel.name, signal, system)
+    if not stated:
+        fitting = fitting_units(channel, signal, system)
+        if len(fitting) != 1:
+            fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
+            return None, f"'{channel.name}' has no unit and is plausible {fits}"
+        unit = fitting[0]
+    concluded = not stated and unit != "1"
+    way = conversion_to(unit, signal, system)
+    if way is None:
+        known = "" if is_unit(unit) else ", a unit that is not known"
+        return None, f"'{channel.name}' is in [{unit}]{known}"
+    scale, formula = way
+    values = scale.factor * channel.values + scale.zero
+    low, high = signal.possible
+    if not np.isfinite(values).any():
+        return None, f"'{channel.name}' holds no numbers"
+    if np.nanmin(values) < low or np.nanmax(values) > high:
+        return None, f"'{channel.name}' in [{unit}] goes beyond what is possible"
+    reason = "name and unit" if likeness else "the only one of its unit"
+    doubt = ""
+    if concluded:
+        doubt = unconfirmed(signal.name, place.label, unit)
+    elif not likeness:
+        confirms = f"--column '{signal.name}={place.label}' confirms it"
+        doubt = f"nothing but its unit speaks for it, {confirms}"
+    return Assigned(
+        place.file,
+        place.group,
+        channel,
+        place.label,
+        unit,
+        scale.factor,
+        scale.zero,
+        formula,
+        unit_reason(reason, unit, concluded),
+        certain=likeness == EXACT and channel.name == signal.name and bool(channel.unit),
+        concluded=concluded,
+        doubt=doubt,
+    ), ""
+
+
+def _by_name(
+    assigned: dict[str, Assigned],
+    doubts: dict[str, str],
+    places: Sequence[PlacedChannel],
+    system: System,
+) -> None:
+    """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
+    found: dict[int, list[tuple[Signal, Assigned]]] = {EXACT: [], WORDS: [], WITHIN: []}
+    for signal in system.signals.values():
+        for place in places:
+            likeness = alike(place.channel.name, place.channel.about, signal)
+            if likeness and is_asked(place.channel.name) and not signal.exact:
+                doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
+            elif likeness:
+                one, doubt = _candidate(place, signal, system, likeness)
+                if one is not None:
+                    found[likeness].append((signal, one))
+                else:
+                    doubts[signal.name] = doubt
+    settled = set(assigned)
+    for level in found.values():
+        taken = {id(one.channel) for one in assigned.values()}
+        left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
+        for signal, one in left:
+            rivals = [o.label for s, o in left if s is signal]
+            claims = [s.name for s, o in left if o.channel is one.channel]
+            settled.add(signal.name)
+            if len(rivals) == len(claims) == 1:
+                assigned[signal.name] = one
+            elif len(rivals) > 1:
+                doubts[signal.name] = f"it may be {' or '.join(map(repr, rivals))}"
+            else:
+                doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
+
+
+def _by_unit(
+    signals: Sequence[Signal],
+    assigned: Mapping[str, Assigned],
+    doubts: Mapping[str, str],
+    places: Sequence[PlacedChannel],
+    system: System,
+) -> dict[str, Assigned]:
+    """The only channel that has its unit, for each signal that alone lacks one of it."""
+    taken = {id(one.channel) for one in assigned.values()}
+    fitting = [
+        (signal, one)
+        for signal in signals
+        if signal.name not in assigned and signal.name not in doubts
+        for place in places
+        if id(place.channel) not in taken
+        and place.channel.unit
+        and not is_asked(place.channel.name)
+        and (one := _candidate(place, signal, system, 0)[0]) is not None
+    ]
+    return {
+        signal.name: one
+        for signal, one in fitting
+        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1
+    }

@@ -1,0 +1,183 @@
+"""Signals of different rates and recorders, at common times: nothing is invented in a gap."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.recordings.channels.matching import Assigned
+from workbench.recordings.channels.proposal import ProposedMapping
+from workbench.recordings.formats import RecordedFile
+from workbench.system.parts import Signal
+from workbench.system.system import System
+
+_LATE = 1.5  # steps of a channel, from which on it has a gap
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A recording in SI units.
+
+    Attributes
+    ----------
+    time : (n,) s, as the recorder counts them.
+    signals : (n,) each, by name.
+    start : of time zero [s since 1970], NaN where that is not known.
+    notes : what was interpolated and left out, in words.
+    doubts : why its files may be damaged, or units wrong, in words.
+    """
+
+    time: Vector
+    signals: Mapping[str, Vector]
+    start: float
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Samples of one signal at its own times."""
+
+    signal: Signal
+    times: Vector
+    values: Vector
+    step: float
+    missing: int
+
+
+def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: System) -> Measured:
+    """Bring the channels of a proposal to common times.
+
+    The times are those of the slowest output, where all have samples. Other signals are
+    interpolated between two samples of their own, in a straight line, or held where the system says
+    that they are; where these are further apart than a recording may have gaps, there is no sample.
+    An aid is NaN there, and holds up no other.
+
+    Raises
+    ------
+    InputError
+        If a signal has fewer than two samples, channels have no time in common, or the clocks of
+        two files cannot be compared.
+    """
+    starts = _starts(files, proposal)
+    tracks = [
+        _track(system.signals[name], one, proposal, starts[one.file, one.group])
+        for name, one in proposal.assigned.items()
+    ]
+    outputs = {one.name for one in system.outputs}
+    slowest = max((one for one in tracks if one.signal.name in outputs), key=lambda t: t.step)
+    asked = [one for one in tracks if one.signal not in system.aids]
+    begin = max(float(one.times[0]) for one in asked)
+    end = min(float(one.times[-1]) for one in asked)
+    inside = (slowest.times >= begin) & (slowest.times <= end)
+    time = slowest.times[inside]
+    limit = system.sampling.gap if math.isfinite(system.sampling.gap) else system.comparison.block
+    known = np.ones(time.size, dtype=bool)
+    notes = [
+        f"{one.signal.name}: {one.missing} samples without a value" for one in tracks if one.missing
+    ]
+    if cut := int((~inside).sum()):
+        notes.append(f"{cut} samples at the ends, where not all channels have any, were left out")
+    signals: dict[str, Vector] = {}
+    for one in tracks:
+        values, near = _at(one, time, max(limit, _LATE * one.step))
+        if one in asked:
+            known &= near
+        else:
+            values = np.where(near, values, np.nan)
+        signals[one.signal.name] = values
+        if not np.isin(time, one.times).all():
+            way = "held" if one.signal.held else "interpolated"
+            notes.append(f"{one.signal.name}: {way} from samples every {one.step:.6g} s")
+    if gone := int((~known).sum()):
+        notes.append(f"{gone} samples in gaps of more than {limit:g} s were left out")
+    if known.sum() < 2:
+        raise InputError(
+            where=", ".join(str(one.path) for one in files),
+            found=f"channels with {int(known.sum())} samples at common times",
+            expected="channels that were recorded at the same time",
+            remedy="give the files of one recording together, and others apart",
+        )
+    signals = {name: values[known] for name, values in signals.items()}
+    begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
+    zero = min(begun, default=math.nan)
+    damaged = [f"{one.path}: {doubt}" for one in files for doubt in one.doubts]
+    doubts = *damaged, *proposal.contradictions, *_mixed(files, proposal)
+    return Measured(time[known], signals, zero, tuple(notes), doubts)
+
+
+def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
+    """Signals of groups of a file that may be two recordings: one holds the other's channel, too.
+
+    Where both have dates, they are brought together by these.
+    """
+    for (name, one), (_, other) in permutations(proposal.assigned.items(), 2):
+        keys = (one.file, one.group), (other.file, other.group)
+        dated = all(math.isfinite(proposal.clocks[key].start) for key in keys)
+        if one.file != other.file or one.group == other.group or dated:
+            continue
+        file = files[one.file]
+        own, theirs = (file.groups[group] for _, group in keys)
+        if any(channel.name == other.channel.name for channel in own.channels):
+            yield (
+                f"{file.path}: {name} is taken from '{own.name}', which holds "
+                f"'{other.channel.name}' as '{theirs.name}' does, from which that is taken: they "
+                "may be two recordings"
+            )
+            return
+
+
+def _starts(
+    files: Sequence[RecordedFile], proposal: ProposedMapping
+) -> dict[tuple[int, int], float]:
+    """What is added to the times of each group, so that they count from one zero [s].
+
+    Raises
+    ------
+    InputError
+        If only some of the clocks say when they began.
+    """
+    clocks = proposal.clocks
+    known = [clock.start for clock in clocks.values() if math.isfinite(clock.start)]
+    if not known or len(clocks) == 1:
+        return dict.fromkeys(clocks, 0.0)
+    if len(known) < len(clocks):
+        missing = next(key for key, clock in clocks.items() if not math.isfinite(clock.start))
+        raise InputError(
+            where=str(files[missing[0]].path),
+            found="times without a date beside others that have one",
+            expected="clocks that can be compared",
+            remedy="import the files apart, or export them with the same times",
+        )
+    first = min(known)
+    return {key: clock.start - first for key, clock in clocks.items()}
+
+
+def _track(signal: Signal, one: Assigned, proposal: ProposedMapping, start: float) -> _Track:
+    times = proposal.clocks[one.file, one.group].times + start
+    values = one.values
+    held = np.isfinite(times) & np.isfinite(values)
+    if held.sum() < 2:
+        raise InputError(
+            where=f"channel '{one.channel.name}'",
+            found=f"{int(held.sum())} samples",
+            expected=f"samples of {signal.label}",
+            remedy="name another channel",
+        )
+    step = float(np.median(np.diff(times[held])))
+    return _Track(signal, times[held], values[held], step, int((~held).sum()))
+
+
+def _at(one: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
+    """Values at some times, (n,), and whether samples stand near enough around them, (n,)."""
+    after = np.clip(np.searchsorted(one.times, time), 0, one.times.size - 1)
+    exact = one.times[after] == time
+    before = np.where(exact, after, np.maximum(after - 1, 0))
+    near = one.times[after] - one.times[before] <= limit * (1.0 + 1e-9)
+    near &= (time >= one.times[0]) & (time <= one.times[-1])
+    values = one.values[before] if one.signal.held else np.interp(time, one.times, one.values)
+    return values, near

@@ -1,0 +1,138 @@
+"""Which channel a user says is which signal, and how alike their names are."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workbench.errors import InputError
+from workbench.recordings.formats.spelling import named, spelled
+from workbench.system.parts import Signal
+from workbench.system.system import System
+from workbench.system.tables import Table
+
+TIME = "time"
+_TIME_WORDS = frozenset(
+    "time t zeit timestamp zeitstempel datum date datetime uhrzeit temps tiempo tempo elapsed "  # noqa: SIM905
+    "clock utc messzeit relativzeit reltime".split()
+)
+# A value that is asked for is no measurement: words, and what tells within one, as in German.
+_ASKED = frozenset(("set", "sp", "cmd", "req", "dmd", "ref", "reference"))
+_ASKED_WITHIN = re.compile(
+    "soll|vorgabe|anforderung|setpoint|demand|command|request|target|consigne"
+)
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
+_LEAST = 4  # letters of a word that tells within another one: "druck" in "Bremsdruck"
+EXACT, WORDS, WITHIN = 4, 3, 2  # how alike names are
+
+
+@dataclass(frozen=True)
+class NamedChannel:
+    """A channel that a user names.
+
+    Attributes
+    ----------
+    channel : its name, or "GROUP/NAME" where several groups have it.
+    unit : what its values are in, whatever the file says; empty: as the file says.
+    reversed : whether its sign is the other one.
+    """
+
+    channel: str
+    unit: str = ""
+    reversed: bool = False
+
+    def to_dict(self) -> dict[str, str | bool]:
+        """Entries of a TOML table."""
+        return {
+            "channel": self.channel,
+            **({"unit": self.unit} if self.unit else {}),
+            **({"reversed": True} if self.reversed else {}),
+        }
+
+
+def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
+    """Channels by signal, as a table of TOML has them: a name, or a table.
+
+    Raises
+    ------
+    InputError
+        If a signal is none of the system, or an entry is unknown.
+    """
+    table.refuse_unknown((TIME, *system.signals))
+    found: dict[str, NamedChannel] = {}
+    for signal, entry in table.content.items():
+        if isinstance(entry, str):
+            found[signal] = NamedChannel(table.take(signal, str))
+            continue
+        table.take(signal, dict)
+        own = table.table(signal)
+        own.refuse_unknown("channel unit reversed")
+        unit = spelled(own.text("unit", ""))
+        other = "reversed" in own and own.take("reversed", bool)
+        found[signal] = NamedChannel(own.take("channel", str), unit, other)
+    return found
+
+
+def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChannel]:
+    """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    signal, equals, channel = (part.strip() for part in text.partition("="))
+    if not equals or not channel.lstrip("-") or signal not in (TIME, *system.signals):
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"SIGNAL=CHANNEL or SIGNAL=CHANNEL [unit], of {TIME}, "
+            f"{', '.join(system.signals)}",
+            remedy="write for instance 'time=Zeit [ms]'; a minus before the channel reverses it",
+        )
+    name, unit = named(channel.removeprefix("-").strip())
+    return signal, NamedChannel(name, unit, channel.startswith("-"))
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of a name, however they are run together.
+
+    >>> words("Brems-Druck_2"), words("rollSpeed"), words("n Rolle (gefiltert)")
+    (('brems', 'druck', '2'), ('roll', 'speed'), ('n', 'rolle', 'gefiltert'))
+    """
+    apart = re.sub(r"([a-zäöüß])([A-ZÄÖÜ])", r"\1 \2", name)
+    folded = apart.casefold().translate(_UMLAUTS)
+    return tuple(re.findall(r"[^\W\d_]+|\d+", folded))
+
+
+def is_time(name: str) -> bool:
+    """Whether a name is one of time."""
+    return bool(_TIME_WORDS.intersection(words(name)))
+
+
+def is_asked(name: str) -> bool:
+    """Whether a name is one of a value that is asked for, not measured."""
+    own = words(name)
+    return bool(_ASKED.intersection(own)) or any(map(_ASKED_WITHIN.search, own))
+
+
+def alike(channel: str, about: str, signal: Signal) -> int:
+    """How alike a channel's name is to those of a signal: EXACT, WORDS, WITHIN, or 0."""
+    known = [signal.name, signal.label, *signal.called]
+    own = words(channel)
+    best = 0
+    for name in known:
+        theirs = words(name)
+        if channel.strip() == name or (theirs and own == theirs):
+            return EXACT
+        if theirs and set(theirs) <= {*own, *words(about)}:
+            best = max(best, WORDS)
+        joined = "".join(theirs)
+        if len(joined) >= _LEAST and joined in "".join(own):
+            best = max(best, WITHIN)
+    return best
+
+
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Names for a message, not more than people read."""
+    left = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + left

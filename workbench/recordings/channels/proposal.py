@@ -1,0 +1,291 @@
+"""Channels are proposed for signals, as the user names them, then as names and units tell."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from workbench.errors import InputError, closest
+from workbench.recordings.channels.clock import Clock, read_clock
+from workbench.recordings.channels.matching import (
+    Assigned,
+    PlacedChannel,
+    match,
+    unconfirmed,
+    unit_reason,
+)
+from workbench.recordings.channels.names import TIME, NamedChannel, listed
+from workbench.recordings.channels.units import conversion_to, fitting_units
+from workbench.recordings.formats import RecordedFile
+from workbench.recordings.formats.spelling import conversion, is_unit
+from workbench.system.parts import Signal
+from workbench.system.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class ProposedMapping:
+    """Which channels of some files are which signals of a system.
+
+    Attributes
+    ----------
+    assigned : channels by signal.
+    clocks : of each group with an assigned channel, by file and group.
+    left : channels that nobody takes.
+    problems : why a signal that is needed has no channel, in words.
+    unmatched : why a channel is not taken for a signal that a recording may be without, in words.
+    contradictions : units that were named and that files contradict, in words.
+    """
+
+    assigned: Mapping[str, Assigned]
+    clocks: Mapping[tuple[int, int], Clock]
+    left: tuple[str, ...]
+    problems: tuple[str, ...]
+    unmatched: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
+
+    @property
+    def certain(self) -> bool:
+        """Whether it follows from names and units alone."""
+        own = all(one.certain for one in self.assigned.values())
+        return not self.problems and own and all(one.certain for one in self.clocks.values())
+
+    @property
+    def doubts(self) -> list[str]:
+        """What somebody must confirm, in words: nobody has said it, nor does a file."""
+        found = [f"{name}: {one.doubt}" for name, one in self.assigned.items() if one.doubt]
+        times = {one.channel: one.unit for one in self.clocks.values() if not one.certain}
+        return found + [
+            f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
+        ]
+
+    @property
+    def named(self) -> dict[str, NamedChannel]:
+        """As it is stored."""
+        found = {name: one.named for name, one in self.assigned.items()}
+        for clock in self.clocks.values():
+            if clock.channel:
+                found.setdefault(
+                    TIME, NamedChannel(clock.channel, "" if clock.certain else clock.unit)
+                )
+        return found
+
+
+def propose(
+    files: Sequence[RecordedFile],
+    system: System,
+    given: Mapping[str, NamedChannel],
+    step: float | None = None,
+) -> ProposedMapping:
+    """Propose a channel for each signal.
+
+    Parameters
+    ----------
+    files : that hold one recording, of one or several recorders.
+    given : channels that the user names, by signal, and by "time".
+    step : between two samples, where the files do not say it [s].
+
+    Raises
+    ------
+    InputError
+        If a named channel is missing or is named twice, or its unit does not fit; or a group that
+        holds a signal has no time.
+    """
+    places = _places(files)
+    where = ", ".join(str(one.path) for one in files)
+    assigned = {
+        name: _as_named(one, system.signals[name], places, system, where)
+        for name, one in given.items()
+        if name != TIME
+    }
+    _refuse_shared(assigned, where)
+    if TIME in given:
+        _find(given[TIME], TIME, places, where)
+    times = {given[TIME].channel} if TIME in given else set()
+    free = [
+        one
+        for one in places
+        if one.channel.name not in times
+        and not one.channel.stamp
+        and all(one.channel is not other.channel for other in assigned.values())
+    ]
+    assigned, doubts = match(assigned, free, system)
+    problems = tuple(
+        f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
+        for one in (*system.inputs, *system.outputs)
+        if one.name not in assigned
+    )
+    unmatched = tuple(
+        f"{one.name}: {doubts[one.name]}"
+        for one in system.judged
+        if one.name in doubts and one.name not in assigned
+    )
+    clocks = _clocks(assigned, files, given.get(TIME), step, system)
+    taken = {id(one.channel) for one in assigned.values()}
+    timed = {clock.channel for clock in clocks.values()}
+    left = [p for p in places if id(p.channel) not in taken and p.channel.name not in timed]
+    shown = tuple(f"{p.label} [{p.channel.unit}]" if p.channel.unit else p.label for p in left)
+    contradictions = tuple(_contradictions(given, assigned, files, clocks, system))
+    return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
+
+
+def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
+    """All channels, each with a name that no other has, if groups have names."""
+    found = [
+        (i, j, group, channel)
+        for i, one in enumerate(files)
+        for j, group in enumerate(one.groups)
+        for channel in group.channels
+    ]
+    counts = Counter(channel.name for *_, channel in found)
+    return [
+        PlacedChannel(
+            i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}"
+        )
+        for i, j, group, one in found
+    ]
+
+
+def _find(
+    one: NamedChannel, signal: str, places: Sequence[PlacedChannel], where: str
+) -> PlacedChannel:
+    """The place that a user names."""
+    name = one.channel
+    found = [place for place in places if place.channel.name == name]
+    found = found or [place for place in places if name in (place.label, place.full)]
+    found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
+    if signal == TIME and found:
+        return found[0]
+    if len(found) != 1:
+        names = [place.channel.name for place in places]
+        raise InputError(
+            where=f"{where}, channel '{name}'",
+            found=f"{len(found)} channels of this name" if found else "no such channel",
+            expected=f"one for {signal} among {listed(names)}{closest(name, names)}",
+            remedy=f"correct the name, --column '{signal}=NAME'"
+            + (", or GROUP/NAME where several groups have it" if found else ""),
+        )
+    return found[0]
+
+
+def _as_named(
+    one: NamedChannel, signal: Signal, places: Sequence[PlacedChannel], system: System, where: str
+) -> Assigned:
+    """The channel that a user names for a signal."""
+    place = _find(one, signal.name, places, where)
+    unit = stated = one.unit or place.channel.unit
+    if not stated:
+        fitting = fitting_units(place.channel, signal, system)
+        unit = fitting[0] if len(fitting) == 1 else ""
+    concluded = not stated and unit != "1"
+    way = conversion_to(unit, signal, system) if unit else None
+    if way is None:
+        raise _no_unit_of(signal, place, unit, stated_by_user=bool(one.unit), where=where)
+    turn = -1.0 if one.reversed else 1.0
+    scale, formula = way
+    return Assigned(
+        place.file,
+        place.group,
+        place.channel,
+        place.label,
+        unit,
+        turn * scale.factor,
+        turn * scale.zero,
+        formula,
+        unit_reason("named", unit, concluded),
+        certain=not concluded,
+        concluded=concluded or bool(one.unit),
+        doubt=unconfirmed(signal.name, place.label, unit) if concluded else "",
+    )
+
+
+def _no_unit_of(
+    signal: Signal, place: PlacedChannel, unit: str, *, stated_by_user: bool, where: str
+) -> InputError:
+    """A unit that cannot become that of a signal; where one is stated, no other is proposed."""
+    name = f"--column '{signal.name}={place.label}"
+    if not unit:
+        found, remedy = "no unit in the file", f"give it, {name} [UNIT]'"
+    elif not is_unit(unit):
+        found = f"[{unit}], a unit that is not known"
+        remedy = f"convert the values, or name one that is the same, {name} [UNIT]'"
+    else:
+        found = f"[{unit}], no unit of {signal.label}"
+        remedy = "correct the unit" if stated_by_user else "name another channel"
+    return InputError(
+        where=f"{where}, channel '{place.channel.name}'",
+        found=found,
+        expected=f"one that can become {signal.unit}"
+        + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
+        remedy=remedy,
+    )
+
+
+def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
+    """Refuse one channel that is named for two signals."""
+    taken: dict[int, str] = {}
+    for signal, one in assigned.items():
+        if id(one.channel) in taken:
+            raise InputError(
+                where=f"{where}, channel '{one.label}'",
+                found=f"it stands for {taken[id(one.channel)]} and for {signal}",
+                expected="a channel of its own for each signal",
+                remedy=f"correct one of the two, --column '{signal}=NAME'",
+            )
+        taken[id(one.channel)] = signal
+
+
+def _clocks(
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    named: NamedChannel | None,
+    step: float | None,
+    system: System,
+) -> dict[tuple[int, int], Clock]:
+    """Times of each group with an assigned channel, by file and group.
+
+    Raises
+    ------
+    InputError
+        If a group has none, or one rate is that of unlike numbers of samples in one file.
+    """
+    clocks: dict[tuple[int, int], Clock] = {}
+    for i, j in dict.fromkeys((one.file, one.group) for one in assigned.values()):
+        group = files[i].groups[j]
+        at = str(files[i].path) + (f", '{group.name}'" if group.name else "")
+        clocks[i, j] = read_clock(group, named, step, system, at)
+    for index, file in enumerate(files):
+        own = [clock for (i, _), clock in clocks.items() if i == index and clock.counted]
+        sizes = dict.fromkeys(str(clock.times.size) for clock in own)
+        if len(sizes) > 1:
+            raise InputError(
+                where=str(file.path),
+                found=f"one rate for channels of {' and '.join(sizes)} samples",
+                expected="channels that were sampled together, or times of their own",
+                remedy="export each with its times, or name channels of one length by --column",
+            )
+    return clocks
+
+
+def _contradictions(
+    given: Mapping[str, NamedChannel],
+    assigned: Mapping[str, Assigned],
+    files: Sequence[RecordedFile],
+    clocks: Mapping[tuple[int, int], Clock],
+    system: System,
+) -> Iterator[str]:
+    """Units that a user names, and that the files contradict: one of the two is wrong."""
+    for name in (one for one in given if one in assigned):
+        one, signal = assigned[name], system.signals[name]
+        ways = [conversion_to(unit, signal, system) for unit in (one.unit, one.channel.unit)]
+        if one.channel.unit and ways[0] != ways[1]:
+            yield _contradiction(files[one.file], one.label, one.unit, one.channel.unit)
+    for (i, j), clock in clocks.items():
+        stated = {one.name: one.unit for one in files[i].groups[j].channels}.get(clock.channel)
+        if stated and conversion(clock.unit, "s") != conversion(stated, "s"):
+            yield _contradiction(files[i], clock.channel, clock.unit, stated)
+
+
+def _contradiction(file: RecordedFile, channel: str, unit: str, stated: str) -> str:
+    return (
+        f"{file.path}, channel '{channel}': taken in [{unit}], as named, and the file states "
+        f"[{stated}]"
+    )

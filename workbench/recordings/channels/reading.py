@@ -1,0 +1,80 @@
+"""A recorder's file as signals, by what was confirmed before or what is certain."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from workbench.errors import InputError
+from workbench.recordings.channels.merge import Measured, merge
+from workbench.recordings.channels.names import TIME, NamedChannel, listed
+from workbench.recordings.channels.parting import propose_recordings
+from workbench.recordings.channels.proposal import ProposedMapping
+from workbench.recordings.channels.told import Told
+from workbench.recordings.csv import header
+from workbench.recordings.formats import read_foreign
+from workbench.system.system import System
+
+
+def has_own_names(path: Path, system: System) -> bool:
+    """Whether the first line of a CSV has the system's own names."""
+    try:
+        with path.open("rb") as stream:
+            line = stream.readline(1 << 16).decode("utf-8-sig", "replace")
+    except OSError:
+        return True  # the strict reader says what is wrong
+    names = {header(cell)[0] for cell in re.split("[,;\t]", line)}
+    return {TIME, *(one.name for one in (*system.inputs, *system.outputs))} <= names
+
+
+def read_measured(
+    path: Path, system: System, told: Told, stored: Mapping[str, NamedChannel]
+) -> Measured:
+    """Read a file whose channels were confirmed, or are named as the signals are.
+
+    Parameters
+    ----------
+    stored : channels that were confirmed for the folder; those of `told` win.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, holds several recordings, or somebody must say what its
+        channels are.
+    """
+    recorded = read_foreign(path)
+    found = propose_recordings([recorded], system, stored, told)
+    if len(found.held) > 1:
+        names = [f"'{one.name}'" for one in found.held]
+        raise InputError(
+            where=str(path),
+            found=f"{len(names)} recordings, {listed(names)}",
+            expected="one",
+            remedy=f"run 'workbench import {path} --out CASES', which makes a case of each, or "
+            "name the channels of one, --column 'SIGNAL=GROUP/CHANNEL'",
+        )
+    (proposal,) = (one.proposal for one in found.held)
+    if not proposal.certain:
+        raise _unsure(path, proposal)
+    return merge([recorded], proposal, system)
+
+
+def _unsure(path: Path, proposal: ProposedMapping) -> InputError:
+    proposed = [
+        f"{name} = {one.channel.name} [{one.unit}]"
+        for name, one in proposal.assigned.items()
+        if not one.certain
+    ]
+    found = [*proposal.problems, *(f"perhaps {one}" for one in proposed)]
+    found += [
+        f"perhaps time = {clock.channel} [{clock.unit}]"
+        if clock.channel
+        else f"perhaps time {clock.reason}"
+        for clock in proposal.clocks.values()
+        if not clock.certain
+    ]
+    return InputError(
+        where=str(path),
+        found=f"channels that nobody confirmed: {'; '.join(found)}",
+        expected="the system's own names with units, or channels that are named",
+        remedy=f"run 'workbench import {path} --out CASES', which asks, or name them with --column",
+    )

@@ -1,0 +1,307 @@
+"""The text of a recording: CSV to columns of numbers, nothing guessed."""
+
+import csv
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.errors import InputError, closest
+from workbench.runtime.files import read_text
+
+_HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?")
+
+
+_NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")
+
+
+_NUMBER = re.compile(r" *[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)? *")
+
+
+_THOUSANDS = re.compile(r" *[+-]?[1-9][0-9]{0,2}[.,][0-9]{3} *")
+
+
+_STAND_IN = "0"  # in empty fields that may be, while numbers are read
+
+
+_LARGEST = 1e100  # no measurement comes near; leaves room for the factors of units
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a recording.
+
+    Attributes
+    ----------
+    unit : as the header spells it.
+    values : (n,) finite numbers in that unit, NaN where a field may be empty and is; row i stands
+        on line i + 2 of the file.
+    """
+
+    unit: str
+    values: Vector
+
+
+def header(cell: str) -> tuple[str, str | None]:
+    """Name and unit of a column, None without one.
+
+    >>> header("pressure [kPa]")
+    ('pressure', 'kPa')
+    """
+    match = _HEADER_CELL.fullmatch(cell.strip())
+    return (match["name"], match["unit"] or None) if match else (cell, None)
+
+
+def cell(value: float) -> str:
+    """A number as it stands in a recording, with all digits; empty where nothing was measured.
+
+    >>> cell(0.1), cell(float("nan"))
+    ('0.1', '')
+    """
+    return "" if math.isnan(value) else repr(value)
+
+
+def read_columns(
+    path: Path,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    with_gaps: Collection[str] = (),
+) -> dict[str, Column]:
+    """Read named columns of a recording.
+
+    The separator is a comma, a semicolon or a tab. Numbers have a decimal point; with
+    semicolons or tabs they may have a decimal comma instead, throughout the file. What
+    could be read in two ways is refused.
+
+    Parameters
+    ----------
+    path : CSV file with one header line, `name [unit]` per column.
+    required, optional : names of columns, matched exactly; all others are ignored.
+    with_gaps : names of those that may have empty fields.
+
+    Returns
+    -------
+    columns : by name; an optional column that the file lacks is absent.
+
+    Raises
+    ------
+    InputError
+        At the first problem, with its line and column.
+    """
+    text = read_text(path, "correct 'file' in the table [measurement] of case.toml")
+    lines = text.rstrip("\n").split("\n")
+    _refuse_long(path, lines)
+    separator = _separator(path, lines[0])
+    header, *rows = _split(path, lines, separator)
+    found = _find(path, header, required, optional)
+    if not rows:
+        raise InputError(
+            where=f"{path}, line 2",
+            found="the end of the file after the header",
+            expected="rows of numbers",
+            remedy="export the recording again, with its samples",
+        )
+    table = list(zip(*rows, strict=True))
+    cells = {name: table[index] for name, (index, _) in found.items()}
+    gaps = {
+        name: np.array([not cell.strip() for cell in column])
+        for name, column in cells.items()
+        if name in with_gaps
+    }
+    filled = {
+        name: np.where(gaps[name], _STAND_IN, column).tolist() if name in gaps else column
+        for name, column in cells.items()
+    }
+    values = _numbers(list(filled.values()), separator)
+    if values is None:
+        raise _first_problem(path, filled, separator)
+    return {
+        name: Column(unit, np.where(gaps[name], np.nan, column) if name in gaps else column)
+        for (name, (_, unit)), column in zip(found.items(), values, strict=True)
+    }
+
+
+def _refuse_long(path: Path, lines: list[str]) -> None:
+    lengths = list(map(len, lines))
+    longest = max(lengths)
+    if longest > csv.field_size_limit():
+        line = lengths.index(longest)
+        raise InputError(
+            where=f"{path}, line {line + 1}",
+            found=f"{longest} characters, '{lines[line][:60]}'...",
+            expected=f"a sample, in at most {csv.field_size_limit()} characters",
+            remedy="export the recording again, with a line for each sample",
+        )
+
+
+def _separator(path: Path, header: str) -> str:
+    separators = [mark for mark in ",;\t" if mark in header]
+    if len(separators) == 1:
+        return separators[0]
+    names = {",": "commas", ";": "semicolons", "\t": "tabs"}
+    if not header.strip():
+        found = "an empty file or an empty first line"
+    elif not separators:
+        found = f"no separator in '{header[:60]}'"
+    else:
+        found = " and ".join(names[mark] for mark in separators)
+    raise InputError(
+        where=f"{path}, line 1",
+        found=found,
+        expected="a header 'name [unit]' per column with one kind of separator: "
+        "comma, semicolon or tab",
+        remedy="write the header as the first line and keep other separators out of it",
+    )
+
+
+def _split(path: Path, lines: list[str], separator: str) -> list[list[str]]:
+    try:
+        rows = list(csv.reader(lines, delimiter=separator, strict=True))
+    except csv.Error:
+        rows = []
+    if len(rows) != len(lines):
+        complete = [_ends_quotation(line, separator) for line in lines]
+        raise InputError(
+            where=f"{path}, line {complete.index(False) + 1}",
+            found="a quotation that does not end before the next separator or the end of the line",
+            expected="fields without quotation marks, or quoted within one line",
+            remedy="correct or remove the quotation marks",
+        )
+    width = len(rows[0])
+    for line, row in enumerate(rows, start=1):
+        if len(row) != width:
+            raise InputError(
+                where=f"{path}, line {line}",
+                found=f"{len(row)} fields in '{lines[line - 1][:60]}'",
+                expected=f"{width} as in the header",
+                remedy="complete or remove the line; a file with decimal commas needs "
+                "semicolons between its fields, and no number has thousands separators",
+            )
+    return rows
+
+
+def _ends_quotation(line: str, separator: str) -> bool:
+    try:
+        list(csv.reader([line], delimiter=separator, strict=True))
+    except csv.Error:
+        return False
+    return True
+
+
+def _find(
+    path: Path, header: list[str], required: Sequence[str], optional: Sequence[str]
+) -> dict[str, tuple[int, str]]:
+    """Return index and unit of each wanted column."""
+    parsed = [_HEADER_CELL.fullmatch(cell.strip()) for cell in header]
+    names = [match["name"] if match else cell for match, cell in zip(parsed, header, strict=True)]
+    columns: dict[str, tuple[int, str]] = {}
+    for name in (*required, *optional):
+        indices = [index for index, other in enumerate(names) if other == name]
+        if not indices and name in optional:
+            continue
+        where = f"{path}, line 1, column '{name}'"
+        if not indices:
+            raise InputError(
+                where=where,
+                found=f"no such column among {', '.join(names)}",
+                expected=f"a column '{name} [unit]'{closest(name, names)}",
+                remedy="rename the column, or name it in [measurement.columns] of case.toml",
+            )
+        if len(indices) > 1:
+            raise InputError(
+                where=where,
+                found=f"{len(indices)} columns of this name",
+                expected="one",
+                remedy="rename or remove the others",
+            )
+        match = parsed[indices[0]]
+        unit = match["unit"] if match else None
+        if not unit:
+            raise InputError(
+                where=where,
+                found=f"no unit in '{header[indices[0]]}'",
+                expected=f"'{name} [unit]'",
+                remedy="write the unit in brackets behind the name",
+            )
+        columns[name] = indices[0], unit
+    return columns
+
+
+def _numbers(columns: Sequence[Sequence[str]], separator: str) -> list[Vector] | None:
+    """Convert all cells, or return None if one of them is not beyond doubt a number."""
+    characters = frozenset().union(*("".join(column) for column in columns))
+    mark = "," if "," in characters else "."
+    if not characters <= _NUMBER_CHARACTERS or {",", "."} <= characters or mark == separator:
+        return None
+    if separator != "," and _only_thousands(columns, mark):
+        return None
+    try:
+        values = [
+            np.array([float(cell) for cell in "\n".join(column).replace(",", ".").split("\n")])
+            for column in columns
+        ]
+    except ValueError:
+        return None
+    if not all(np.abs(column).max() < _LARGEST for column in values):
+        return None
+    return values
+
+
+def _only_thousands(columns: Sequence[Sequence[str]], mark: str) -> bool:
+    """Say whether every number with a mark, such as 1.234, may have it between thousands."""
+    marked = (cell for column in columns for cell in column if mark in cell)
+    first = next(marked, None)
+    return (
+        first is not None
+        and _THOUSANDS.fullmatch(first) is not None
+        and all(_THOUSANDS.fullmatch(cell) for cell in marked)
+    )
+
+
+def _first_problem(path: Path, cells: Mapping[str, Sequence[str]], separator: str) -> InputError:
+    """Name the first cell that `_numbers` stumbles over."""
+    ambiguous = "one decimal mark throughout the file, and no thousands separators"
+    rewrite = "export the recording again, without thousands separators"
+    mark, number, place = "", "", str(path)  # the first decimal mark, its number and where
+    for line, row in enumerate(zip(*cells.values(), strict=True), start=2):
+        for name, cell in zip(cells, row, strict=True):
+            where = f"{path}, line {line}, column '{name}'"
+            text = cell.strip(" ")
+            marks = [character for character in text if character in ",."]
+            doubtful = len(marks) > 1 or marks == [separator]
+            is_number = _NUMBER.fullmatch(text) is not None
+            if is_number and not doubtful:
+                is_number = abs(float(text.replace(",", "."))) < _LARGEST
+            if not is_number:
+                return InputError(
+                    where=where,
+                    found=repr(text) if text else "an empty field",
+                    expected="a finite number",
+                    remedy="correct the field, or remove its line",
+                )
+            if doubtful:
+                return InputError(
+                    where=where,
+                    found=f"'{text}', which is ambiguous",
+                    expected=ambiguous,
+                    remedy=rewrite,
+                )
+            if marks and not mark:
+                mark, number, place = marks[0], text, where
+            if marks and marks[0] != mark:
+                return InputError(
+                    where=where,
+                    found=f"'{text}' after '{number}' ({place}), which is ambiguous",
+                    expected=ambiguous,
+                    remedy=rewrite,
+                )
+    return InputError(
+        where=place,
+        found=f"'{number}' and no number that tells a decimal mark from a thousands separator",
+        expected=ambiguous,
+        remedy="write the decimals of at least one number with other than three digits",
+    )

@@ -1,0 +1,323 @@
+"""Published recordings become case folders: the publisher's own files, checked by their checksums.
+
+The workbench holds none of them. What it knows of a set is a `Published`, which a system's
+companion has as `PUBLISHED`, a package in its module `published`.
+"""
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.recordings.case import KEYS, Case, read_case
+from workbench.recordings.csv import cell
+from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.runtime.resources import commit
+from workbench.system.registry import companion_part, system_path
+from workbench.system.system import System
+from workbench.system.tables import read_table
+
+PREPARED = "prepared.json"
+_CASE = "case.toml"
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedRecording:
+    """One recording of a published set, or a piece of one.
+
+    Attributes
+    ----------
+    name : of the case folder.
+    title : one line for reports.
+    columns : (n,) each, by `name [unit]` as the case's CSV has it; the first is `time [s]`.
+    file : that it was read from, of those of the layout.
+    rows : first and last row of that file's samples, from 0.
+    changed : what was converted, chosen or cut, for people.
+    conditions : of the case, as `case.toml` has them.
+    held_out : it is there to judge a fit to the others by.
+    machine : that it was recorded on, where a set has several; each is diagnosed for itself.
+    date : when it was recorded, ISO 8601; empty: unknown.
+    counts_from : time before which samples only lead to those that count [s]; None: all count.
+    """
+
+    name: str
+    title: str
+    columns: Mapping[str, Vector]
+    file: str
+    rows: tuple[int, int]
+    changed: tuple[str, ...] = ()
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    held_out: bool = False
+    machine: str = ""
+    date: str = ""
+    counts_from: float | None = None
+
+
+@dataclass(frozen=True)
+class FolderLayout:
+    """A way in which the set lies in a folder.
+
+    Attributes
+    ----------
+    name : for people, such as "the publisher's own files".
+    files : SHA-256 of each, by its path in the folder; all must be there.
+    read : the recordings in a folder with these files.
+    pattern : of files that anybody may have recorded in this format, in place of `files`; their
+        checksums are noted.
+    one : reads a single recording from its own folder, where it has one with a case.toml; or None.
+    """
+
+    name: str
+    files: Mapping[str, str]
+    read: Callable[[Path], Sequence[PublishedRecording]]
+    pattern: str = ""
+    one: Callable[[Path], PublishedRecording] | None = None
+
+    def found(self, source: Path) -> dict[str, str]:
+        """SHA-256 of the files of the layout that are in a folder, by their path there."""
+        paths = source.glob(self.pattern) if self.pattern else map(source.joinpath, self.files)
+        return {
+            path.relative_to(source).as_posix(): _sha256(path.read_bytes())
+            for path in sorted(paths)
+            if path.is_file()
+        }
+
+
+@dataclass(frozen=True)
+class Published:
+    """A set of recordings that somebody published.
+
+    Attributes
+    ----------
+    title : what was measured on which machine.
+    source : authors, year, where it is to be had.
+    licence : under which it was published.
+    recordings : what they are, which are fitted and which are held out.
+    layouts : in which it is read, the publisher's own first.
+    """
+
+    title: str
+    source: str
+    licence: str
+    recordings: str
+    layouts: tuple[FolderLayout, ...]
+
+    def __str__(self) -> str:
+        parts = [f"{self.title}\n\n{self.recordings}\n", f"source:  {self.source}"]
+        parts += [f"licence: {self.licence}"]
+        for layout in self.layouts:
+            parts += [f"\n{layout.name}:"]
+            parts += [f"  {sha256}  {path}" for path, sha256 in layout.files.items()]
+        return "\n".join(parts)
+
+
+def published(which: str) -> Published:
+    """What a system's companion knows of its published recordings.
+
+    Parameters
+    ----------
+    which : name of a system, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is no such system, or its recordings were not published.
+    """
+    path = system_path(which)
+    companion = read_table(path, "name a system", 'title = "..."').text("companion", "")
+    if (found := _known(companion)) is None:
+        raise InputError(
+            where=str(path),
+            found="no companion that knows of published recordings",
+            expected="a Python module with a 'PUBLISHED'",
+            remedy="choose another system; write case folders for your own recordings",
+        )
+    return found
+
+
+def _known(companion: str) -> Published | None:
+    """What a companion knows of published recordings, if there is one, and it does."""
+    if not companion:
+        return None
+    # A package has it in a part of its own: commands ask each package whether it has some, too.
+    own = companion_part(companion, "published") or import_module(companion)
+    found = getattr(own, "PUBLISHED", None)
+    return found if isinstance(found, Published) else None
+
+
+def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]:
+    """Write case folders of a published set, and what was done as `prepared.json`.
+
+    Parameters
+    ----------
+    which : see `published`.
+    source : folder that holds the set in one of its layouts.
+    out : a new folder, an empty one, or one that was written so before. What was written then and
+        is no case now is removed, if it is as it was written.
+
+    Raises
+    ------
+    InputError
+        If the set is not in `source`, a file of it is another one, or `out` holds other files.
+    """
+    known = published(which)
+    _refuse_other_files(out)
+    layout = _layout(known, source)
+    recordings = list(layout.read(source))
+    with claimed(out):
+        before = _written(out)
+        written: dict[str, str] = {}
+        for one in recordings:
+            written |= {f"{one.name}/{file}": text for file, text in _texts(one).items()}
+        _remove(out, {path: sha256 for path, sha256 in before.items() if path not in written})
+        for path, text in written.items():
+            write_whole(out / path, text)
+        write_json(
+            out / PREPARED,
+            {
+                "system": which,
+                "title": known.title,
+                "source": known.source,
+                "licence": known.licence,
+                "workbench": commit(),
+                "layout": layout.name,
+                "read": layout.found(source),
+                "held_out": [one.name for one in recordings if one.held_out],
+                "written": {path: _sha256(text.encode()) for path, text in written.items()},
+                "cases": {one.name: _described(one) for one in recordings},
+            },
+        )
+    return recordings
+
+
+def read_recorded(folder: Path, system: System) -> Case:
+    """Read a case folder, or a recording as its machine wrote it, whose format is known.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    document = read_table(folder / _CASE, "repair the folder, or remove it", 'title = "..."')
+    known = _known(system.companion)
+    layouts = known.layouts if known else ()
+    readers = [layout.one for layout in layouts if layout.one is not None]
+    if set(document.content) <= set(KEYS) or not readers:
+        return read_case(folder, system)
+    one = readers[0](folder)
+    with tempfile.TemporaryDirectory(prefix="recorded-") as scratch:
+        for file, text in _texts(one).items():
+            write_whole(Path(scratch) / one.name / file, text)
+        try:
+            case = read_case(Path(scratch) / one.name, system)
+        except InputError as error:  # of files that are not the user's
+            where = error.where.replace(scratch, str(folder.parent))
+            raise InputError(
+                where=where, found=error.found, expected=error.expected, remedy=error.remedy
+            ) from None
+    return replace(case, source=folder.parent / one.file)
+
+
+def _described(one: PublishedRecording) -> dict[str, Any]:
+    time = next(iter(one.columns.values()))
+    return {
+        "file": one.file,
+        "rows": list(one.rows),
+        "samples": time.size,
+        "seconds": float(time[-1] - time[0]),
+        "columns": list(one.columns),
+        "conditions": dict(one.conditions),
+        "machine": one.machine,
+        "changed": list(one.changed),
+    }
+
+
+def _refuse_other_files(out: Path) -> None:
+    if out.exists() and not (out / PREPARED).is_file() and any(out.iterdir()):
+        raise InputError(
+            where=str(out),
+            found="a folder with other files",
+            expected="a new or an empty folder, or one with prepared recordings",
+            remedy="choose another folder",
+        )
+
+
+def _layout(known: Published, source: Path) -> FolderLayout:
+    """The layout in which the set lies in a folder, of files with the right checksums."""
+    for layout in known.layouts:
+        if layout.found(source):
+            for path, sha256 in layout.files.items():
+                _check(source / path, sha256)
+            return layout
+    expected = [next(iter(layout.files), layout.pattern) for layout in known.layouts]
+    raise InputError(
+        where=str(source),
+        found="none of the files" if source.is_dir() else "no such folder",
+        expected=f"a folder with {' or '.join(expected)}",
+        remedy=f"get them from {known.source}",
+    )
+
+
+def _check(path: Path, sha256: str) -> None:
+    if not path.is_file():
+        raise InputError(
+            where=str(path),
+            found="no such file",
+            expected="all files of the set",
+            remedy="complete the folder",
+        )
+    found = _sha256(path.read_bytes())
+    if found != sha256:
+        raise InputError(
+            where=str(path),
+            found=f"another file (SHA-256 {found})",
+            expected=f"the file as it was published (SHA-256 {sha256})",
+            remedy="get it again; to use other recordings, write case folders for them",
+        )
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _written(out: Path) -> dict[str, str]:
+    """SHA-256 of the files that were written into a folder before, by their path there."""
+    path = out / PREPARED
+    if not path.is_file():
+        return {}
+    found: dict[str, str] = json.loads(path.read_text()).get("written", {})
+    return found
+
+
+def _remove(out: Path, files: Mapping[str, str]) -> None:
+    """Remove files that are as they were written, and the folders which that leaves empty."""
+    for name, sha256 in files.items():
+        path = out / name
+        if path.is_file() and _sha256(path.read_bytes()) == sha256:
+            path.unlink()
+            if not any(path.parent.iterdir()):
+                path.parent.rmdir()
+
+
+def _texts(one: PublishedRecording) -> dict[str, str]:
+    """Files of a case folder, by name."""
+    measurement = {"file": "measured.csv"}
+    if one.counts_from is not None:
+        measurement["counts_from"] = f"{one.counts_from!r} s"
+    dated = {"date": one.date} if one.date else {}
+    case = {"title": one.title, **dated, "measurement": measurement}
+    conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
+    rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
+    lines = [",".join(one.columns), *(",".join(map(cell, row)) for row in rows)]
+    return {
+        _CASE: tomli_w.dumps(case | conditions),
+        "measured.csv": "\n".join(lines) + "\n",
+    }

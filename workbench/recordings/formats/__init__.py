@@ -1,0 +1,170 @@
+"""Files of recorders, read as they are: which channels they hold, with names, units and times.
+
+Each format is one module, and what it needs beyond the workbench is in the extra `files`. What a
+channel means for a machine is not known here.
+"""
+
+import gzip
+import hashlib
+import io
+import warnings
+import zlib
+from collections.abc import Callable
+from contextlib import nullcontext, redirect_stdout
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from workbench.errors import InputError
+from workbench.recordings.formats.contents import Contents, FileChannel, Group, RecordedFile
+from workbench.recordings.formats.text import read as read_as_text
+from workbench.runtime.files import read_bytes
+from workbench.runtime.pool import Pool
+from workbench.runtime.resources import installing
+
+__all__ = ["FileChannel", "Group", "RecordedFile", "is_foreign", "read_foreign"]
+
+_Reader = Callable[[Path, bytes], Contents]
+_OF_THE_FILE = (UserWarning, RuntimeWarning)
+_MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
+# Packages that read a format, by the module here, and what people call its files.
+_PACKAGES = {
+    "excel": ("openpyxl", "an Excel workbook"),
+    "parquet": ("pyarrow", "a Parquet file"),
+    "matlab5": ("scipy", "a MAT file"),
+    "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
+    "mdf": ("asammdf", "an MDF file"),
+    "tdms": ("nptdms", "a TDMS file"),
+}
+# Their libraries hand what a file says to compiled code, which may end the process or never return.
+_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
+_START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
+_BEGINS = {  # how files begin, whatever their ending
+    b"PAR1": "parquet",
+    b"MDF     ": "mdf",
+    b"UnFinMF ": "mdf",
+    b"TDSm": "tdms",
+    b"MATLAB 5.0 MAT-file": "matlab5",
+    b"MATLAB 7.3 MAT-file": "hdf5",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"PK\x03\x04": "excel",
+}
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file is read here by its ending; a CSV may be the workbench's own."""
+    return path.suffix.lower() != ".csv"
+
+
+def read_foreign(path: Path) -> RecordedFile:
+    """Read a file of a recorder.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, its format is not known, or the package that reads it is missing.
+    """
+    raw = read_bytes(path, "correct the path")
+    if not raw:
+        raise InputError(
+            where=str(path),
+            found="an empty file",
+            expected="a recording",
+            remedy="export it again, with its samples",
+        )
+    sha256 = hashlib.sha256(raw).hexdigest()
+    packed = raw.startswith(b"\x1f\x8b")
+    if packed:
+        raw = _unpacked(path, raw)
+    words, groups, notes, doubts = _reader(path, raw)(path, raw)
+    if not any(group.channels for group in groups):
+        raise InputError(
+            where=str(path),
+            found=f"{words} without a channel of numbers",
+            expected="a recording",
+            remedy="export it again, with its samples",
+        )
+    return RecordedFile(
+        path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256, doubts
+    )
+
+
+def _unpacked(path: Path, raw: bytes) -> bytes:
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
+            unpacked = stream.read(_MOST + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(
+            where=str(path),
+            found=f"a damaged gzip file ({error})",
+            expected="a whole one",
+            remedy="copy or pack it again",
+        ) from None
+    if len(unpacked) > _MOST:
+        raise InputError(
+            where=str(path),
+            found=f"more than {_MOST >> 30} GB, unpacked",
+            expected="a recording that fits into memory",
+            remedy="cut it into several files",
+        )
+    return unpacked
+
+
+def _reader(path: Path, raw: bytes) -> _Reader:
+    """The reader of a format, by how the file begins."""
+    module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
+    if raw.startswith(b"\xd0\xcf\x11\xe0"):
+        raise InputError(
+            where=str(path),
+            found="a workbook of Excel 97 to 2003 (.xls)",
+            expected="a workbook (.xlsx), or a CSV",
+            remedy="save it as .xlsx",
+        )
+    if not module:
+        return read_as_text
+    package, called = _PACKAGES[module]
+    try:
+        import_module(package)
+    except ImportError:
+        raise InputError(
+            where=str(path),
+            found=f"{called}, which the package '{package}' reads, and that is not installed",
+            expected="the extra [files], which holds what reads such files",
+            remedy=installing("files"),
+        ) from None
+    reader = partial(_apart if module in _NATIVE else _here, module)
+    return partial(_undamaged, reader, called)
+
+
+def _here(module: str, path: Path, raw: bytes) -> Contents:
+    reader = import_module(f"workbench.recordings.formats.{module}")
+    # Some print what puzzles them, where results are expected.
+    with (
+        redirect_stdout(io.StringIO()),
+        warnings.catch_warnings(record=True, action="always") as told,
+    ):
+        found: Contents = reader.read(path, raw)
+    # What libraries warn of is about the file, or is about themselves.
+    notes = [str(one.message)[:200] for one in told if issubclass(one.category, _OF_THE_FILE)]
+    return found._replace(notes=[*found.notes, *dict.fromkeys(notes)])
+
+
+def _apart(module: str, path: Path, raw: bytes) -> Contents:
+    """Read a file in a process of its own."""
+    with Pool(1, nullcontext, module, limit=_START + len(raw) / _RATE) as pool:
+        return pool.submit(_here, path, raw).result()
+
+
+def _undamaged(reader: _Reader, called: str, path: Path, raw: bytes) -> Contents:
+    """What a library reads of a file, if it is whole."""
+    try:
+        return reader(path, raw)
+    except InputError:
+        raise
+    except Exception as error:  # libraries stumble over damaged files in dozens of ways
+        raise InputError(
+            where=str(path),
+            found=f"{called} that cannot be read ({type(error).__name__}: {error})",
+            expected="a whole file, as its recorder writes it",
+            remedy="copy or export it again",
+        ) from None

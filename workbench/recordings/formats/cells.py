@@ -1,0 +1,220 @@
+"""A table of cells as people and recorders lay it out: names, units, then samples."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.recordings.formats.contents import FileChannel, Group
+from workbench.recordings.formats.numbers import (
+    MISSING,
+    all_plain,
+    is_number,
+    reading_of,
+    values_of,
+)
+from workbench.recordings.formats.preamble import stated_step
+from workbench.recordings.formats.spelling import is_unit, named, spelled
+from workbench.recordings.formats.stamps import has_day, has_day_alone, is_stamp, read_stamps
+
+_DIGITS = frozenset("0123456789+-.,eE")
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Rows of cells, and where the samples among them begin.
+
+    Attributes
+    ----------
+    rows : of one width.
+    lines : of the file, from 1, on which they stand.
+    head : lines above the samples, as text.
+    names, units : cells of the header; empty where there is none.
+    """
+
+    rows: list[list[str]]
+    lines: list[int]
+    head: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> Cells:
+    """Find samples and header among rows of any width.
+
+    Parameters
+    ----------
+    lines : of the file, on which the rows stand.
+
+    Raises
+    ------
+    InputError
+        If there are no two columns of samples, or their names do not reach as far as they do.
+    """
+    data = [i for i, row in enumerate(rows) if _is_data(row)]
+    width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
+    samples = [i for i in data if len(rows[i]) == width or len(_trimmed(rows[i])) == width]
+    # A line of a preamble may hold numbers, too, but not several one after the other.
+    first = next((i for i, j in zip(samples, samples[2:], strict=False) if j == i + 2), None)
+    if first is None or width < 2:
+        raise InputError(
+            where=where,
+            found="no columns of numbers",
+            expected="a table: names, then a row for each sample, at least a time and a signal",
+            remedy="export the recording as a table",
+        )
+    names, units = _header(rows[:first], width)
+    head = tuple(" ".join(filter(None, row)) for row in rows[:first])
+    kept = [i for i in samples if i >= first]
+    found = [list(rows[i][:width]) for i in kept]
+    if names:
+        _refuse_narrow(names, units, found, f"{where}, above line {lines[first]}")
+    else:
+        names = [f"column {i + 1}" for i in range(width)]
+    filled = (tuple((row + [""] * width)[:width]) for row in (names, units))
+    return Cells(found, [lines[i] for i in kept], head, *filled)
+
+
+def _refuse_narrow(
+    names: Sequence[str], units: Sequence[str], samples: Sequence[Sequence[str]], where: str
+) -> None:
+    """Refuse a header that does not reach as far as the samples: which name is whose is not known.
+
+    R writes row numbers without a name; numbers with decimal commas between commas are two cells.
+    """
+    named = len(_trimmed(names))
+    held = max(len(_trimmed(row)) for row in samples)
+    if named >= held and (not units or len(units) >= named):
+        return
+    raise InputError(
+        where=where,
+        found=f"{named} names over {held} columns of samples"
+        if named < held
+        else f"{len(units)} units below {named} names",
+        expected="as many cells in each row, so that each column has its own name and unit",
+        remedy="name every column, that of row numbers, too; between commas, write decimal points "
+        "or put numbers into quotation marks",
+    )
+
+
+def _trimmed(row: Sequence[str]) -> Sequence[str]:
+    """A row without empty cells at its end."""
+    end = len(row)
+    while end and not row[end - 1].strip():
+        end -= 1
+    return row[:end]
+
+
+def _is_data(row: Sequence[str]) -> bool:
+    """Whether a row holds two numbers or times, and little else."""
+    if _DIGITS.issuperset("".join(row)) and sum(cell[-1:].isdigit() for cell in row) > 1:
+        return True  # as nearly all rows are
+    held = [cell.strip() for cell in row if cell.strip().lower() not in MISSING]
+    count = sum(is_number(cell) or is_stamp(cell) for cell in held)
+    return count >= min(2, max(1, len(row) - 1)) and 3 * count > len(held)
+
+
+def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
+    """Names and units as they stand above the samples; empty where there are none."""
+    rows: list[list[str]] = []
+    for row in reversed(above):
+        if not _trimmed(row):
+            continue
+        cells = [cell.strip() for cell in row]
+        if len(_trimmed(cells)) > width or len(_trimmed(cells)) < max(2, width // 2):
+            break
+        rows.insert(0, cells)
+        if len(rows) == 3:
+            break
+    if not rows:
+        return [], []
+    at = next((i for i in range(1, len(rows)) if _are_units(rows[i])), None)
+    if at is None:
+        return rows[-1], []
+    return rows[at - 1], [spelled(cell) for cell in rows[at]]
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    held = [cell for cell in cells if cell]
+    return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
+
+
+def read_group(
+    table: Cells, name: str, where: str, *, commas: bool = True
+) -> tuple[Group, str, list[str]]:
+    """Channels of a table, how its numbers are written, and notes on what was left out.
+
+    Parameters
+    ----------
+    commas : whether numbers may hold commas.
+
+    Raises
+    ------
+    InputError
+        If numbers can be read in two ways.
+    """
+    columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
+    stamps: list[FileChannel] = []
+    numbers: dict[int, list[str]] = {}
+    notes: list[str] = []
+    labels = [_label(table, i) for i in range(len(columns))]
+    labels, columns = _joined(labels, columns)
+    for i, cells in enumerate(columns):
+        if _mostly(cells, is_stamp):
+            channel = read_stamps(labels[i][0], cells)
+            if channel is None:
+                notes.append(f"'{labels[i][0]}' holds dates that can be read in two ways")
+            else:
+                stamps.append(channel)
+        elif _mostly(cells, is_number):
+            numbers[i] = all_plain(cells)
+        elif any(cells):
+            notes.append(f"'{labels[i][0]}' holds texts")
+    reading = reading_of(list(numbers.values()), where, commas=commas)
+    channels: list[FileChannel] = []
+    for i, cells in numbers.items():
+        values = values_of(cells, reading)
+        gaps = np.flatnonzero(np.isnan(values)).tolist()
+        bad = [k for k in gaps if cells[k].lower() not in MISSING]
+        if bad:
+            notes.append(
+                f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
+                f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
+            )
+        channels.append(FileChannel(*labels[i], values))
+    step, doubt = stated_step(table.head)
+    within = (name,) if name else ()
+    group = Group(name, (*stamps, *channels), step=step, step_doubt=doubt, within=within)
+    return group, reading, notes
+
+
+def _joined(
+    labels: list[tuple[str, str]], columns: list[list[str]]
+) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """The same columns, with one of days and one of times of day as one."""
+    kinds = [_mostly(cells, is_stamp) and has_day_alone(cells) for cells in columns]
+    clocks = [_mostly(cells, is_stamp) and not has_day(cells) for cells in columns]
+    if not any(kinds) or not any(clocks):
+        return labels, columns
+    day, clock = kinds.index(True), clocks.index(True)
+    joined = [f"{one} {other}" for one, other in zip(columns[day], columns[clock], strict=True)]
+    left = [i for i in range(len(columns)) if i not in (day, clock)]
+    name = f"{labels[day][0]} {labels[clock][0]}", ""
+    return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]
+
+
+def _label(table: Cells, i: int) -> tuple[str, str]:
+    """Name and unit of a column."""
+    name, unit = named(table.names[i])
+    return name or f"column {i + 1}", unit or table.units[i]
+
+
+def _mostly(cells: Sequence[str], is_one: Callable[[str], bool]) -> bool:
+    """Whether more than half of the cells that hold anything are of a kind."""
+    few = cells[:: max(1, len(cells) // 1000)]  # a thousand tell, if they hold anything
+    held = [cell for cell in few if cell.lower() not in MISSING]
+    if not held:
+        held = [cell for cell in cells if cell.lower() not in MISSING]
+    return len(held) > 0 and 2 * sum(map(is_one, held)) > len(held)

@@ -1,0 +1,89 @@
+"""What a recorder's file holds, before anybody says which channel is which signal."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from workbench.arrays import Vector
+
+
+@dataclass(frozen=True, eq=False)
+class FileChannel:
+    """One channel of a file.
+
+    Attributes
+    ----------
+    name : as the recorder has it.
+    unit : as the file spells it; empty where it says none.
+    values : (n,) in that unit, NaN where the recorder has no number.
+    about : what the file says of it beside the name.
+    start : of time stamps, the time from which they count [s since 1970]; NaN: none is known.
+    stamp : whether values are times that were written as dates or times of day.
+    shown : of time stamps without a known date, what they show where they count from [s]; NaN: no
+        time of day.
+    """
+
+    name: str
+    unit: str
+    values: Vector
+    about: str = ""
+    start: float = math.nan
+    stamp: bool = False
+    shown: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Channels that were sampled together.
+
+    Attributes
+    ----------
+    name : of a sheet, a table or a group of the file; empty where it has one alone.
+    channels : (n,) samples each.
+    time : what the file itself says when its samples were taken, in s; None: one of the channels
+        may be the time.
+    step : time between two samples that the file states [s]; NaN: it states none.
+    step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
+    within : names of what holds it in the file, outermost first: a sheet, nested structures.
+    """
+
+    name: str
+    channels: tuple[FileChannel, ...]
+    time: FileChannel | None = None
+    step: float = math.nan
+    step_doubt: str = ""
+    within: tuple[str, ...] = ()
+
+    def renamed(self, name: str) -> "Group":
+        """The same group with another name."""
+        return replace(self, name=name)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFile:
+    """A file as it was read.
+
+    Attributes
+    ----------
+    kind : format, and what was found of it, in words.
+    notes : what was left out or understood, in words.
+    sha256 : of the file.
+    doubts : why it may be damaged, in words.
+    """
+
+    path: Path
+    kind: str
+    groups: tuple[Group, ...]
+    notes: tuple[str, ...]
+    sha256: str
+    doubts: tuple[str, ...] = ()
+
+
+class Contents(NamedTuple):
+    """What the reader of a format finds in a file; see `RecordedFile`."""
+
+    kind: str
+    groups: list[Group]
+    notes: list[str]
+    doubts: tuple[str, ...] = ()

@@ -1,0 +1,118 @@
+"""Numbers as people and recorders write them: decimal points or commas, marks between thousands."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from itertools import islice
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+
+MISSING = frozenset(
+    ("", "nan", "na", "n/a", "n.a.", "#n/a", "#nv", "-", "--", "---", "null", "none", "inf", "-inf")
+)
+_NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)?")
+_GROUPED = re.compile(r"[+-]?\d{1,3}([ \u00a0\u202f'\u2019]\d{3})+([.,]\d+)?")
+_SPACES = re.compile(r"[ \u00a0\u202f'\u2019]")
+_SET = re.compile("[ \u00a0\u202f'\u2019\u2212]")
+_EXPONENT = r"([eE][+-]?\d+)?"
+_POINT, _COMMA = "decimal points", "decimal commas"
+_THOUSANDS_POINT = "decimal commas, points between thousands"
+_THOUSANDS_COMMA = "decimal points, commas between thousands"
+# Ways to read a number, and what takes it to a text of Python.
+_READINGS: dict[str, tuple[re.Pattern[str], Callable[[str], str]]] = {
+    _POINT: (re.compile(rf"[+-]?(\d+\.?\d*|\.\d+){_EXPONENT}"), str),
+    _COMMA: (
+        re.compile(rf"[+-]?(\d+,?\d*|,\d+){_EXPONENT}"),
+        lambda text: text.replace(",", "."),
+    ),
+    _THOUSANDS_POINT: (
+        re.compile(rf"[+-]?(\d+|[1-9]\d{{0,2}}(\.\d{{3}})+)(,\d*)?{_EXPONENT}"),
+        lambda text: text.replace(".", "").replace(",", "."),
+    ),
+    _THOUSANDS_COMMA: (
+        re.compile(rf"[+-]?(\d+|[1-9]\d{{0,2}}(,\d{{3}})+)(\.\d*)?{_EXPONENT}"),
+        lambda text: text.replace(",", ""),
+    ),
+}
+_LARGEST = 1e100  # no measurement comes near
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, in whatever way it is to be read."""
+    return _NUMBER.fullmatch(plain(cell)) is not None
+
+
+def all_plain(cells: list[str]) -> list[str]:
+    """Cells without signs of type setting, which most columns have none of."""
+    return [plain(cell) for cell in cells] if _SET.search("".join(cells)) else cells
+
+
+def plain(cell: str) -> str:
+    """A cell without signs of type setting."""
+    text = cell.replace("\u2212", "-") if "\u2212" in cell else cell
+    return _SPACES.sub("", text) if _GROUPED.fullmatch(text) else text
+
+
+def reading_of(columns: Sequence[Sequence[str]], where: str, *, commas: bool) -> str:
+    """The one way in which all numbers can be read.
+
+    Raises
+    ------
+    InputError
+        If there are two that differ, or none.
+    """
+    marks = frozenset().union(*("".join(cells) for cells in columns)) & {",", "."}
+    if not commas or not marks:
+        return _POINT
+    cells = (cell for column in columns for cell in column if "," in cell or "." in cell)
+    if len(marks) == 1:
+        usual, other = (_POINT, _THOUSANDS_POINT) if "." in marks else (_COMMA, _THOUSANDS_COMMA)
+        # The first number that no mark between thousands explains decides: mostly the first at all.
+        found = set(islice(cells, 1)) if _all_fit(columns, other) else set()
+        different = [usual, other] if found else [usual]
+    else:
+        found = {cell for cell in cells if _NUMBER.fullmatch(cell)}
+        ways = {
+            name: tuple(float(python(cell)) for cell in sorted(found))
+            for name, (pattern, python) in _READINGS.items()
+            if all(map(pattern.fullmatch, found))
+        }
+        different = list({values: name for name, values in reversed(ways.items())}.values())
+    if len(different) == 1:
+        return different[0]
+    example = min(found, key=len)
+    raise InputError(
+        where=where,
+        found=f"numbers such as '{example}', which can be read with {' or with '.join(different)}"
+        if different
+        else "numbers with decimal points and others with decimal commas",
+        expected="one decimal mark, and a number that tells it from one between thousands",
+        remedy="export the recording again, with more decimals and no marks between thousands",
+    )
+
+
+def _all_fit(columns: Sequence[Sequence[str]], reading: str) -> bool:
+    """Whether all numbers with a mark can be read so; ends at the first that cannot."""
+    pattern, _ = _READINGS[reading]
+    return all(
+        pattern.fullmatch(cell)
+        for column in columns
+        for cell in column
+        if ("," in cell or "." in cell) and _NUMBER.fullmatch(cell)
+    )
+
+
+def values_of(cells: Sequence[str], reading: str) -> Vector:
+    """Numbers of a column, (n,); NaN where there is none."""
+    pattern, python = _READINGS[reading]
+    as_python = reading == _POINT
+    try:  # nearly always all are numbers, and Python's own reader is the fastest
+        values = np.array([float(cell if as_python else python(cell)) for cell in cells])
+    except ValueError:
+        values = np.array(
+            [float(python(cell)) if pattern.fullmatch(cell) else math.nan for cell in cells]
+        )
+    return np.where(np.abs(values) < _LARGEST, values, np.nan)

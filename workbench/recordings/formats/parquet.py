@@ -1,0 +1,67 @@
+"""Parquet: one table, with units in the metadata of its columns or in their names."""
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from workbench.recordings.formats.contents import Contents, FileChannel, Group
+from workbench.recordings.formats.spelling import named, spelled
+from workbench.recordings.formats.stamps import is_stamp, read_stamps
+
+_UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
+_ABOUT = (b"description", b"comment", b"long_name")
+
+
+def read(path: Path, raw: bytes) -> Contents:
+    """Kind, groups and notes of a Parquet file."""
+    table = pq.read_table(io.BytesIO(raw))
+    channels: list[FileChannel] = []
+    notes: list[str] = []
+    for field, column in zip(table.schema, table.columns, strict=True):
+        name, unit = named(field.name)
+        known = field.metadata or {}
+        unit = unit or spelled(_first(known, _UNITS))
+        about = _first(known, _ABOUT)
+        kind = field.type
+        if pa.types.is_timestamp(kind):
+            channels.append(_stamps(name, column))
+        elif pa.types.is_duration(kind):
+            steps = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
+            values = _numbers(column.cast(pa.int64())) * steps
+            channels.append(FileChannel(name, "s", values, about, stamp=True))
+        elif pa.types.is_floating(kind) or pa.types.is_integer(kind):
+            channels.append(FileChannel(name, unit, _numbers(column), about))
+        elif pa.types.is_decimal(kind) or pa.types.is_boolean(kind):
+            channels.append(FileChannel(name, unit, _numbers(column.cast(pa.float64())), about))
+        else:
+            texts = [str(value) if value is not None else "" for value in column.to_pylist()]
+            found = read_stamps(name, texts) if any(map(is_stamp, texts[:100])) else None
+            if found is None:
+                notes.append(f"'{name}' holds {kind}")
+            else:
+                channels.append(found)
+    return Contents("Parquet", [Group("", tuple(channels))], notes)
+
+
+def _first(known: dict[bytes, bytes], keys: tuple[bytes, ...]) -> str:
+    return next((known[key].decode("utf-8", "replace") for key in keys if key in known), "")
+
+
+def _numbers(column: pa.ChunkedArray) -> np.ndarray:
+    values = column.to_numpy()
+    return np.asarray(values, dtype=np.float64)
+
+
+def _stamps(name: str, column: pa.ChunkedArray) -> FileChannel:
+    """Time stamps, without what a float of seconds since 1970 would round."""
+    units = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}[column.type.unit]
+    counts = column.cast(pa.int64())
+    first = next((value for value in counts.to_pylist() if value is not None), None)
+    if first is None:
+        return FileChannel(name, "s", np.full(len(column), math.nan), stamp=True)
+    since = pa.compute.subtract(counts, first)
+    return FileChannel(name, "s", _numbers(since) / units, start=first / units, stamp=True)

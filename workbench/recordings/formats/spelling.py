@@ -1,0 +1,116 @@
+"""Units as recorders spell them, and those that have a zero of their own."""
+
+import re
+from dataclasses import dataclass
+
+from workbench.errors import InputError
+from workbench.system.units import check_unit, si_factor
+
+# Spellings that mean one unit alone. Case matters elsewhere: mN is no MN.
+_SPELLINGS = {
+    "-": "1", "--": "1", "[-]": "1", "none": "1", "ohne": "1",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "Sek": "s", "Sek.": "s", "sek": "s",
+    "Sekunden": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
+    "usec": "us", "hr": "h", "hours": "h", "minutes": "min", "days": "d",
+    "kmh": "km/h", "km/std": "km/h", "kph": "km/h", "KM/H": "km/h", "Km/h": "km/h",
+    "kPA": "kPa", "KPa": "kPa", "Bar": "bar", "BAR": "bar", "mBar": "mbar", "pa": "Pa",
+    "RPM": "rpm", "Rpm": "rpm", "r/min": "rpm", "U/Min": "rpm", "1/Min": "rpm", "upm": "rpm",
+    "Upm": "rpm", "rev/min": "rpm", "/min": "1/min",
+    "Umdr/min": "rpm", "U/s": "rev/s",
+    "NM": "N.m", "N m": "N.m", "N*m": "N.m", "kN m": "kN.m", "kNM": "kN.m", "KN": "kN",
+    "KNm": "kNm",
+    "DegC": "degC", "°C": "degC", "deg C": "degC", "degC": "degC", "C": "degC", "Grad C": "degC",
+    "℃": "degC", "°F": "degF", "degF": "degF", "deg F": "degF", "Kelvin": "K",
+    "Grad": "deg", "Grad/s": "deg/s", "degrees": "deg", "radians": "rad", "rad/sec": "rad/s",
+    "m/sec": "m/s", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "Newton": "N", "metre": "m",
+    "ft.lb": "lbf.ft", "ft*lb": "lbf.ft", "ft-lb": "lbf.ft", "ft lb": "lbf.ft", "ftlb": "lbf.ft",
+    "ft.lbf": "lbf.ft", "ft*lbf": "lbf.ft", "ft-lbf": "lbf.ft", "ft lbf": "lbf.ft",
+    "lb.ft": "lbf.ft", "lb*ft": "lbf.ft", "lb-ft": "lbf.ft", "lb ft": "lbf.ft", "lbft": "lbf.ft",
+    "lbf*ft": "lbf.ft", "lbf-ft": "lbf.ft", "lbf ft": "lbf.ft", "lbfft": "lbf.ft",
+    "kp": "kgf", "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
+    "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2",
+    "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%",
+}  # fmt: skip
+_POWERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": "."})
+# Value in SI of one, and of zero, where a factor alone is not enough: temperatures; and units of
+# trade that the workbench's own files do not have.
+_OTHER = {
+    "degC": ("K", 1.0, 273.15),
+    "degF": ("K", 5.0 / 9.0, 459.67 * 5.0 / 9.0),
+    "psi": ("Pa", 6894.757293168361, 0.0),  # 0.45359237 kg * 9.80665 m/s2 / (25.4 mm)^2
+    "mph": ("m/s", 0.44704, 0.0),
+    "lbf": ("N", 4.4482216152605, 0.0),
+    "lbf.ft": ("N.m", 4.4482216152605 * 0.3048, 0.0),
+    "kgf": ("N", 9.80665, 0.0),
+    "kgf/cm2": ("Pa", 98066.5, 0.0),
+    "in": ("m", 0.0254, 0.0),
+    "ft": ("m", 0.3048, 0.0),
+    "ns": ("s", 1e-9, 0.0),
+    "d": ("s", 86400.0, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """From a unit of a file to SI: `factor*value + zero`."""
+
+    factor: float
+    zero: float = 0.0
+
+
+def spelled(text: str) -> str:
+    """A unit as the workbench spells it, from what stands in a file; empty: nothing stands there.
+
+    >>> spelled("[ U/Min ]"), spelled("m/s²"), spelled("-"), spelled("kNm")
+    ('rpm', 'm/s2', '1', 'kNm')
+    """
+    bare = text.strip()
+    for marks in ("[]", "()", "{}", "<>"):
+        if bare[:1] == marks[0] and bare[-1:] == marks[1]:
+            bare = bare[1:-1].strip()
+    bare = bare.strip("'\"").strip().translate(_POWERS).replace("**", "^")
+    return _SPELLINGS.get(bare, bare)
+
+
+def conversion(unit: str, si: str) -> Conversion | None:
+    """How values in a unit become SI, or None if the unit is none, or of another dimension.
+
+    Parameters
+    ----------
+    unit : as `spelled`.
+    """
+    base, factor, zero = _OTHER.get(unit, (unit, 1.0, 0.0))
+    try:
+        return Conversion(factor * si_factor(base, si, ""), zero)
+    except InputError:
+        return None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that can be converted, or a sign for none."""
+    unit = spelled(text)
+    try:
+        check_unit(unit, "")
+    except InputError:
+        return unit in _OTHER
+    return True
+
+
+_NAMED = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
+_TRAILING = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)")
+
+
+def named(cell: str) -> tuple[str, str]:
+    """Name and unit of a column; the unit is empty where none is told.
+
+    >>> named("pC [bar]"), named("pC (bar)"), named("Kraft (gefiltert)"), named("Druck in bar")
+    (('pC', 'bar'), ('pC', 'bar'), ('Kraft (gefiltert)', ''), ('Druck', 'bar'))
+    """
+    text = cell.strip().strip("'\"").strip()
+    if match := _NAMED.fullmatch(text):
+        unit = match["square"] if match["square"] is not None else match["round"]
+        if match["name"] and (match["square"] is not None or is_unit(unit)):
+            return match["name"], spelled(unit)
+    if (match := _TRAILING.fullmatch(text)) and is_unit(match["unit"]):
+        return match["name"], spelled(match["unit"])
+    return text, ""

@@ -1,0 +1,98 @@
+"""TDMS of LabVIEW and DIAdem: groups of channels, with waveforms or channels of times."""
+
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nptdms import TdmsFile
+from nptdms.log import log_manager
+
+from workbench.recordings.formats.contents import Contents, FileChannel, Group
+from workbench.recordings.formats.spelling import conversion, named, spelled
+
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
+
+
+def read(path: Path, raw: bytes) -> Contents:
+    """Kind, groups and notes of a file, in scaled values."""
+    groups: list[Group] = []
+    notes: list[str] = []
+    doubts: list[str] = []
+    with _heard(doubts):
+        for held in TdmsFile.read(io.BytesIO(raw)).groups():
+            groups += _groups(held, notes)
+    return Contents("TDMS", groups, notes, tuple(doubts))
+
+
+@contextmanager
+def _heard(doubts: list[str]) -> Iterator[None]:
+    """Take down what the library only prints, such as an end that is missing."""
+    said = io.StringIO()
+    before = log_manager.console_handler.setStream(said)
+    try:
+        yield
+    finally:
+        log_manager.console_handler.setStream(before)
+        doubts += dict.fromkeys(line[:200] for line in said.getvalue().splitlines())
+
+
+def _groups(held: Any, notes: list[str]) -> list[Group]:
+    """A group of the file; channels with other times or lengths are groups of their own."""
+    found: dict[tuple[int, float, float, float], list[FileChannel]] = {}
+    for one in held.channels():
+        name, unit = named(one.name)
+        stated: Mapping[str, Any] = one.properties
+        unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
+        values = one[:]
+        step, offset = _counted(stated)
+        begun = stated.get("wf_start_time")
+        start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan
+        if values.dtype.kind == "M":
+            channel = _stamps(name, values)
+        elif values.dtype.kind in "fiub":
+            about = str(stated.get("description", ""))
+            channel = FileChannel(name, unit, np.asarray(values, dtype=np.float64), about)
+        else:
+            notes.append(f"'{name}' holds texts")
+            continue
+        key = values.size, step, offset, -1.0 if np.isnan(start) else start
+        found.setdefault(key, []).append(channel)
+    groups = []
+    for (size, step, offset, start), channels in found.items():
+        if size < 2:
+            continue
+        clock = None
+        if step > 0.0:
+            times = offset + step * np.arange(size, dtype=np.float64)
+            clock = FileChannel("time", "s", times, start=start if start >= 0.0 else np.nan)
+        groups.append(Group(held.name, tuple(channels), time=clock, within=(held.name,)))
+    return groups
+
+
+def _counted(stated: Mapping[str, Any]) -> tuple[float, float]:
+    """Step and begin of a waveform [s]; zeros where it is none, or none over time."""
+    step = float(stated.get("wf_increment", 0.0) or 0.0)
+    # Without a unit LabVIEW means seconds; a spectrum has Hz.
+    scale = conversion(spelled(str(stated.get("wf_xunit_string", "") or "s")), "s")
+    if scale is None or not step > 0.0:
+        return 0.0, 0.0
+    return scale.factor * step, scale.factor * float(stated.get("wf_start_offset", 0.0) or 0.0)
+
+
+def _since_1970(moment: Any) -> float:
+    counted = np.datetime64(moment, "us").astype(np.int64)
+    seconds = float(counted) * 1e-6
+    return seconds if seconds > 0.0 else np.nan  # TDMS writes 1904 where it knows none
+
+
+def _stamps(name: str, values: Any) -> FileChannel:
+    """Time stamps, without what a float of seconds since 1970 would round."""
+    known = ~np.isnat(values)
+    first = values[known][0] if known.any() else np.datetime64(0, "us")
+    times = (values - first) / np.timedelta64(1, "s")
+    return FileChannel(
+        name, "s", np.where(known, times, np.nan), start=_since_1970(first), stamp=True
+    )

@@ -1,0 +1,441 @@
+"""Files of recorders become case folders; what was done to them is written down.
+
+A file is read (`foreign`), its channels are proposed for the signals of a system and confirmed
+(`mapping`), and it is cut where it holds several recordings. Originals are only read.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.recordings.case import UNKNOWN, check_recording, conditions_shown, read_conditions
+from workbench.recordings.channels import COLUMNS, Measured, NamedChannel, ProposedRecording, merge
+from workbench.recordings.csv import cell
+from workbench.recordings.formats.stamps import iso
+from workbench.recordings.plausibility import Origin, doubts
+from workbench.runtime.files import write_json, write_whole
+from workbench.runtime.resources import commit
+from workbench.system.parts import Cutting
+from workbench.system.system import System
+from workbench.system.tables import Table
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Samples that are kept as one recording, or left out.
+
+    Attributes
+    ----------
+    first, end : sample, and the one after the last.
+    reason : why they are left out; empty: they are kept.
+    """
+
+    first: int
+    end: int
+    reason: str = ""
+
+
+def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut]:
+    """Cut a recording into those that it holds, in their order; all samples are in one part.
+
+    It is cut where no recording may have a gap, and, if the system says how (`cutting`) and there
+    is more than one part, from the rise of one signal to the fall of another. A recording without
+    anything to cut is one part.
+
+    Parameters
+    ----------
+    time : (n,) s.
+    signals : (n,) each, SI.
+    """
+    gaps = np.flatnonzero(np.diff(time) > system.sampling.largest_gap) + 1
+    bounds = [0, *gaps.tolist(), time.size]
+    pieces = list(pairwise(bounds))
+    parts = _parts(time, signals, system.cutting, pieces, system) if system.cutting else []
+    if sum(not one.reason for one in parts) < 2:
+        parts = [Cut(first, end) for first, end in pieces]
+    judged = [_long_enough(one, time, system) for one in parts]
+    return list(_with_rest(judged, time.size))
+
+
+def _parts(
+    time: Vector,
+    signals: Mapping[str, Vector],
+    rule: Cutting,
+    pieces: list[tuple[int, int]],
+    system: System,
+) -> list[Cut]:
+    """Parts between a rise and a fall, with what is kept around them."""
+    applied = np.abs(system.signal(rule.begins.signal, signals)) > rule.begins.level
+    moving = np.abs(system.signal(rule.ends.signal, signals)) > rule.ends.level
+    found: list[Cut] = []
+    for low, high in pieces:
+        last = low
+        for begin, end, reason in _runs(time, applied, moving, rule.released, low, high):
+            first = max(last, int(np.searchsorted(time, time[begin] - rule.before)))
+            stop = min(high, int(np.searchsorted(time, time[end - 1] + rule.after, "right")))
+            found.append(Cut(first, stop, reason))
+            last = stop
+    return found
+
+
+def _runs(
+    time: Vector,
+    applied: np.ndarray,
+    moving: np.ndarray,
+    released: float,
+    low: int,
+    high: int,
+) -> Iterator[tuple[int, int, str]]:
+    """First sample, the one after the last, and why a run is no recording."""
+    k = low
+    while k < high:
+        if not (applied[k] and moving[k]) or (k > low and applied[k - 1]):
+            k += 1
+            continue
+        end, on = k, k
+        while end < high and moving[end] and time[end] - time[on] <= released:
+            on = end if applied[end] else on
+            end += 1
+        if end == high:
+            yield k, end, "it does not end in this recording"
+        elif moving[end]:
+            yield k, end, "it was released before its end"
+        elif k == low:
+            yield k, end, "it had begun before this recording"
+        else:
+            yield k, end, ""
+        k = end
+
+
+def _long_enough(one: Cut, time: Vector, system: System) -> Cut:
+    lasts = time[one.end - 1] - time[one.first]
+    if one.reason or (one.end - one.first >= system.fewest and lasts >= system.shortest):
+        return one
+    return Cut(one.first, one.end, "it is shorter than a recording must be")
+
+
+def _with_rest(parts: list[Cut], size: int) -> Iterator[Cut]:
+    """The parts and what is between them."""
+    last = 0
+    for one in parts:
+        if one.first > last:
+            yield Cut(last, one.first, "between recordings")
+        yield one
+        last = one.end
+    if last < size:
+        yield Cut(last, size, "between recordings")
+
+
+__all__ = [
+    "IMPORTED",
+    "Cut",
+    "Import",
+    "Piece",
+    "case_name",
+    "describe",
+    "import_recording",
+    "imported",
+    "store",
+    "write",
+    "write_record",
+]
+
+IMPORTED = "import.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One recording of an import.
+
+    Attributes
+    ----------
+    name : of its case folder.
+    samples : first, and the one after the last, of those that were read.
+    time : (n,) s from its first sample.
+    signals : (n,) each, SI.
+    conditions : as `case.toml` has them.
+    sources : where each condition is from: given, shown by the record, unknown.
+    doubts : what is unlikely in it, in words.
+    """
+
+    name: str
+    samples: tuple[int, int]
+    time: Vector
+    signals: Mapping[str, Vector]
+    conditions: Mapping[str, Any]
+    sources: Mapping[str, str]
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Import:
+    """What becomes of one recording, or one long one.
+
+    Attributes
+    ----------
+    recording : files that hold it, and its channels.
+    measured : all of it, in SI units.
+    parts : in which it was cut.
+    pieces : those that become cases.
+    """
+
+    recording: ProposedRecording
+    measured: Measured
+    parts: tuple[Cut, ...]
+    pieces: tuple[Piece, ...] = field(default_factory=tuple)
+
+
+def import_recording(
+    name: str,
+    recording: ProposedRecording,
+    system: System,
+    conditions: Mapping[str, Any],
+    *,
+    whole: bool = False,
+) -> Import:
+    """Make cases of a recording whose channels are known.
+
+    Parameters
+    ----------
+    name : of the case, or of all that a long recording is cut into, with numbers.
+    recording : with channels of all signals that are needed, confirmed.
+    conditions : of all these recordings, as `case.toml` has them.
+    whole : leave a long recording as it is.
+
+    Raises
+    ------
+    InputError
+        If signals have no samples in common, a condition is none of the system's, or a recording
+        cannot be what it says it is.
+    """
+    where = recording.where
+    measured = merge(recording.files, recording.proposal, system)
+    check_recording(measured.time, system, f"{where}, time", None)
+    parts = [Cut(0, measured.time.size)] if whole else cut(measured.time, measured.signals, system)
+    kept = [one for one in parts if not one.reason]
+    if not kept:
+        raise InputError(
+            where=where,
+            found=f"no recording: {'; '.join(dict.fromkeys(one.reason for one in parts))}",
+            expected=f"at least {system.fewest} samples over {system.shortest:g} s",
+            remedy="import it as one recording, --whole",
+        )
+    many = len(kept) > 1
+    names = [f"{k:02d}_{name}" if many else name for k in range(1, len(kept) + 1)]
+    pieces = [
+        _piece(own, one, measured, system, conditions, where)
+        for own, one in zip(names, kept, strict=True)
+    ]
+    return Import(recording, measured, tuple(parts), tuple(pieces))
+
+
+def case_name(path: Path, part: str = "") -> str:
+    """Name of a case: letters, figures and signs that every file system takes.
+
+    Parameters
+    ----------
+    part : name of a sheet or group that holds a recording of its own.
+
+    Examples
+    --------
+    >>> case_name(Path("monday.xlsx")), case_name(Path("monday.xlsx"), "120 % load, warm")
+    ('monday', 'monday_120_load_warm')
+    """
+    stem = re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", path.name)
+    names = (re.sub(r"[^\w.+-]+", "_", name).strip("._") for name in (stem, part))
+    return "_".join(filter(None, names)) or "recording"
+
+
+def _piece(
+    name: str,
+    one: Cut,
+    measured: Measured,
+    system: System,
+    given: Mapping[str, Any],
+    where: str,
+) -> Piece:
+    part = slice(one.first, one.end)
+    time = measured.time[part] - measured.time[one.first]
+    signals = {signal: values[part] for signal, values in measured.signals.items()}
+    shown = conditions_shown(signals, system)
+    unknown = {
+        kind.name: UNKNOWN
+        for kind in system.conditions
+        if kind.name not in given and kind.name not in shown and not (kind.sign or kind.sets)
+    }
+    conditions = {**unknown, **shown, **given}
+    table = Table(conditions, f"{where}, conditions")
+    read = read_conditions(table, system)
+    sources = {
+        key: "given" if key in given else "shown by the record" if key in shown else UNKNOWN
+        for key in read
+    }
+    origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
+    found = doubts(time, signals, read, system, origin)
+    ordered = {key: conditions[key] for key in read}
+    return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
+
+
+def store(out: Path, named: Mapping[str, NamedChannel]) -> None:
+    """Keep confirmed channels for all files of a folder; those of earlier files stay.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    tables = {signal: one.to_dict() for signal, one in named.items()}
+    write_whole(out / COLUMNS, tomli_w.dumps({"columns": tables}))
+
+
+def write(one: Import, out: Path, system: System) -> None:
+    """Write case folders of an import.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    written: dict[str, str] = {}
+    for piece in one.pieces:
+        names = ", ".join(file.path.name for file in one.recording.files)
+        names += f", '{one.recording.name}'" if one.recording.name else ""
+        case = {"title": f"{piece.name}, imported from {names}"}
+        conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
+        measurement = {"measurement": {"file": "measured.csv"}}
+        written[f"{piece.name}/case.toml"] = tomli_w.dumps({**case, **conditions, **measurement})
+        columns = {"time": piece.time, **piece.signals}
+        units = {"time": "s", **{n: system.signals[n].unit for n in piece.signals}}
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [",".join(f"{name} [{units[name]}]" for name in columns)]
+        lines += [",".join(map(cell, row)) for row in rows]
+        written[f"{piece.name}/measured.csv"] = "\n".join(lines) + "\n"
+    for path, text in written.items():
+        write_whole(out / path, text)
+
+
+def describe(one: Import, system: System) -> dict[str, Any]:
+    """What was read, converted, dropped and cut, for programs."""
+    time, measured = one.measured.time, one.measured
+    return {
+        "files": [
+            {
+                "file": str(file.path),
+                "sha256": file.sha256,
+                "format": file.kind,
+                "notes": list(file.notes),
+                "doubts": list(file.doubts),
+            }
+            for file in one.recording.files
+        ],
+        "recording": one.recording.name or None,
+        "began": iso(measured.start + float(time[0])) or None,
+        "time": _described_clocks(one),
+        "channels": _described_channels(one, system),
+        "dropped": list(one.recording.proposal.left),
+        "notes": list(measured.notes),
+        "cut": [
+            {
+                "begins": float(time[part.first]),
+                "ends": float(time[part.end - 1]),
+                "samples": part.end - part.first,
+                "case": next((p.name for p in one.pieces if p.samples[0] == part.first), None),
+                "left_out": part.reason or None,
+            }
+            for part in one.parts
+        ],
+        "cases": {
+            piece.name: {
+                "samples": piece.time.size,
+                "seconds": float(piece.time[-1]),
+                "conditions": {
+                    key: {"value": value, "from": piece.sources[key]}
+                    for key, value in piece.conditions.items()
+                },
+                "doubts": list(piece.doubts),
+            }
+            for piece in one.pieces
+        },
+    }
+
+
+def _described_clocks(one: Import) -> list[dict[str, Any]]:
+    files = one.recording.files
+    return [
+        {
+            "file": files[file].path.name,
+            "group": files[file].groups[group].name,
+            "channel": clock.channel or None,
+            "unit": clock.unit,
+            "reason": clock.reason,
+        }
+        for (file, group), clock in one.recording.proposal.clocks.items()
+    ]
+
+
+def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]]:
+    files = one.recording.files
+    return {
+        name: {
+            "file": files[found.file].path.name,
+            "group": files[found.file].groups[found.group].name,
+            "channel": found.channel.name,
+            "unit": found.unit,
+            "unit_stated": not found.concluded,
+            "converted": {
+                "to": system.signals[name].unit,
+                "factor": found.factor,
+                "zero": found.zero,
+                "recorded_as": found.formula or None,
+            },
+            "reason": found.reason,
+        }
+        for name, found in one.recording.proposal.assigned.items()
+    }
+
+
+def imported(out: Path) -> list[dict[str, Any]]:
+    """What was imported into a folder before; empty if nothing was.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other files.
+    """
+    path = out / IMPORTED
+    if path.is_file():
+        found: list[dict[str, Any]] = json.loads(path.read_text())["imports"]
+        return found
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(
+            where=str(out),
+            found="a folder with other files" if out.is_dir() else "a file",
+            expected="a new or an empty folder, or one with imported recordings",
+            remedy="choose another folder",
+        )
+    return []
+
+
+def write_record(out: Path, system: System, imports: Sequence[Mapping[str, Any]]) -> None:
+    """Write what was read, converted, dropped and cut, as `import.json`.
+
+    Parameters
+    ----------
+    imports : of `describe`, and those before.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    content = {"system": system.name, "workbench": commit(), "imports": list(imports)}
+    write_json(out / IMPORTED, content)

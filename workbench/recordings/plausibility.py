@@ -1,0 +1,308 @@
+"""Whether a recording can be what it says it is.
+
+What is impossible is refused, what is unlikely becomes a doubt, and both say where. What can be
+told of a machine stands in its system file: ranges, redundancies, conditions that the record shows,
+and times between samples.
+"""
+
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.errors import InputError
+from workbench.system.parts import FIRST, Condition, Redundancy, Signal, Tolerance
+from workbench.system.system import System
+from workbench.system.units import si_factor
+
+_FEW = 5  # samples that tell a value, whatever one or two of them read
+_ROUNDED = 1.0 + 1e-6  # times are written with some digits
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a recording stands.
+
+    Attributes
+    ----------
+    name : of the file or the table.
+    first_line : of the first sample in a file, None without one.
+    columns : name of each signal's column, and of "time".
+    conditions : where the conditions stand.
+    doubts : what its reader doubts already, in words.
+    """
+
+    name: str
+    first_line: int | None
+    columns: Mapping[str, str]
+    conditions: str
+    doubts: tuple[str, ...] = ()
+
+    def at(self, sample: int, signal: str) -> str:
+        """Place of a sample."""
+        line = f", line {sample + self.first_line}" if self.first_line is not None else ""
+        return f"{self.name}{line}, column '{self.columns.get(signal, signal)}'"
+
+
+@dataclass(frozen=True)
+class _Finding:
+    """Something that is unlikely, or impossible."""
+
+    impossible: bool
+    where: str
+    found: str
+    expected: str
+    remedy: str
+
+    def refusal(self) -> InputError:
+        return InputError(
+            where=self.where, found=self.found, expected=self.expected, remedy=self.remedy
+        )
+
+
+def doubts(
+    time: Vector,
+    signals: Mapping[str, Vector],
+    conditions: Mapping[str, Any],
+    system: System,
+    origin: Origin,
+) -> tuple[str, ...]:
+    """What is unlikely in a recording, in words.
+
+    Parameters
+    ----------
+    time : (n,) s, increasing.
+    signals : (n,) each, SI.
+    conditions : by name, SI.
+
+    Raises
+    ------
+    InputError
+        At what is impossible.
+    """
+    system = system.under(conditions)
+    found = list(_ranges(time, signals, system, origin))
+    _refuse(found)  # what is out of range has no use in formulas
+    with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
+        for check in (
+            _still(signals, system, origin),
+            _sampling(time, system, origin),
+            _redundancies(time, signals, system, origin),
+            _conditions(signals, conditions, system, origin),
+        ):
+            found += check
+    _refuse(found)
+    return (*origin.doubts, *(str(one.refusal()) for one in found))
+
+
+def _refuse(found: list[_Finding]) -> None:
+    for one in found:
+        if one.impossible:
+            raise one.refusal()
+
+
+def _ranges(
+    time: Vector, signals: Mapping[str, Vector], system: System, origin: Origin
+) -> Iterator[_Finding]:
+    """Samples out of their ranges; the first of each signal and range."""
+    for name, values in signals.items():
+        signal = system.signals[name]
+        for impossible, (low, high) in ((True, signal.possible), (False, signal.plausible)):
+            outside = np.flatnonzero((values < low) | (values > high))
+            if not outside.size:
+                continue
+            first = int(outside[0])
+            many = f", and {outside.size - 1} more such samples" if outside.size > 1 else ""
+            limits = f"from {_shown(signal, low)} to {_shown(signal, high)}"
+            yield _Finding(
+                impossible,
+                origin.at(first, name),
+                f"{_shown(signal, values[first])} at {time[first]:.9g} s{many}",
+                f"what {'is possible' if impossible else 'is likely'}, {limits}",
+                f"correct the values or the unit of the column; if they are right, widen "
+                f"'{'possible' if impossible else 'plausible'}' of {name} in {system.source}",
+            )
+            break  # what is impossible is unlikely too
+
+
+def _shown(signal: Signal, value: float) -> str:
+    """A value in the unit that people read."""
+    return f"{value / si_factor(signal.shown, signal.unit, signal.name):.6g} {signal.shown}"
+
+
+def _still(signals: Mapping[str, Vector], system: System, origin: Origin) -> Iterator[_Finding]:
+    """Signals that never change although their noise alone would move them."""
+    outputs = [one.name for one in system.outputs]
+    for name, values in signals.items():
+        signal = system.signals[name]
+        values = values[np.isfinite(values)]  # an aid is missing elsewhere
+        if signal.exact or not values.size or values.min() < values.max():
+            continue
+        yield _Finding(
+            # Steps coarser than noise may hide it; an input may rest.
+            name in outputs and signal.resolution <= signal.noise,
+            origin.at(0, name),
+            f"{_shown(signal, values[0])} in all {values.size} samples",
+            f"readings that scatter by {_shown(signal, signal.deviation(values[0]))}, as the "
+            "sensor's noise does",
+            "check the sensor, and what its column holds",
+        )
+
+
+def _sampling(time: Vector, system: System, origin: Origin) -> Iterator[_Finding]:
+    """Too few samples in a second, or a gap between two of them."""
+    steps, limits = np.diff(time), system.sampling
+    usual, longest = float(np.median(steps)), int(steps.argmax())
+    where = origin.at(longest + 1, "time")
+    if steps[longest] > limits.gap and steps[longest] > 2.0 * usual:
+        yield _Finding(
+            bool(steps[longest] > limits.largest_gap),
+            where,
+            f"a gap of {steps[longest]:.6g} s after {time[longest]:.9g} s",
+            f"samples of one recording, no more than {limits.gap:g} s apart",
+            "write a case folder for each recording, if several stand in one file",
+        )
+    if usual > limits.slowest * _ROUNDED:
+        yield _Finding(
+            False,
+            origin.at(1, "time"),
+            f"a sample every {usual:.6g} s",
+            f"one every {limits.slowest:g} s or more often; estimates are worse without",
+            "record at a higher rate",
+        )
+
+
+def _redundancies(
+    time: Vector, signals: Mapping[str, Vector], system: System, origin: Origin
+) -> Iterator[_Finding]:
+    """Signals that contradict each other while they ought to agree."""
+    told: set[str] = set()  # of several that tell the same of one, the first
+    for one in system.redundancies:
+        names = _named(one)
+        if one.formula.text in told or not _has(names, signals, system):
+            continue
+        left, right = _sides(one, time, signals, system)
+        large = np.maximum(np.abs(left), np.abs(right))
+        compared = large > one.tolerance.slack
+        for limit, side in ((one.while_below, -1.0), (one.while_above, 1.0)):
+            if limit is not None:
+                size = np.abs(system.signal(limit.signal, signals))
+                compared &= side * size > side * limit.level
+        chosen = np.flatnonzero(compared)
+        if chosen.size < _FEW:
+            continue
+        shares = np.abs(left - right)[chosen] / large[chosen]
+        share = float(np.median(shares))  # whatever single samples read
+        if not share > one.tolerance.likely:
+            continue
+        told.add(one.formula.text)
+        first = int(chosen[shares > one.tolerance.likely][0])
+        columns = [name for name in signals if name in _compared(one)]
+        told_by = [name for name in columns if one.store is None or name in one.formula.names]
+        where = f"at {time[first]:.9g} s"
+        other = one.other.text
+        if one.store is not None:
+            other = f"{other}, with what {one.store.formula.text} gains,"
+            where = f"in the mean of {one.store.over:g} s from {time[first]:.9g} s on"
+        yield _Finding(
+            share > one.tolerance.possible,
+            origin.at(first, told_by[-1] if told_by else "time"),
+            f"{one.formula.text} = {left[first]:.6g} {one.unit} beside {other} = "
+            f"{right[first]:.6g} {one.unit} {where}, and by {share:.0%} apart in "
+            f"half of {chosen.size} samples",
+            f"the same within {one.tolerance.likely:.0%}: {one.reason}",
+            f"check units, signs and columns of {', '.join(columns)}",
+        )
+
+
+def _compared(one: Redundancy) -> Set[str]:
+    """Names in the formulas that are compared."""
+    stored: Set[str] = one.store.formula.names if one.store is not None else frozenset()
+    return one.formula.names | one.other.names | stored
+
+
+def _named(one: Redundancy) -> Set[str]:
+    """All names that a redundancy needs."""
+    limits = [limit.signal for limit in (one.while_below, one.while_above) if limit is not None]
+    return _compared(one) | set(limits)
+
+
+def _sides(
+    one: Redundancy, time: Vector, signals: Mapping[str, Vector], system: System
+) -> tuple[Vector, Vector]:
+    """Both sides of a redundancy from each sample on, (n,) each; NaN beyond the end."""
+    left, right = (system.evaluate(formula, signals) for formula in (one.formula, one.other))
+    if one.store is None:
+        return left, right
+    over = one.store.over
+    end = time + over
+
+    def gained(values: Vector) -> Vector:
+        later: Vector = np.interp(end, time, values, right=np.nan)
+        return (later - values) / over
+
+    def mean(values: Vector) -> Vector:
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+        return gained(np.append(0.0, np.cumsum(steps)))
+
+    return mean(left), mean(right) + gained(system.evaluate(one.store.formula, signals))
+
+
+def _has(names: Set[str], signals: Mapping[str, Vector], system: System) -> bool:
+    """Whether a recording has all of some signals; what only judges may be missing."""
+    for one in reversed(system.derived):  # each is made of those before it
+        names |= one.formula.names if one.name in names else set()
+    return not names & (system.signals.keys() - signals.keys())
+
+
+def _conditions(
+    signals: Mapping[str, Vector], conditions: Mapping[str, Any], system: System, origin: Origin
+) -> Iterator[_Finding]:
+    """Conditions that the record contradicts."""
+    for one in system.conditions:
+        shown = shown_by(one, signals, system)
+        if one.agrees is None or shown is None or isinstance(conditions.get(one.name, ""), str):
+            continue  # nobody says it, or knows it any more
+        at_start = one.agrees.place == FIRST
+        values = system.evaluate(one.agrees.formula, signals)
+        sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
+        said = float(conditions[one.name])
+        share = _apart(shown, said, one.agrees.tolerance)
+        if not share > one.agrees.tolerance.likely:
+            continue
+        names = [name for name in signals if name in one.agrees.formula.names]
+        where = origin.at(sample, names[0]) if names else origin.name
+        yield _Finding(
+            share > one.agrees.tolerance.possible,
+            f"{origin.conditions} {one.name}",
+            f"{_worded(one, said)} where the record has {one.agrees.formula.text} = "
+            f"{_worded(one, shown)} ({where}{', at the start' if at_start else ', its largest'})",
+            f"the same within {one.agrees.tolerance.likely:.0%}",
+            "correct the condition, or the unit or the sign of the column",
+        )
+
+
+def shown_by(one: Condition, signals: Mapping[str, Vector], system: System) -> float | None:
+    """What a recording shows of a condition [its unit]; None if it shows nothing.
+
+    At the start this is the median of some samples; the largest value is one that is reached more
+    than once.
+    """
+    if one.agrees is None or not _has(one.agrees.formula.names, signals, system):
+        return None
+    with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
+        values = system.evaluate(one.agrees.formula, signals)
+    few = min(_FEW, values.size)
+    return float(np.median(values[:few]) if one.agrees.place == FIRST else np.sort(values)[-few])
+
+
+def _apart(one: float, other: float, tolerance: Tolerance) -> float:
+    """Difference as a share of the larger one, 0 where it means nothing."""
+    difference = abs(one - other)
+    return difference / max(abs(one), abs(other)) if difference > tolerance.slack else 0.0
+
+
+def _worded(one: Condition, value: float) -> str:
+    return f"{value:.6g} {one.unit}".rstrip()

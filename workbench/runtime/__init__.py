@@ -1,0 +1,1 @@
+"""Processes, files, caches and progress; knows no model."""

@@ -1,0 +1,1 @@
+"""Questions asked of a diagnosis, or of many recordings."""

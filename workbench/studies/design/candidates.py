@@ -1,0 +1,174 @@
+"""What may be run next, one by one: conditions, and profiles of the inputs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.signal import lfilter
+
+from workbench.arrays import Vector
+from workbench.system.experiments import (
+    RELEASE,
+    SINE,
+    STAIRCASE,
+    STEP,
+    Experiments,
+    Setting,
+    VariedInput,
+)
+from workbench.system.system import System
+from workbench.system.units import si_factor
+
+_STAIRS = 3  # from the least to the largest demand
+_GRID = 48  # settings, which two cores predict in a quarter of a minute
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Demand on an input.
+
+    Attributes
+    ----------
+    levels : of a step or staircase, one after the other and again; of a sine its ends; of what is
+        released, before it is [unit].
+    every : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
+    """
+
+    input: VariedInput
+    kind: str
+    levels: tuple[float, ...]
+    every: float
+
+    def demand(self, time: Vector) -> Vector:
+        """What is asked for, (n,) [unit]."""
+        begun = time - self.input.begins
+        if self.kind == SINE:
+            low, high = self.levels
+            wave = np.sin(2.0 * np.pi * begun / self.every)
+            return np.where(begun >= 0.0, 0.5 * (low + high) + 0.5 * (high - low) * wave, 0.0)
+        if self.kind == RELEASE:
+            return np.where((begun >= 0.0) & (begun < self.every), self.levels[0], 0.0)
+        stair = np.floor(np.maximum(begun, 0.0) / self.every).astype(int) % len(self.levels)
+        return np.where(begun >= 0.0, np.array(self.levels)[stair], 0.0)
+
+    def signal(self, time: Vector) -> Vector:
+        """What the input then is, (n,) [unit]: behind its lags."""
+        values, h = self.demand(time), float(time[1] - time[0])
+        for lag in self.input.lags:
+            pole = np.exp(-h / lag)
+            values = lfilter([1.0 - pole], [1.0, -pole], values)
+        return values
+
+    def text(self, system: System) -> str:
+        """For people, in the unit of figures."""
+        signal = system.signals[self.input.name]
+        factor = si_factor(signal.shown, signal.unit, signal.name)
+        unit = "" if signal.shown == "1" else f" {signal.shown}"
+        shown = [f"{level / factor:.3g}" for level in self.levels]
+        if self.kind == SINE:
+            return f"{signal.name} sine {shown[0]} to {shown[1]}{unit}, period {self.every:g} s"
+        if self.kind == STEP:
+            return f"{signal.name} step to {shown[0]}{unit}"
+        if self.kind == RELEASE:
+            return f"{signal.name} step to {shown[0]}{unit}, released after {self.every:g} s"
+        return f"{signal.name} staircase {', '.join(shown)}{unit}, {self.every:g} s each"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One recording that could be made.
+
+    Attributes
+    ----------
+    settings : of conditions and of what is set besides, by name.
+    profiles : of the inputs that are varied.
+    """
+
+    settings: Mapping[str, Setting]
+    profiles: tuple[Profile, ...]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Settings that are numbers, SI."""
+        values = {name: one.value for name, one in self.settings.items()}
+        return {name: v for name, v in values.items() if isinstance(v, int | float)}
+
+    def text(self, system: System) -> str:
+        """For people."""
+        assert system.experiments is not None
+        besides = system.experiments.labels
+        said = [
+            f"{besides[name] if name in besides else system.condition(name).label} {setting.text}"
+            for name, setting in self.settings.items()
+        ]
+        return "; ".join([*said, *(one.text(system) for one in self.profiles)])
+
+
+def every_setting(experiments: Experiments) -> list[Experiment]:
+    """Every setting, each with the profiles that sweep most of their ranges."""
+    followed = tuple(_profiles(one)[0] for one in experiments.varied)
+    names = list(experiments.settings)
+    return [
+        Experiment(dict(zip(names, settings, strict=True)), followed)
+        for settings in product(*experiments.settings.values())
+    ]
+
+
+def some_settings(experiments: Experiments) -> list[Experiment]:
+    """Every setting, or a fraction of a grid that is large.
+
+    The fraction is regular, each value being in it as often as any other: of settings whose values
+    are numbered, those whose numbers add up to a multiple (G. E. P. Box, J. S. Hunter, 1961,
+    Technometrics 3, 311-351). `other_settings` has what is next to them.
+    """
+    plan = every_setting(experiments)
+    parts = -(-len(plan) // _GRID)
+    numbers = product(*(range(len(values)) for values in experiments.settings.values()))
+    return [one for one, at in zip(plan, numbers, strict=True) if sum(at) % parts == 0]
+
+
+def other_settings(experiments: Experiments, one: Experiment) -> list[Experiment]:
+    """All that differ from an experiment in one setting."""
+    return [
+        replace(one, settings={**one.settings, name: value})
+        for name, values in experiments.settings.items()
+        for value in values
+        if value != one.settings[name]
+    ]
+
+
+def other_profiles(experiments: Experiments, one: Experiment) -> list[Experiment]:
+    """All other profiles, with the settings of an experiment."""
+    every = product(*(_profiles(varied) for varied in experiments.varied))
+    return [replace(one, profiles=followed) for followed in every if followed != one.profiles]
+
+
+def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
+    """An experiment drawn at random: each of all that may be run is as likely."""
+    settings = {
+        name: values[rng.integers(len(values))] for name, values in experiments.settings.items()
+    }
+    profiles = [_profiles(one) for one in experiments.varied]
+    return Experiment(settings, tuple(some[rng.integers(len(some))] for some in profiles))
+
+
+def _profiles(one: VariedInput) -> list[Profile]:
+    """Stairs begun at either end; sines; steps to the ends of the range and between them.
+
+    What is released was so from the upper end, and between them.
+    """
+    low, high = one.low, one.high
+    rising = np.linspace(low, high, _STAIRS + 1).tolist()
+    stairs = (*rising, *rising[-2:0:-1])
+    found = []
+    if STAIRCASE in one.profiles:
+        falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
+        found += [Profile(one, STAIRCASE, levels, one.every) for levels in (stairs, falling)]
+    if SINE in one.profiles:
+        found += [Profile(one, SINE, (low, high), times * one.every) for times in (1.0, 2.0)]
+    if STEP in one.profiles:
+        found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
+    if RELEASE in one.profiles:
+        found += [Profile(one, RELEASE, (to,), one.every) for to in (0.5 * (low + high), high)]
+    return found

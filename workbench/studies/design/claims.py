@@ -1,0 +1,28 @@
+"""Which samples of a recording that a model predicts would count, and why others would not."""
+
+from workbench.diagnosis.data.counting import Counted, count
+from workbench.diagnosis.inference.thresholds import SOUND
+from workbench.errors import InputError
+from workbench.recordings.case import Case
+from workbench.system.system import System
+
+
+def counts(case: Case, system: System) -> bool:
+    """Whether a recording has enough that counts."""
+    return _counted(case, system, restarting=True) is not None
+
+
+def left_claims(case: Case, system: System) -> set[str] | None:
+    """Reasons why samples do not count, but for its end; None where too few do."""
+    counted = _counted(case, system, restarting=False)
+    if counted is None:
+        return None
+    reasons = [one.reason for one in system.comparison.exclusions if not one.to_the_end]
+    return {reason for reason in reasons if counted.excluded[reason].any()}
+
+
+def _counted(case: Case, system: System, *, restarting: bool) -> Counted | None:
+    try:
+        return count(case, system, tuple(case.signals), SOUND, restarting=restarting)
+    except InputError:
+        return None

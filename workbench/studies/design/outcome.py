@@ -1,0 +1,188 @@
+"""Which experiment to make next, as a value: a sentence, numbers, a table, a figure."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from workbench.diagnosis.inference.rivals import Rivals
+from workbench.studies.design.prediction import Prediction
+from workbench.system.system import Channel, System
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PROPOSED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class RankedExperiment:
+    """One experiment.
+
+    Attributes
+    ----------
+    text : what to do, for people.
+    cost : of it, in `unit`.
+    """
+
+    text: str
+    cost: float
+    unit: str
+    prediction: Prediction
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts."""
+        found = self.prediction
+        return {
+            "experiment": self.text,
+            "groups": [list(group) for group in found.groups],
+            "separation": found.separation,
+            "chance": found.right,
+            "separations": np.sqrt(np.maximum(0.0, found.apart)).tolist(),
+            "deviation": {"before": found.precision[0], "after": found.precision[1]},
+            "cost": {"value": self.cost, "unit": self.unit},
+            "duration": float(found.case.time[-1] - found.case.time[0]),
+            "inputs": {
+                one.input.name: {"profile": one.kind, "levels": one.levels, "every": one.every}
+                for one in found.candidate.profiles
+            },
+            "conditions": {
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in found.case.conditions.items()
+            },
+            "settings": {
+                name: setting.value
+                for name, setting in found.candidate.settings.items()
+                if name not in found.case.conditions
+            },
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class NextStop:
+    """Experiments, best first.
+
+    Attributes
+    ----------
+    rivals : what they are to tell apart; of a single one, how large it is.
+    channels : that are compared.
+    tried : all experiments.
+    sensors : the best one with a further sensor, by what that measures; of those that part more
+        than any without.
+    """
+
+    system: System
+    rivals: Rivals
+    channels: tuple[Channel, ...]
+    tried: tuple[RankedExperiment, ...]
+    sensors: dict[str, RankedExperiment]
+
+    @property
+    def proposals(self) -> tuple[RankedExperiment, ...]:
+        """The best ones."""
+        return self.tried[:PROPOSED]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The rivals, by their causes."""
+        return tuple(" with ".join(one.effects) for one in self.rivals.models)
+
+    @property
+    def parts(self) -> bool:
+        """Whether the best one likely parts any of the rivals."""
+        return len(self.tried[0].prediction.groups) > 1
+
+    @property
+    def sentence(self) -> str:
+        """The answer in one or two sentences."""
+        best = self.tried[0]
+        found = best.prediction
+        if len(self.names) == 1:
+            return f"Next: {best.text}. It makes {self.names[0]} {_ratio(found):.2g} times as sure."
+        said = []
+        if self.parts:
+            groups = " from ".join(_or(self.names[i] for i in group) for group in found.groups)
+            said.append(
+                f"Next: {best.text}. It parts {groups} by {found.separation:.1f} standard "
+                "deviations."
+            )
+        for group in found.groups:
+            if len(group) > 1:
+                names = " and ".join(self.names[i] for i in group)
+                said.append(f"No experiment here likely parts {names}, whichever is true.")
+        for sensor, one in self.sensors.items():
+            groups = " from ".join(_or(self.names[i] for i in g) for g in one.prediction.groups)
+            said.append(f"A sensor of {sensor} would part {groups}: {one.text}.")
+        return " ".join(said)
+
+    def summary(self) -> str:
+        """The answer and the best experiments, for people."""
+        lines = [self.sentence]
+        for number, one in enumerate(self.proposals, 1):
+            lines += [f"{number}. {one.text}", f"   {_told(one)}"]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """All that were tried, best first."""
+        return pd.DataFrame(
+            {
+                "experiment": [one.text for one in self.tried],
+                "separation": [one.prediction.separation for one in self.tried],
+                "chance": [one.prediction.right for one in self.tried],
+                "deviation_before": [one.prediction.precision[0] for one in self.tried],
+                "deviation_after": [one.prediction.precision[1] for one in self.tried],
+                f"cost [{self.tried[0].unit}]": [one.cost for one in self.tried],
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts; the keys of the first level are a contract."""
+        return {
+            "sentence": self.sentence,
+            "rivals": list(self.names),
+            "parts": self.parts,
+            "tried": [one.to_dict() for one in self.tried],
+            "sensors": {name: one.to_dict() for name, one in self.sensors.items()},
+        }
+
+    def plot(self) -> "Figure":
+        """Figure of the best experiments, and of what each rival leaves of the first in them."""
+        from workbench.studies.design.report import responses_figure
+
+        return responses_figure(self)
+
+    def _repr_html_(self) -> str:
+        """The answer and the table of experiments, for notebooks."""
+        return f"<p>{escape(self.sentence)}</p>{self.to_frame().to_html(index=False)}"
+
+
+def _or(names: Iterable[str]) -> str:
+    return " or ".join(names)
+
+
+def _ratio(found: Prediction) -> float:
+    return found.precision[0] / found.precision[1]
+
+
+def _told(one: RankedExperiment) -> str:
+    found = one.prediction
+    cost = f"cost {one.cost:.3g} {one.unit}"
+    if len(found.apart) == 1:
+        return f"{_ratio(found):.2g} times as sure, {cost}"
+    group = " or its group" if 1 < len(found.groups) < len(found.apart) else ""
+    return (
+        f"separation {found.separation:.1f} standard deviations, chance {found.right:.0%} that the "
+        f"right one{group} is then named, {cost}"
+    )
+
+
+def chosen(ranked: Sequence[Prediction]) -> list[Prediction]:
+    """Best first: pairs that are told apart, then the least distance, then precision."""
+
+    def worth(one: Prediction) -> tuple[float, float, float]:
+        return float(np.round(one.chance.sum(), 2)), one.separation, _ratio(one)
+
+    return sorted(ranked, key=worth, reverse=True)

@@ -1,0 +1,168 @@
+"""Recordings that a model predicts of an experiment, as sensors would make them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.models.fmu import CoSimulation
+from workbench.models.native import (
+    OK,
+    REFUSED,
+    checked,
+    compiled,
+    do_step,
+    read,
+    set_inputs,
+    stepping,
+)
+from workbench.recordings.case import Case, Value, read_only
+from workbench.studies.design.candidates import Experiment
+from workbench.system.experiments import Experiments
+from workbench.system.parts import LARGEST
+from workbench.system.system import Condition, System
+
+
+def recorded(
+    model: CoSimulation,
+    system: System,
+    experiments: Experiments,
+    candidate: Experiment,
+    values: Mapping[str, float],
+    name: str,
+    judged: tuple[str, ...],
+    seed: int,
+) -> Case:
+    """What the sensors would record of an experiment if the model with these values were true.
+
+    Inputs that a controller makes follow from the model's variables, anew in each of the blocks
+    whose means are compared; those that a profile makes go from sample to sample in a line, of
+    which a step of the model has the middle, unless they are held.
+
+    Parameters
+    ----------
+    values : of the model's parameters, SI.
+    judged : names of signals that are only there to judge by, and are recorded.
+    seed : of the noise of the sensors.
+    """
+    h = system.sample_time
+    time: Vector = h * np.arange(round(experiments.lasts / h) + 1.0)
+    u, y = _driven(model, system, experiments, candidate, values, judged, time)
+    time, rng = time[: len(y)], np.random.default_rng(seed)
+    outputs = tuple(one.name for one in system.outputs)
+    clean = dict(
+        zip((*(one.name for one in system.inputs), *outputs, *judged), [*u.T, *y.T], strict=True)
+    )
+    signals = {
+        key: read_only(
+            column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
+        )
+        for key, column in clean.items()
+    }
+    return Case(
+        name=name,
+        title=candidate.text(system),
+        conditions=_conditions(system, candidate, clean),
+        time=read_only(time),
+        signals=signals,
+        inputs=tuple(one.name for one in system.inputs),
+        outputs=outputs,
+        source=Path(name),
+    )
+
+
+def start_of(system: System, experiments: Experiments, candidate: Experiment) -> dict[str, float]:
+    """States at the start of an experiment, SI."""
+    known = {**system.values, **candidate.numbers}
+    return {state: float(formula(known)) for state, formula in experiments.start.items()}
+
+
+def _driven(
+    model: CoSimulation,
+    system: System,
+    experiments: Experiments,
+    candidate: Experiment,
+    values: Mapping[str, float],
+    judged: tuple[str, ...],
+    time: Vector,
+) -> tuple[Matrix, Matrix]:
+    """Inputs (n, m) and readings (n, c) without noise, until the recording ends."""
+    known: dict[str, Any] = {**system.values, **candidate.numbers}
+    model.start(
+        start_of(system, experiments, candidate),
+        {key: value for key, value in values.items() if key in model.defaults},
+    )
+    names, outputs = [one.name for one in system.inputs], [one.name for one in system.outputs]
+    readings = [system.signals[key].reading for key in (*outputs, *judged)]
+    formulas = [*experiments.driven.values()]
+    formulas += [experiments.ends.formula] if experiments.ends else []
+    variables = {v.name for v in model.description.variables}
+    felt = model.variables(sorted({key for one in formulas for key in one.names} & variables))
+    u, y = np.zeros((time.size, len(names))), np.zeros((time.size, len(readings)))
+    for one in candidate.profiles:
+        u[:, names.index(one.input.name)] = one.signal(time)
+    held = np.array([one.held for one in system.inputs], np.bool_)
+    h = float(time[1] - time[0])
+    every = max(1, round(system.comparison.block / h))
+    model.set(model.variables(names), u[0])
+    running = stepping(model, names, readings)
+    for k in range(0, time.size, every):
+        block = slice(k, k + every + 1)
+        feels = {**known, **dict(zip(felt.names, model.get(felt).tolist(), strict=True))}
+        for key, formula in experiments.driven.items():
+            u[block, names.index(key)] = formula(feels)
+        ends = experiments.ends
+        if ends is not None and abs(float(ends.formula(feels))) < ends.below:
+            return u[:k], y[:k]
+        checked(_followed(running, h, held, u[block], y[block]), model)
+    return u, y
+
+
+@compiled
+def _followed(model, h, held, u, y):  # type: ignore[no-untyped-def]
+    """Readings (n, c) while inputs go from sample to sample, (n, m), h [s] apart; a status."""
+    m = u.shape[1]
+    for k in range(len(u)):
+        if k > 0:
+            for j in range(m):
+                model.u[j] = u[k - 1, j] if held[j] else 0.5 * (u[k - 1, j] + u[k, j])
+            if set_inputs(model, 0, m) or do_step(model, h):
+                return REFUSED
+        for j in range(m):
+            model.u[j] = u[k, j]
+        if set_inputs(model, 0, m) or read(model):
+            return REFUSED
+        for i in range(y.shape[1]):
+            y[k, i] = model.y[i]
+    return OK
+
+
+def _conditions(
+    system: System, candidate: Experiment, clean: Mapping[str, Vector]
+) -> dict[str, Value]:
+    """Conditions as they are set; others as the recording says, or the usual ones."""
+    found: dict[str, Value] = {}
+    for one in system.conditions:
+        if one.name in candidate.settings:
+            found[one.name] = candidate.settings[one.name].value
+        elif one.choices:
+            found[one.name] = (one.choices[0],) * one.count if one.count else one.choices[0]
+        elif not one.sets:
+            found[one.name] = _told(system, one, clean)
+    return found
+
+
+def _told(system: System, one: Condition, clean: Mapping[str, Vector]) -> float:
+    """A quantity as a recording says it."""
+    if one.agrees is None:
+        raise InputError(
+            where=f"{system.source}, [next.conditions]",
+            found=f"no '{one.name}', of which no recording tells",
+            expected="its values",
+            remedy=f"add {one.name} = [...], or agrees = {{ is = ... }} to the condition",
+        )
+    values = system.evaluate(one.agrees.formula, clean)
+    return float(values.max() if one.agrees.place == LARGEST else values[0])

@@ -1,0 +1,230 @@
+"""Distance of a stop that was not made, from stops that were.
+
+past stops -> levels and how sure they are -> the model, drawn many times -> distance, deceleration,
+    safety level; each past stop beside what the others say of it
+"""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.inference.search import Reporter
+from workbench.errors import InputError
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.runtime.progress import Pace
+from workbench.studies.distance.forecast import (
+    Forecaster,
+    Question,
+    dimension,
+    forecasting,
+    stopping_of,
+)
+from workbench.studies.distance.outcome import Distance, Forecast, PastStop, Safety
+from workbench.studies.distance.past import Past, fitted, places
+from workbench.studies.distance.plain import Plain
+from workbench.studies.distance.rare_events import Descent, Tail
+from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, recorded
+from workbench.system.stopping import SPEED, Stopping
+from workbench.system.system import System
+
+__all__ = ["Distance", "Effort", "distance_of_stop"]
+
+_PART, _PLAIN = 2000, 7  # plain samples of a task, and their stream of random numbers
+_RUNS = 8  # of subset simulation: the scatter of fewer says little, and processors share them
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is drawn.
+
+    Attributes
+    ----------
+    samples : of the distribution that is asked for.
+    decades : down to which the safety level goes; 0: none is asked for.
+    seed : the same of which gives the same numbers.
+    plain : samples beside the safety level, each drawn by itself; 0: none.
+    """
+
+    samples: int = 4000
+    decades: int = 9
+    seed: int = 1
+    plain: int = 0
+
+    @property
+    def checked(self) -> int:
+        """Samples of a past stop by the others: there are many, and 95 % need fewer than tails."""
+        return max(1, self.samples // 4)
+
+    @property
+    def each(self) -> int:
+        """Samples of a decade of a run of subset simulation, a multiple of ten."""
+        return max(1, self.samples // 20) * 10
+
+
+def distance_of_stop(
+    system: System,
+    cases: Sequence[Case],
+    said: Mapping[str, Any],
+    effort: Effort,
+    workers: int,
+    report: Reporter,
+) -> Distance:
+    """Predict the distance of a stop from past stops of the same machine.
+
+    Parameters
+    ----------
+    cases : past stops.
+    said : what is asked for and the conditions, as people write them, by name; what is not said is
+        usual.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If the system does not say how it stops, what is said is none of it, a recording holds no
+        stop, or fewer than two are within what the model claims.
+    """
+    stopping = stopping_of(system)
+    stop = asked_stop(said, system, stopping)
+    made = [recorded(case, system, stopping) for case in cases]
+    if sum(not one.outside for one in made) < 2:
+        raise InputError(
+            where="recordings",
+            found=f"{sum(not one.outside for one in made)} within what the model claims",
+            expected="two stops or more, which say what the model leaves",
+            remedy="give more recordings of this machine",
+        )
+    report(f"fit to {len(cases)} stops")
+    past = fitted(system, cases, workers, report)
+    with Pool(workers, forecasting, system) as pool:
+        return _Forecasts(system, stopping, made, past, effort, pool, report).told(stop)
+
+
+class _Forecasts:
+    """Of one set of past stops."""
+
+    def __init__(
+        self,
+        system: System,
+        stopping: Stopping,
+        made: Sequence[RecordedStop],
+        past: Past,
+        effort: Effort,
+        pool: Pool[Forecaster],
+        report: Reporter,
+    ) -> None:
+        self._system, self._stopping = system, stopping
+        self._made, self._past, self._effort = made, past, effort
+        self._pool, self._report = pool, report
+        own = []
+        for one, values in zip(made, past.own, strict=True):
+            at = places(past.joint.shared, system, one.stop.conditions)
+            own.append({**{name: float(past.mean[j]) for name, j in at.items()}, **values})
+        halts = [
+            pool.submit(Forecaster.halt, one.stop, values)
+            for one, values in zip(made, own, strict=True)
+        ]
+        self._model = np.array([one.result().distance for one in halts])
+        measured = np.array([one.distance for one in made])
+        self._left = np.log(measured / self._model)
+
+    def told(self, stop: Stop) -> Distance:
+        """What is to be said of a stop, and of those that were made."""
+        counted = Pace(self._report, "distributions").part(len(self._made) + 1)
+        questions = [self._question(one.stop, k) for k, one in enumerate(self._made)]
+        asked = self._question(stop, None)
+        drawn = [self._drawn(one, self._effort.checked, k) for k, one in enumerate(questions)]
+        drawn.append(self._drawn(asked, self._effort.samples, len(questions)))
+        for one in drawn:
+            one.add_done_callback(counted)
+        *each, ahead = [_forecast(one.result()) for one in drawn]
+        nominal = self._pool.submit(Forecaster.halt, stop, {}).result().distance
+        safety, interrupted = self._safety(asked, nominal)
+        plain, short = self._plain(asked, nominal)
+        return Distance(
+            system=self._system,
+            stop=stop,
+            ahead=ahead,
+            nominal=nominal,
+            past=tuple(
+                PastStop(one, float(model), forecast)
+                for one, model, forecast in zip(self._made, self._model, each, strict=True)
+            ),
+            safety=safety,
+            plain=plain,
+            interrupted=interrupted or short,
+        )
+
+    def _question(self, stop: Stop, without: int | None) -> Question:
+        """What the past stops, or all but one, say of a stop."""
+        whole = [k for k, one in enumerate(self._made) if not one.outside and k != without]
+        left = float(np.sqrt(np.square(self._left[whole]).mean()))
+        return Question(stop, self._past.known(without), left, len(whole))
+
+    def _drawn(
+        self, question: Question, samples: int, number: int
+    ) -> "Future[tuple[Matrix, float]]":
+        rng = np.random.default_rng([self._effort.seed, number])
+        count = dimension(question, self._system, self._stopping)
+        points = rng.standard_normal((samples, count))
+        return self._pool.submit(Forecaster.drawn, question, points)
+
+    def _safety(self, question: Question, nominal: float) -> tuple[Safety | None, bool]:
+        """The safety level; and whether Ctrl-C ended it, which keeps the runs that are done."""
+        effort = self._effort
+        if not effort.decades:
+            return None, False
+        interrupted = False
+        counted = Pace(self._report, "runs of subset simulation").part(_RUNS)
+        under_way: list[Future[tuple[Descent, float]]] = []
+        try:
+            for number in range(_RUNS):
+                given = question, effort.decades, effort.each, 1000 * effort.seed + number
+                under_way.append(self._pool.submit(Forecaster.descent, *given))
+                under_way[-1].add_done_callback(counted)
+            wait(under_way)
+        except KeyboardInterrupt:
+            interrupted = True
+            for one in under_way:
+                one.cancel()
+        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+        if len(done) < 2:
+            return None, interrupted
+        tail = Tail(tuple(run for run, _ in done), question.addend)
+        spent = sum(one for _, one in done) / tail.evaluations
+        speed, response = question.stop.asked[SPEED], self._stopping.response
+        return Safety.of(tail, effort.decades, speed, response, nominal, spent), interrupted
+
+    def _plain(self, question: Question, nominal: float) -> tuple[Plain | None, bool]:
+        """Plain samples; and whether Ctrl-C left some out."""
+        effort = self._effort
+        sizes = [_PART] * (effort.plain // _PART) + [effort.plain % _PART]
+        parts = [(size, (effort.seed, _PLAIN, k)) for k, size in enumerate(sizes) if size]
+        if not parts:
+            return None, False
+        interrupted = False
+        counted = Pace(self._report, "parts of the plain samples").part(len(parts))
+        under_way: list[Future[Vector]] = []
+        try:
+            for size, seed in parts:
+                under_way.append(self._pool.submit(Forecaster.plainly, question, size, seed))
+                under_way[-1].add_done_callback(counted)
+            wait(under_way)
+        except KeyboardInterrupt:
+            interrupted = True
+            for one in under_way:
+                one.cancel()
+        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+        shortness = np.concatenate([np.empty(0), *done])
+        speed, response = question.stop.asked[SPEED], self._stopping.response
+        return Plain.of(shortness, effort.decades, speed, response, nominal), interrupted
+
+
+def _forecast(drawn: tuple[Matrix, float]) -> Forecast:
+    (distances, certain), outside = drawn
+    return Forecast(np.sort(distances), np.sort(certain), outside)

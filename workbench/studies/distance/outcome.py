@@ -1,0 +1,470 @@
+"""The distance of a stop as a value: sentences, numbers, tables, a figure."""
+
+import math
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import Any, Self
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from workbench.arrays import Vector
+from workbench.pages.figures import LIGHT, STYLE
+from workbench.studies.distance.forecast import stopping_of
+from workbench.studies.distance.plain import Plain
+from workbench.studies.distance.rare_events import Tail, plain_runs
+from workbench.studies.distance.recorded import RecordedStop, Stop
+from workbench.studies.distance.standard import (
+    StopConditions,
+    equivalent_rate,
+    nominal_rate,
+    percentage,
+    stopping_distance,
+)
+from workbench.system.stopping import SPEED, Asked
+from workbench.system.system import System
+from workbench.system.units import si_factor
+
+QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
+
+
+_BAND = 0.95
+
+
+_SEEN = 0.1  # share of the range of past stops by which one may be beyond it, and is near
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Distribution of a distance.
+
+    Attributes
+    ----------
+    distances : (n,) drawn, least first [m].
+    certain : (n,) the same if the machine and its model were known [m].
+    outside : share that is beyond what the model claims.
+    """
+
+    distances: Vector
+    certain: Vector
+    outside: float
+
+    def quantile(self, share: float) -> float:
+        """Distance that so many stops do not exceed [m]."""
+        return float(np.quantile(self.distances, share))
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """In which 95 % are [m]."""
+        return self.quantile(0.5 - 0.5 * _BAND), self.quantile(0.5 + 0.5 * _BAND)
+
+    @property
+    def width(self) -> float:
+        """Of the band, over that of a machine that is known."""
+        low, high = np.quantile(self.certain, [0.5 - 0.5 * _BAND, 0.5 + 0.5 * _BAND])
+        return float((self.band[1] - self.band[0]) / (high - low))
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A stop as it would be under nominal conditions.
+
+    Attributes
+    ----------
+    speed : nominal [m/s]; rate : equivalent deceleration [m/s2]; distance [m].
+    rating : percentage, None where the system has no constants for this speed.
+    """
+
+    speed: float
+    rate: float
+    distance: float
+    rating: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class PastStop:
+    """A stop that was made, and what the others say of it.
+
+    Attributes
+    ----------
+    model : distance that the model says, as fitted to it [m].
+    forecast : by the other stops.
+    """
+
+    recorded: RecordedStop
+    model: float
+    forecast: Forecast
+
+    @property
+    def held(self) -> bool:
+        """Whether the band of the others holds its distance."""
+        low, high = self.forecast.band
+        return low <= self.recorded.distance <= high
+
+
+@dataclass(frozen=True)
+class SafetyLevel:
+    """A deceleration that all but one stop in so many reach.
+
+    Attributes
+    ----------
+    decade : of that number.
+    ratio : of it to the nominal one; low, high : between which it is, 95 %.
+    variation : coefficient of variation of the probability.
+    plain_stops : of plain sampling that tell as much; plain_hours : processor time.
+    """
+
+    decade: int
+    ratio: float
+    low: float
+    high: float
+    variation: float
+    plain_stops: float
+    plain_hours: float
+
+
+@dataclass(frozen=True)
+class Safety:
+    """Decelerations that are reached with all but a small probability.
+
+    Attributes
+    ----------
+    levels : by decade.
+    nominal : equivalent deceleration of the model as its sheet says it [m/s2].
+    stops : that were drawn; spent : processor time of each [s].
+    """
+
+    levels: tuple[SafetyLevel, ...]
+    nominal: float
+    stops: int
+    spent: float
+
+    @classmethod
+    def of(
+        cls,
+        tail: Tail,
+        decades: int,
+        speed: float,
+        response: float,
+        nominal: float,
+        spent: float,
+    ) -> Self:
+        """From the lower tail of minus the logarithm of the distance.
+
+        Parameters
+        ----------
+        speed : at the command [m/s]; response [s].
+        nominal : distance [m].
+        """
+        rate = equivalent_rate(speed, response, nominal)
+
+        def ratio(shortness: float) -> float:
+            return equivalent_rate(speed, response, math.exp(-shortness)) / rate
+
+        levels = []
+        for decade in range(1, decades + 1):
+            found = tail.quantile(decade)
+            plain = plain_runs(found.probability, found.variation)
+            value, low, high = (ratio(one) for one in (found.value, found.low, found.high))
+            hours = plain * spent / 3600.0
+            levels.append(SafetyLevel(decade, value, low, high, found.variation, plain, hours))
+        return cls(tuple(levels), rate, tail.evaluations, spent)
+
+
+@dataclass(frozen=True, eq=False)
+class Distance:
+    """What past stops say of one that is asked for.
+
+    Attributes
+    ----------
+    ahead : its distribution.
+    nominal : distance of the model as its sheet says it [m].
+    past : stops that were made.
+    safety : None where it was not asked for, or interrupted early.
+    plain : the same by plain samples; None where they were not asked for.
+    interrupted : whether runs are missing.
+    """
+
+    system: System
+    stop: Stop
+    ahead: Forecast
+    nominal: float
+    past: tuple[PastStop, ...]
+    safety: Safety | None
+    plain: Plain | None
+    interrupted: bool
+
+    @property
+    def claimed(self) -> list[PastStop]:
+        """Past stops that the model claims."""
+        return [one for one in self.past if not one.recorded.outside]
+
+    @property
+    def response(self) -> float:
+        """Equivalent response time [s]."""
+        return stopping_of(self.system).response
+
+    def rate(self, distance: float) -> float:
+        """Equivalent deceleration by which the stop has a distance [m/s2]."""
+        return equivalent_rate(self.stop.asked[SPEED], self.response, distance)
+
+    def corrected(self, one: RecordedStop) -> Corrected | None:
+        """A past stop under nominal conditions; None where no nominal speed is near."""
+        stopping = stopping_of(self.system)
+        nominal, asked = stopping.nominal, one.stop.asked
+        if nominal is None:
+            return None
+        speed = min(nominal.speeds, key=lambda v: abs(v - asked[SPEED]))
+        if abs(speed - asked[SPEED]) > nominal.within * speed:
+            return None
+        made = StopConditions(
+            mass=float(nominal.mass(asked)),
+            rotating=float(nominal.rotating(self.system.values)),
+            resistance=one.resistance,
+        )
+        rate = equivalent_rate(asked[SPEED], stopping.response, one.distance)
+        rate = nominal_rate(rate, made, nominal.reference)
+        distance = stopping_distance(speed, stopping.response, rate)
+        constants = None
+        if stopping.rating is not None:
+            known = stopping.rating.constants.items()
+            constants = next((c for v, c in known if math.isclose(v, speed)), None)
+        rating = None if constants is None else percentage(distance, constants)
+        return Corrected(speed, rate, distance, rating)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the data do not carry."""
+        count = len(self.claimed)
+        found = []
+        if self.safety is not None:
+            found.append(
+                f"{count} stops show what happens once in {count + 1}; levels beyond that follow "
+                "from tolerances and from the forms of their distributions, which no stop has shown"
+            )
+        for asked in stopping_of(self.system).asked:
+            seen = [one.recorded.stop.asked[asked.name] for one in self.claimed]
+            near = _SEEN * (max(seen) - min(seen))
+            value = self.stop.asked[asked.name]
+            if not min(seen) - near <= value <= max(seen) + near:
+                low, high, here = (_shown(one, asked) for one in (min(seen), max(seen), value))
+                found.append(f"{asked.label} {here} is beyond that of past stops, {low} to {high}")
+        for name, said in self.stop.conditions.items():
+            if not any(one.recorded.stop.conditions[name] == said for one in self.claimed):
+                label = self.system.condition(name).label
+                found.append(f"no past stop that the model claims was made with {label} {said}")
+        if self.ahead.outside > 0.0:
+            reasons = ", ".join(one.reason for one in stopping_of(self.system).outside)
+            found.append(
+                f"{self.ahead.outside:.1%} of the stops drawn are beyond what the model claims "
+                f"({reasons}): their distances are no prediction"
+            )
+        return found
+
+    @property
+    def sentence(self) -> str:
+        """The answer in one sentence."""
+        low, high = self.ahead.band
+        middle = self.ahead.quantile(0.5)
+        speed = next(one for one in stopping_of(self.system).asked if one.name == SPEED)
+        told = [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
+        begins = ", ".join([f"From {_shown(self.stop.asked[SPEED], speed)}", *told])
+        return (
+            f"{begins}: {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
+            f"{self.rate(middle):.3f} m/s2 after {self.response:.2f} s."
+        )
+
+    def summary(self) -> str:
+        """The answer, what it rests on, and what it does not carry, for people."""
+        lines = [self.sentence]
+        said = [
+            f"{one.label} {_shown(self.stop.asked[one.name], one)}"
+            for one in stopping_of(self.system).asked
+        ]
+        said += [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
+        lines.append(f"asked for: {', '.join(said)}")
+        held = sum(one.held for one in self.claimed)
+        widths = [one.forecast.width for one in self.claimed]
+        lines.append(
+            f"{held} of {len(self.claimed)} past stops are in the 95 % band that the others "
+            f"predict, which is {np.median(widths):.2f} times as wide (at most {max(widths):.2f}) "
+            "as if the machine were known"
+        )
+        away = len(self.past) - len(self.claimed)
+        if away:
+            reasons = sorted({r for one in self.past for r in one.recorded.outside})
+            lines.append(f"{away} are beyond what the model claims: {', '.join(reasons)}")
+        if self.safety is not None:
+            lines += ["", *_told(self.safety)]
+        if self.plain is not None:
+            lines += self.plain.told()
+        lines += [f"warning: {one}" for one in self.warnings]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Past stops: measured, corrected, and as the others predict them."""
+        rating = stopping_of(self.system).rating
+        rows = []
+        for one in self.past:
+            made, fixed = one.recorded, self.corrected(one.recorded)
+            low, high = one.forecast.band
+            rate = equivalent_rate(made.stop.asked[SPEED], self.response, made.distance)
+            rows.append(
+                {
+                    "stop": made.stop.name,
+                    "command [s]": made.command,
+                    "speed [m/s]": made.stop.asked[SPEED],
+                    "distance [m]": made.distance,
+                    "deceleration [m/s2]": rate,
+                    "model [m]": one.model,
+                    "predicted [m]": one.forecast.quantile(0.5),
+                    "low [m]": low,
+                    "high [m]": high,
+                    "width": one.forecast.width,
+                    "held": one.held,
+                    "outside": ", ".join(made.outside),
+                    "nominal_speed [m/s]": np.nan if fixed is None else fixed.speed,
+                    "nominal_deceleration [m/s2]": np.nan if fixed is None else fixed.rate,
+                    "nominal_distance [m]": np.nan if fixed is None else fixed.distance,
+                }
+            )
+            if rating is not None:
+                percent = None if fixed is None else fixed.rating
+                rows[-1]["rating [%]"] = np.nan if percent is None else percent
+        return pd.DataFrame(rows)
+
+    def quantiles(self) -> pd.DataFrame:
+        """Of the distance and of the deceleration of the stop that is asked for."""
+        found = [self.ahead.quantile(share) for share in QUANTILES]
+        return pd.DataFrame(
+            {
+                "share": QUANTILES,
+                "distance [m]": found,
+                "deceleration [m/s2]": [self.rate(one) for one in found],
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts; the keys of the first level are a contract."""
+        frame = self.to_frame()
+        return {
+            "sentence": self.sentence,
+            "asked": dict(self.stop.asked),
+            "conditions": dict(self.stop.conditions),
+            "distance": {f"{share:g}": self.ahead.quantile(share) for share in QUANTILES},
+            "deceleration": self.rate(self.ahead.quantile(0.5)),
+            "response": self.response,
+            "nominal": {"distance": self.nominal, "deceleration": self.rate(self.nominal)},
+            "outside": self.ahead.outside,
+            "width": self.ahead.width,
+            "safety": None if self.safety is None else [asdict(one) for one in self.safety.levels],
+            "plain": None if self.plain is None else asdict(self.plain),
+            "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
+            "held": {"of": len(self.claimed), "stops": sum(one.held for one in self.claimed)},
+            "warnings": self.warnings,
+            "interrupted": self.interrupted,
+        }
+
+    def plot(self) -> "Figure":
+        """Figure of the distribution, of past stops beside predictions, and of the safety level."""
+        return distance_figure(self)
+
+    def _repr_html_(self) -> str:
+        """The answer and its quantiles, for notebooks."""
+        return f"<p>{escape(self.sentence)}</p>{self.quantiles().to_html(index=False)}"
+
+
+def _shown(value: float, asked: Asked) -> str:
+    """A quantity for people."""
+    unit = f" {asked.shown}" * (asked.shown != "1")
+    return f"{value / si_factor(asked.shown, asked.unit, asked.name):.4g}{unit}"
+
+
+def _told(safety: Safety) -> list[str]:
+    """Lines on the safety level."""
+    lines = [
+        f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one stop in "
+        f"so many reach; {safety.stops} stops drawn, {1e3 * safety.spent:.2g} ms each:",
+        "  one in     ratio    95 %               variation   by plain sampling",
+    ]
+    for one in safety.levels:
+        lines.append(
+            f"  1e{one.decade:<6} {one.ratio:7.4f}    {one.low:.4f} to {one.high:.4f}"
+            f"   {one.variation:8.3f}    {one.plain_stops:.1e} stops, {one.plain_hours:.1e} h"
+        )
+    return lines
+
+
+_MOST = 60  # past stops that have names below the figure
+
+
+def distance_figure(found: Distance) -> Figure:
+    """Draw the distribution with its quantiles, past stops with their bands, the safety level."""
+    rows = 2 if found.safety is None else 3
+    with mpl.rc_context(STYLE):
+        sheet = Figure(figsize=(9.0, 0.5 + 2.9 * rows), layout="constrained")
+        panels = sheet.subplots(rows)
+        _distribution(panels[0], found)
+        _past(panels[1], found.past)
+        if found.safety is not None:
+            _levels(panels[2], found.safety)
+    return sheet
+
+
+def _distribution(axes: Axes, found: Distance) -> None:
+    distances = found.ahead.distances
+    axes.hist(distances, bins=60, density=True, color=LIGHT["raw"], alpha=0.5)
+    top = axes.get_ylim()[1]
+    for share in QUANTILES:
+        at = found.ahead.quantile(share)
+        axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
+        axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
+    axes.axvline(found.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title=found.sentence, xlabel="distance [m]", ylabel="density [1/m]")
+    axes.title.set_fontsize(9)
+
+
+def _past(axes: Axes, past: tuple[PastStop, ...]) -> None:
+    """Each stop and its band, over the middle of what the others predict."""
+    middle = np.array([one.forecast.quantile(0.5) for one in past])
+    low, high = np.array([one.forecast.band for one in past]).T / middle
+    made = np.array([one.recorded.distance for one in past]) / middle
+    inside = np.array([not one.recorded.outside for one in past])
+    place = np.arange(len(past))
+    axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
+    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
+    axes.plot(
+        *(place[~inside], made[~inside], "x"),
+        color=LIGHT["1"],
+        markersize=5,
+        label="beyond what the model claims",
+    )
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
+    names = [one.recorded.stop.name for one in past] if len(past) <= _MOST else []
+    axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
+
+
+def _levels(axes: Axes, safety: Safety) -> None:
+    decades = np.array([one.decade for one in safety.levels])
+    ratio, low, high = np.array([(one.ratio, one.low, one.high) for one in safety.levels]).T
+    axes.errorbar(
+        *(decades, ratio),
+        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
+        color=LIGHT["2"],
+        marker="o",
+        markersize=4,
+        capsize=3,
+    )
+    axes.set(
+        title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
+        "stop in so many reach",
+        xlabel="one stop in",
+        ylabel="ratio",
+    )
+    axes.title.set_fontsize(9)
+    axes.set_xticks(decades, [f"1e{k}" for k in decades])

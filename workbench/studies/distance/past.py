@@ -1,0 +1,116 @@
+"""What past stops say about the next one: the levels of a machine, how sure they are, the rest.
+
+The fit is that of the diagnosis without effects; nothing is estimated a second time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.quadratic import Joint, Key, Quadratic, add, covariance, minimum
+from workbench.diagnosis.inference.search import ROUNDS, Reporter
+from workbench.diagnosis.inference.thresholds import of_system
+from workbench.diagnosis.inference.unknowns import choice_of
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.errors import InputError
+from workbench.recordings.case import Case, Value
+from workbench.system.system import OBSERVER, System
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Levels of a machine, as past stops know them.
+
+    Attributes
+    ----------
+    keys : parameter, and choice of a condition.
+    mean : (p,) SI; covariance : (p, p).
+    """
+
+    keys: tuple[Key, ...]
+    mean: Vector
+    covariance: Matrix
+
+    def root(self) -> Matrix:
+        """(p, p) whose square is the covariance, of unknowns in any unit."""
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))  # none of what is known
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        root: Matrix = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        return root
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A fit to past stops.
+
+    Attributes
+    ----------
+    names : of the recordings.
+    joint : of the fit, about its best point.
+    mean : (p,) levels there.
+    own : by recording, tolerances as fitted, by parameter, SI.
+    """
+
+    names: tuple[str, ...]
+    joint: Joint
+    mean: Vector
+    own: tuple[Mapping[str, float], ...]
+
+    def known(self, without: int | None = None) -> Known:
+        """Levels by all recordings, or by all but one, by one step from the fit to all."""
+        stops = self.joint.stops()
+        kept = [one for k, one in enumerate(stops) if k != without]
+        total = add([*kept, self.joint.prior])
+        step = minimum(Quadratic(total.N, total.g, total.c, 0))
+        return Known(self.joint.shared, self.mean + step, covariance(total.N))
+
+
+def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter) -> Past:
+    """Fit levels, and what differs between recordings, to past stops.
+
+    Raises
+    ------
+    InputError
+        If a recording has too little that counts.
+    """
+    path = system.model(OBSERVER).path
+    assert path is not None
+    given = (path, system, system.given, cases, workers)
+    with Simulations(*given, report=report, restarting=False) as simulations:
+        # Of effects none is tried; the thresholds bound steps alone.
+        fit = Fit(simulations, [], of_system(system.comparison, 1))
+        best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)
+        joint = fit.quadratics(fit.linearise(best, []))
+        values = fit.unknowns.values(best.point)
+    tolerances = system.comparison.tolerances
+    return Past(
+        names=tuple(case.name for case in cases),
+        joint=joint,
+        mean=np.array([best.point.levels[key] for key in joint.shared]),
+        own=tuple({name: float(one[name]) for name in tolerances} for one in values),
+    )
+
+
+def places(keys: Sequence[Key], system: System, conditions: Mapping[str, Value]) -> dict[str, int]:
+    """Which of the levels each parameter has under some conditions.
+
+    Raises
+    ------
+    InputError
+        If no past stop was made under them.
+    """
+    found = {}
+    for name, level in system.comparison.levels.items():
+        key = name, choice_of(system, name, conditions)
+        if key not in keys:
+            raise InputError(
+                where=f"{level.by} = {key[1]}",
+                found="no past stop under this condition",
+                expected=f"one, by which '{name}' is known",
+                remedy="give recordings under this condition too",
+            )
+        found[name] = list(keys).index(key)
+    return found

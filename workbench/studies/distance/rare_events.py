@@ -1,0 +1,185 @@
+"""Quantiles that are reached once in a million times or less, by subset simulation.
+
+A rare event is a chain of frequent ones: of each decade the tenth of the samples that is furthest
+out leads on, by Markov chains that stay beyond the tenth. Nine decades take as many samples as
+plain sampling has for the third or fourth.
+Sources: S.-K. Au, J. L. Beck (2001), Probabilistic Engineering Mechanics 16, 263-277; the steps of
+the chains are those of I. Papaioannou, W. Betz, K. Zwirglmaier, D. Straub (2015), Probabilistic
+Engineering Mechanics 41, 89-103, section 3.3.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import t
+
+from workbench.arrays import Matrix, Vector
+
+_SHARE = 0.1  # of the samples of a decade that lead on
+_ACCEPTED = 0.44  # share of accepted steps at which chains forget best (Papaioannou et al., 3.3)
+_STEP = 0.6  # of a chain at first, over the spread of the samples
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """One run: samples of a distribution, of which the lower tail has as many as the middle.
+
+    Attributes
+    ----------
+    values : (n,) least first; weights : (n,) probability that each stands for.
+    evaluations : of the function.
+    """
+
+    values: Vector
+    weights: Vector
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """A value that is not reached with a probability.
+
+    Attributes
+    ----------
+    low, high : between which it is, 95 %.
+    variation : coefficient of variation of the probability of `value`.
+    """
+
+    probability: float
+    value: float
+    low: float
+    high: float
+    variation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Tail:
+    """The lower tail of a distribution, from runs that know nothing of each other.
+
+    Attributes
+    ----------
+    runs : two or more.
+    addend : cumulative distribution of what is added to each sample, which nothing that was sampled
+        tells, (n,) of (n,); or None. It is not sampled, because chains that follow the bulk miss a
+        single variable with a heavy tail.
+    """
+
+    runs: tuple[Descent, ...]
+    addend: Callable[[Vector], Vector] | None = None
+
+    def quantile(self, decade: int) -> Quantile:
+        """Quantile of a probability 10^-decade, the mean of the runs.
+
+        Runs scatter by Student's t. Over closed forms, intervals of 95 % hold nine times in ten:
+        what runs miss together, they do not show.
+        """
+        values = np.array([self._quantile(one, 10.0**-decade) for one in self.runs])
+        middle, root = float(values.mean()), math.sqrt(values.size)
+        half = float(t.isf(0.025, values.size - 1) * values.std(ddof=1)) / root
+        beyond = np.array([self._beyond(one, middle) for one in self.runs])
+        variation = float(beyond.std(ddof=1) / beyond.mean()) / root
+        return Quantile(10.0**-decade, middle, middle - half, middle + half, variation)
+
+    @property
+    def evaluations(self) -> int:
+        """Of the function, in all."""
+        return sum(one.evaluations for one in self.runs)
+
+    def _quantile(self, run: Descent, probability: float) -> float:
+        if self.addend is None:
+            middle = np.cumsum(run.weights) - 0.5 * run.weights
+            return float(np.interp(probability, middle, run.values))
+        low, high = float(run.values[0]), float(run.values[-1])
+        while self._beyond(run, low) > probability:
+            low -= high - low
+
+        def away(value: float) -> float:
+            return math.log(max(self._beyond(run, value), 1e-300) / probability)
+
+        return float(brentq(away, low, high, xtol=1e-7 * (high - low)))
+
+    def _beyond(self, run: Descent, value: float) -> float:
+        """Probability of less than a value."""
+        if self.addend is None:
+            middle = np.cumsum(run.weights) - 0.5 * run.weights
+            return float(np.interp(value, run.values, middle))
+        return float(run.weights @ self.addend(value - run.values))
+
+
+def plain_runs(probability: float, variation: float) -> float:
+    """Evaluations by which plain sampling tells a probability as surely.
+
+    >>> round(plain_runs(1e-9, 0.1))
+    99999999900
+    """
+    return (1.0 - probability) / (probability * variation**2)
+
+
+def descend(
+    evaluate: Callable[[Matrix], Vector], dimension: int, decades: int, samples: int, seed: int
+) -> Descent:
+    """Go down the lower tail of a function of standard normal variables once.
+
+    Parameters
+    ----------
+    evaluate : takes points (n, d), returns the function (n,).
+    samples : of each decade, a multiple of ten.
+
+    Examples
+    --------
+    A normal variable is below -5.998 once in 1e9 times.
+
+    >>> def first(u):
+    ...     return u[:, 0]
+    >>> tail = Tail(tuple(descend(first, 5, 9, 1000, seed) for seed in range(8)))
+    >>> found = tail.quantile(9)
+    >>> found.low < -5.998 < found.high
+    True
+    """
+    rng = np.random.default_rng(seed)
+    kept = round(_SHARE * samples)
+    points = rng.standard_normal((samples, dimension))
+    values = evaluate(points)
+    weight, step, evaluations = 1.0 / samples, _STEP, samples
+    found, weights = [], []
+    for _ in range(decades - 1):
+        order = np.argsort(values, kind="stable")
+        found.append(values[order[kept:]])
+        weights.append(np.full(samples - kept, weight))
+        begin, bound = order[:kept], float(np.mean(values[order[kept - 1 : kept + 1]]))
+        points, values, step = _chains(evaluate, points[begin], values[begin], bound, step, rng)
+        weight, evaluations = _SHARE * weight, evaluations + samples - kept
+    found.append(values)
+    weights.append(np.full(samples, weight))
+    every, held = np.concatenate(found), np.concatenate(weights)
+    order = np.argsort(every, kind="stable")
+    return Descent(every[order], held[order], evaluations)
+
+
+def _chains(
+    evaluate: Callable[[Matrix], Vector],
+    points: Matrix,
+    values: Vector,
+    bound: float,
+    step: float,
+    rng: np.random.Generator,
+) -> tuple[Matrix, Vector, float]:
+    """Samples beyond a bound from some of them, ten from each, one step of all chains at a time.
+
+    A step keeps the normal distribution whatever its size, so that only the bound refuses it; the
+    size follows the share that is accepted.
+    """
+    found, known = [points], [values]
+    for k in range(1, round(1.0 / _SHARE)):
+        turned = math.sqrt(1.0 - step**2) * points + step * rng.standard_normal(points.shape)
+        there = evaluate(turned)
+        taken = there <= bound
+        points = np.where(taken[:, None], turned, points)
+        values = np.where(taken, there, values)
+        found.append(points)
+        known.append(values)
+        step = min(0.999, step * math.exp((float(taken.mean()) - _ACCEPTED) / math.sqrt(k)))
+    return np.concatenate(found), np.concatenate(known), step

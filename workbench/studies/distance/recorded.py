@@ -1,0 +1,191 @@
+"""What a recording tells of its stop: when it was commanded, what was asked, how far it went."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.arrays import Vector
+from workbench.diagnosis.data.counting import excluded_by
+from workbench.errors import InputError
+from workbench.recordings.case import Case, Value, read_conditions
+from workbench.studies.distance.way import GRID
+from workbench.system.comparison import Exclusion
+from workbench.system.stopping import COMMAND, Driven, Stopping
+from workbench.system.system import Condition, System
+from workbench.system.tables import Table
+
+_RISEN = 6.0  # lags after which what rises is there: a quarter of a percent is left
+_HALF = math.log(2.0)  # lags in which the half is reached
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """A stop, recorded or thought of.
+
+    Attributes
+    ----------
+    asked : by name, SI.
+    conditions : as of a case.
+    along : by input, (g,) what it is by the place, every GRID from the command on.
+    """
+
+    name: str
+    asked: Mapping[str, float]
+    conditions: Mapping[str, Value]
+    along: Mapping[str, Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedStop:
+    """A stop that was made.
+
+    Attributes
+    ----------
+    command : in the recording [s].
+    distance : from the command to standstill, by its own sensors [m].
+    resistance : of gradients and curves over weight, after the response, mean [1].
+    outside : reasons why the model does not claim it.
+    """
+
+    stop: Stop
+    command: float
+    distance: float
+    resistance: float
+    outside: tuple[str, ...]
+
+
+def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
+    """Read the stop out of a recording.
+
+    Raises
+    ------
+    InputError
+        If nothing rises in it, or it does not end at rest.
+    """
+    time, speed = case.time, system.evaluate(stopping.speed, case.signals)
+    rising = next(one for one in stopping.driven if one.name == stopping.timed_by)
+    command = _command(case, rising)
+    end = _at_rest(case, speed, command, stopping)
+    moving = (time > command) & (np.arange(time.size) < end)
+    at = np.concatenate([[command], time[moving]])
+    going = np.interp(at, time, speed)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(at) * (going[1:] + going[:-1]))])
+    rate = (speed[end - 1] - speed[end]) / (time[end] - time[end - 1])
+    distance = float(way[-1] + going[-1] ** 2 / (2.0 * rate))
+    risen = (at > command + rising.delay + _RISEN * rising.lag) & (way <= way[-1])
+    asked = {}
+    for one in stopping.asked:
+        values = np.interp(at, time, system.evaluate(one.formula, case.signals))
+        asked[one.name] = float(values[0] if one.place == COMMAND else np.median(values[risen]))
+    grid = np.arange(0.0, way[-1] + GRID, GRID)
+    along = {
+        one.name: np.interp(grid, way, np.interp(at, time, case[one.name]))
+        for one in stopping.driven
+        if one.along
+    }
+    return RecordedStop(
+        stop=Stop(case.name, asked, case.conditions, along),
+        command=command,
+        distance=distance,
+        resistance=_resistance(case, system, stopping, at, way),
+        outside=tuple(
+            one.reason
+            for one in stopping.outside
+            if _met(one, case.signals, system, time, _step(case))[moving].any()
+        ),
+    )
+
+
+def asked_stop(said: Mapping[str, Any], system: System, stopping: Stopping) -> Stop:
+    """A stop as people ask for it; what they do not say is usual.
+
+    Parameters
+    ----------
+    said : quantities with units, words of conditions, by name.
+
+    Raises
+    ------
+    InputError
+        If something is no quantity that is asked for and no condition, or is not as expected.
+    """
+    where = "what is asked for"
+    kinds = {one.name: one for one in stopping.asked}
+    table = Table(said, where)
+    table.refuse_unknown([*kinds, *(one.name for one in system.conditions)])
+    asked = {name: table.number(name, one.unit, one.usual) for name, one in kinds.items()}
+    told = {
+        one.name: said.get(one.name, _usual(one))
+        for one in system.conditions
+        if one.name in said or one.choices
+    }
+    return Stop("asked for", asked, read_conditions(Table(told, where), system), {})
+
+
+def _usual(one: Condition) -> Any:
+    return [one.choices[0]] * one.count if one.count else one.choices[0]
+
+
+def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) -> bool:
+    """Whether readings of a model's outputs, (n,) each, are beyond what it claims."""
+    h = system.sample_time
+    time: Vector = h * np.arange(float(next(iter(outputs.values())).size))
+    return any(_met(one, outputs, system, time, h).any() for one in stopping.outside)
+
+
+def _met(
+    one: Exclusion, signals: Mapping[str, Vector], system: System, time: Vector, h: float
+) -> NDArray[np.bool_]:
+    """Where a reason holds; at rest a ratio is none, which no reason holds for."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return excluded_by(one, signals, system, time, h, 1)
+
+
+def _step(case: Case) -> float:
+    return float(np.median(np.diff(case.time)))
+
+
+def _command(case: Case, rising: Driven) -> float:
+    """When the command was given, by the half of what it made rise [s]."""
+    signal, time = case[rising.name], case.time
+    low, high = float(np.median(signal[: time.size // 10])), float(np.median(signal[-10:]))
+    half = 0.5 * (low + high)
+    above = signal > half
+    first = int(np.argmax(above))
+    if first == 0 or not high > low:
+        raise InputError(
+            where=f"{case.source}, column '{rising.name}'",
+            found="nothing that rises after the beginning",
+            expected="a stop, from before its command until it is at rest",
+            remedy="leave this recording out",
+        )
+    share = (half - signal[first - 1]) / (signal[first] - signal[first - 1])
+    crossed = time[first - 1] + share * (time[first] - time[first - 1])
+    return float(crossed - rising.delay - _HALF * rising.lag)
+
+
+def _at_rest(case: Case, speed: Vector, command: float, stopping: Stopping) -> int:
+    """First sample at rest after the command."""
+    slow = (case.time > command) & (speed <= stopping.rest)
+    if not slow.any():
+        raise InputError(
+            where=str(case.source),
+            found=f"{speed[-1]:.3g} m/s at its end",
+            expected="a recording until standstill",
+            remedy="leave this recording out",
+        )
+    return int(np.argmax(slow))
+
+
+def _resistance(case: Case, system: System, stopping: Stopping, at: Vector, way: Vector) -> float:
+    """Mean over the way after the response of gradients and curves, over weight."""
+    if stopping.nominal is None:
+        return 0.0
+    values = system.evaluate(stopping.nominal.resistance, case.signals)
+    after = way >= np.interp(at[0] + stopping.response, at, way)
+    here = np.interp(at[after], case.time, values)
+    lengths = np.gradient(way[after])
+    return float(here @ lengths / lengths.sum())

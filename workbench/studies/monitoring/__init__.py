@@ -1,0 +1,118 @@
+"""Condition monitoring: one machine over many recordings, what has changed since when.
+
+folder -> recordings that are new -> estimates -> state on the disk -> watch -> changes
+"""
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from workbench.errors import InputError
+from workbench.recordings.case import Case, read_case
+from workbench.runtime.pool import Pool
+from workbench.studies.monitoring.chart import LevelChange
+from workbench.studies.monitoring.estimate import Appraiser, RecordingEstimate, appraising, watched
+from workbench.studies.monitoring.folder import Delivery, deliveries
+from workbench.studies.monitoring.outcome import Monitored, concluded
+from workbench.studies.monitoring.state import Delivered, State, opened
+from workbench.studies.monitoring.watch import Track
+from workbench.system.registry import open_model
+from workbench.system.system import OBSERVER, System
+
+__all__ = ["RATE", "LevelChange", "Monitored", "RecordingEstimate", "Track", "monitor", "watched"]
+
+RATE = 0.01
+"""Alarms per recording of a sound machine, all quantities together: one in a hundred stops."""
+STATE = "state.sqlite"
+
+Reader = Callable[[Path, System], Case]
+Steps = Callable[[int, int, str], None]
+
+
+def monitor(
+    system: System,
+    folder: Path,
+    out: Path,
+    *,
+    rate: float = RATE,
+    workers: int = os.cpu_count() or 1,
+    read: Reader = read_case,
+    step: Steps = lambda done, total, name: None,
+) -> Monitored:
+    """Estimate what is new in a folder of recordings, and say what has changed in all of them.
+
+    A recording that came before is not estimated again, one that is there twice counts once, one
+    that cannot be used is listed with its reason. Whatever came first, the order is that of dates.
+
+    Parameters
+    ----------
+    folder : holds a folder for each recording of one machine.
+    out : of the state, and where a run goes on from.
+    rate : alarms per recording that a sound machine may raise.
+    workers : processes.
+    read : makes a case of a folder; a function of a module.
+    step : takes how many of the new recordings are done, of how many, and the last one's name.
+
+    Raises
+    ------
+    InputError
+        If there is no recording that can be used, or the state is of another model.
+    """
+    if not watched(system):
+        raise InputError(
+            where=str(system.source),
+            found="no estimated quantity that can be watched",
+            expected="quantities in [estimated] that no condition sets",
+            remedy="name some parameters of the model there, with corrections",
+        )
+    with opened(out / STATE, _identity(system)) as state:
+        new = state.missing(deliveries(folder))
+        interrupted = _estimate(system, new, state, workers, read, step)
+        told = state.all()
+        if interrupted and not any(one.estimate for one in told):
+            raise KeyboardInterrupt  # there is nothing to conclude from
+        return concluded(system, told, rate, folder, interrupted=interrupted)
+
+
+def _identity(system: System) -> dict[str, Any]:
+    """What estimates depend on beside the recordings."""
+    with open_model(system, OBSERVER) as model:
+        return {
+            "workbench": version("wheelset-workbench"),
+            "system": hashlib.sha256(system.source.read_bytes()).hexdigest(),
+            "model": model.sha256,
+        }
+
+
+def _estimate(
+    system: System, new: list[Delivery], state: State, workers: int, read: Reader, step: Steps
+) -> bool:
+    """Estimate what is new; returns whether Ctrl-C ended it. What is done by then is kept."""
+    if not new:
+        return False
+    with Pool(min(workers, len(new)), appraising, system) as pool:
+        try:
+            told = pool.completed(partial(_told, read), new)
+            for done, (number, one) in enumerate(told, 1):
+                state.add(one)
+                step(done, len(new), new[number].name)
+        except KeyboardInterrupt:
+            return True
+    return False
+
+
+def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Delivered:
+    """What comes of one delivery, in a worker."""
+    date, estimate, refusal = "", None, ""
+    try:
+        case = read(delivery.path, appraiser.system)
+        date, estimate = case.date, appraiser(case)
+    except InputError as error:
+        refusal = str(error)
+    except Exception as error:  # one recording must not cost the others; it is listed
+        refusal = f"{delivery.path}: found what no reader expects ({error!r})"
+    return Delivered(delivery.name, delivery.content, date, estimate, refusal)

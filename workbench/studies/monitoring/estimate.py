@@ -1,0 +1,157 @@
+"""One recording becomes one value of each estimated quantity, with its covariance."""
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.counting import Counted, count
+from workbench.diagnosis.data.samples import compared
+from workbench.diagnosis.inference.thresholds import SOUND
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending
+from workbench.recordings.case import UNKNOWN, Case
+from workbench.system.registry import open_model
+from workbench.system.system import Estimated, System
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingEstimate:
+    """What one recording says.
+
+    Attributes
+    ----------
+    values : (q,) of the watched quantities, SI; covariance : (q, q), by the noise of sensors alone.
+    work : (w,) of friction along the whole recording, by the powers of the system [J].
+    counted : time that the values rest on [s].
+    """
+
+    values: Vector
+    covariance: Matrix
+    work: Vector
+    counted: float
+
+
+def watched(system: System) -> tuple[Estimated, ...]:
+    """Quantities of the machine that no condition sets to a value of its own."""
+    set_by = {
+        name
+        for condition in system.conditions
+        for parameters in condition.parameters.values()
+        for name in parameters
+    } | {condition.sets for condition in system.conditions}
+    return tuple(one for one in system.estimated if one.watched and one.name not in set_by)
+
+
+def reach(one: Estimated) -> float:
+    """Standard deviation of what is known of a quantity before a recording: all of its range."""
+    return float((one.high - one.low) / np.sqrt(12.0))
+
+
+class Appraiser:
+    """Estimates the quantities of recordings as constants, by the system's model.
+
+    A Kalman filter whose quantities do not walk is recursive least squares on the linearised model,
+    which weighs every sample by what it tells: D. Simon, Optimal State Estimation, Wiley 2006,
+    section 3.3. Nothing is known of them before but their ranges, so that no recording leans on
+    another.
+
+    Parameters
+    ----------
+    model : of the system's observer.
+
+    Attributes
+    ----------
+    system : whose recordings they are.
+    """
+
+    def __init__(self, system: System, model: FMU) -> None:
+        self.system = system
+        constant = [
+            replace(one, walk=0.0, spread=reach(one)) for one in system.estimated if one.watched
+        ]
+        # Recordings with an aid and without would be compared, and what wears as it should be told.
+        self._constant = replace(system, estimated=tuple(constant), learns=math.inf, aids=())
+        self._model = model
+        self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
+
+    def __call__(self, case: Case) -> RecordingEstimate:
+        """Estimate from one recording.
+
+        Raises
+        ------
+        InputError
+            If too little of it counts, nobody knows a condition that the model asks for, or the
+            filter fails.
+        """
+        names = (*case.inputs, *compared(self._constant, [case]))
+        counted = count(case, self._constant, names, SOUND, restarting=False)
+        end = int(np.flatnonzero(counted.usable)[-1]) + 1
+        clean = case.with_signals(counted.clean)
+        estimator = self._filter(_parameters(case, self._constant))
+        run = replay(clean.part(slice(0, end)), estimator)
+        if run.ending is not Ending.OK:
+            raise InputError(
+                where=str(case.source),
+                found=f"a recording on which the filter fails: {run.ending.value} {run.message}",
+                expected="one that the model follows",
+                remedy="leave it out; `workbench simulate` shows where it fails",
+            )
+        estimated = [one.name for one in self._constant.estimated]
+        own = [estimated.index(one.name) for one in watched(self._constant)]
+        values = {name: float(run.signal(name)[-1]) for name in estimated}
+        return RecordingEstimate(
+            values=np.array([values[estimated[column]] for column in own]),
+            covariance=estimator.covariance[np.ix_(own, own)],
+            work=self._work(clean, values),
+            counted=_seconds(counted, case.time),
+        )
+
+    def _filter(self, parameters: Mapping[str, float]) -> ExtendedKalmanFilter:
+        """The filter on the model with the parameters of conditions."""
+        key = tuple(sorted(parameters.items()))
+        if key not in self._filters:
+            model = self._model.variant(parameters)
+            gains = ExtendedKalmanFilter.reasoned(model, self._constant)
+            self._filters[key] = ExtendedKalmanFilter(model, self._constant, gains)
+        return self._filters[key]
+
+    def _work(self, case: Case, values: Mapping[str, float]) -> Vector:
+        """Work of friction along a recording, with what it says of the quantities, (w,) [J]."""
+        system = self._constant
+        known = {**system.values, **values}
+        powers = [system.evaluate(one.formula, case.signals, known) for one in system.work]
+        return np.array([np.trapezoid(one, case.time) for one in powers])
+
+
+@contextmanager
+def appraising(system: System) -> Iterator[Appraiser]:
+    """Open the system's model, and appraise with it."""
+    with open_model(system) as model:  # which closes its variants
+        yield Appraiser(system, model)
+
+
+def _parameters(case: Case, system: System) -> dict[str, float]:
+    """Parameters of the model that the conditions of a recording set, but for those estimated."""
+    for one in system.conditions:
+        if (one.parameters or one.sets) and case.conditions.get(one.name) == UNKNOWN:
+            raise InputError(
+                where=str(case.source),
+                found=f"{one.label}: unknown",
+                expected="what it was, because the model is another one by that",
+                remedy=f"write {one.name} into case.toml, if anybody knows",
+            )
+    estimated = {one.name for one in system.estimated}
+    found = system.set_by(case.conditions)
+    return {name: value for name, value in found.items() if name not in estimated}
+
+
+def _seconds(counted: Counted, time: Vector) -> float:
+    """Time of the samples that count [s]."""
+    return float(counted.usable.sum() * np.median(np.diff(time)))

@@ -1,0 +1,184 @@
+"""Many machines of one kind, one task for each: their recordings lie wherever they are kept.
+
+A worker copies what is new of a machine's recordings to itself, goes on from the state that it is
+given, and hands back files: it needs no folder in common with who asks.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from workbench.errors import InputError
+from workbench.runtime.files import write_whole
+from workbench.studies.monitoring import STATE, Monitored, Reader, monitor
+from workbench.system.system import System
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Machines that are watched, and how; workers are sent it.
+
+    Attributes
+    ----------
+    location : folder that holds one for each machine, or its URL, which fsspec reads.
+    rate : alarms per recording that a sound machine may raise.
+    read : makes a case of a folder; write : writes what was found into a folder. Functions of
+        modules.
+    """
+
+    system: System
+    location: str
+    rate: float
+    read: Reader
+    write: Callable[[Monitored, Path], object]
+
+    @property
+    def _remote(self) -> Any:
+        """File system and path of a URL; None of a folder of this machine."""
+        if "://" not in self.location:
+            return None
+        import fsspec  # an extra: folders need none
+
+        return fsspec.url_to_fs(self.location)
+
+    def machines(self) -> list[str]:
+        """Names of all machines.
+
+        Raises
+        ------
+        InputError
+            If the location cannot be read, or holds none.
+        """
+        try:
+            if (remote := self._remote) is None:
+                entries = [one for one in Path(self.location).iterdir() if one.is_dir()]
+                found = sorted(one.name for one in entries if not one.name.startswith("."))
+            else:
+                system, path = remote
+                listed = system.ls(path, detail=True)
+                found = sorted(Path(o["name"]).name for o in listed if o["type"] == "directory")
+            reason = "a folder without folders"
+        except (OSError, ValueError, ImportError) as error:
+            found, reason = [], f"what cannot be read ({error})"
+        if not found:
+            raise InputError(
+                where=self.location,
+                found=reason,
+                expected="a folder for each machine, which holds one for each recording",
+                remedy="correct it; other kinds of URLs need the packages that fsspec names",
+            )
+        return found
+
+    def fetched(self, machine: str, to: Path) -> Path:
+        """Folder of a machine's recordings, copied where they are not on this machine."""
+        if (remote := self._remote) is None:
+            return Path(self.location) / machine
+        system, path = remote
+        base = f"{path.rstrip('/')}/{machine}"
+        for file in system.find(base):
+            target = to / file.removeprefix(base).lstrip("/")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            system.get_file(file, str(target))
+        return to
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What became of one machine.
+
+    Attributes
+    ----------
+    recordings : that count; alarms : in all of them.
+    refusal : why there is no result; empty if there is one.
+    files : that were written, by name.
+    """
+
+    machine: str
+    recordings: int = 0
+    alarms: int = 0
+    refusal: str = ""
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+class FleetWorkers(Protocol):
+    """A pool of this machine, or of a cluster."""
+
+    def submit(
+        self, function: Callable[[Fleet, str, bytes], Watched], name: str, state: bytes, /
+    ) -> "Future[Watched]":
+        """Have a worker watch a machine."""
+
+
+@contextmanager
+def serving(fleet: Fleet) -> Iterator[Fleet]:
+    """Prepare a worker: it needs no more than what it is told."""
+    yield fleet
+
+
+def watch_machine(fleet: Fleet, machine: str, state: bytes) -> Watched:
+    """Watch one machine, in a worker.
+
+    Parameters
+    ----------
+    state : that an earlier run left; empty: none.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        out = Path(scratch) / "out"
+        out.mkdir()
+        if state:
+            (out / STATE).write_bytes(state)
+        try:
+            folder = fleet.fetched(machine, Path(scratch) / "recordings")
+            found = monitor(fleet.system, folder, out, rate=fleet.rate, workers=1, read=fleet.read)
+            fleet.write(found, out)
+        except InputError as error:
+            return Watched(machine, refusal=str(error))
+        except Exception as error:  # one machine must not cost the others; it is listed
+            return Watched(machine, refusal=f"{machine}: {error!r}")
+        files = {one.name: one.read_bytes() for one in sorted(out.iterdir())}
+        return Watched(machine, len(found.names), len(found.changes), "", files)
+
+
+def watch_fleet(
+    fleet: Fleet, out: Path, pool: FleetWorkers, step: Callable[[int, int, str], None]
+) -> tuple[list[Watched], bool]:
+    """Watch all machines, each into a folder of its own.
+
+    Parameters
+    ----------
+    out : of the folders, from whose states a run goes on.
+    step : takes how many are done, of how many, and the last one's name.
+
+    Returns
+    -------
+    watched : by name.
+    interrupted : whether Ctrl-C left some out; their states are as they were.
+
+    Raises
+    ------
+    InputError
+        If there are no machines.
+    """
+    names, found, interrupted = fleet.machines(), list[Watched](), False
+    tasks: list[Future[Watched]] = []
+    try:
+        for name in names:
+            before = out / name / STATE
+            state = before.read_bytes() if before.is_file() else b""
+            tasks.append(pool.submit(watch_machine, name, state))
+        for task in as_completed(tasks):
+            one = task.result()
+            for file, content in one.files.items():
+                write_whole(out / one.machine / file, content)
+            found.append(one)
+            step(len(found), len(names), one.machine)
+    except KeyboardInterrupt:
+        interrupted = True
+    finally:
+        for task in tasks:
+            task.cancel()
+    return sorted(found, key=lambda one: one.machine), interrupted

@@ -1,0 +1,281 @@
+"""What has changed on a machine, as a value: a sentence, numbers, tables, a figure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
+from workbench.studies.monitoring.chart import LevelChange
+from workbench.studies.monitoring.estimate import watched
+from workbench.studies.monitoring.state import Delivered
+from workbench.studies.monitoring.watch import Track, watch
+from workbench.system.system import System
+from workbench.system.units import BAND
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Monitored:
+    """One machine over its recordings, in the order of their dates.
+
+    Attributes
+    ----------
+    names, dates : (n,) of the recordings that count.
+    dated : whether their order is that of dates; else it is that of names.
+    tracks : of the watched quantities.
+    threshold : of the sums that raise alarms, for `rate` alarms per recording of a sound machine.
+    work : (n, w) of friction [J], by the system's `work`.
+    counted : (n,) time that the estimates rest on [s].
+    refused : why a recording is not used, by name.
+    again : which recording one repeats, by name.
+    interrupted : whether there are more recordings, which are yet to be estimated.
+    """
+
+    system: System
+    names: tuple[str, ...]
+    dates: tuple[str, ...]
+    dated: bool
+    tracks: tuple[Track, ...]
+    threshold: float
+    rate: float
+    work: Matrix
+    counted: Vector
+    refused: Mapping[str, str]
+    again: Mapping[str, str]
+    interrupted: bool
+
+    @property
+    def changes(self) -> list[tuple[Track, LevelChange]]:
+        """All that were told, in their order."""
+        found = [(track, change) for track in self.tracks for change in track.changes]
+        return sorted(found, key=lambda one: one[1].raised)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What has changed, one sentence for each quantity."""
+        said = []
+        for track in self.tracks:
+            if track.changes:
+                first, last = track.changes[0], track.changes[-1]
+                size = track.level[0] - first.before[0]
+                known = float(np.hypot(track.level[1], first.before[1]))
+                alarms = len(track.changes)
+                until = f", {alarms} alarms until {self.names[last.raised]}" * (alarms > 1)
+                said.append(
+                    f"{_called(track)}: {self._size(track, size, known)} since "
+                    f"{self.names[first.last]}; told at {self.names[first.raised]}{until}"
+                )
+        return said
+
+    def summary(self) -> str:
+        """What has changed, for people."""
+        count = len(self.names)
+        lines = [f"{count} recordings, {self.names[0]} to {self.names[-1]}: "]
+        lines[0] += "; ".join(
+            [
+                f"{len(self.changes) or 'no'} alarms",
+                *([f"{len(self.refused)} not used"] if self.refused else []),
+                *([f"{len(self.again)} there twice"] if self.again else []),
+            ]
+        )
+        lines += self.sentences
+        lines += [f"not used: {name}: {why}" for name, why in self.refused.items()]
+        lines += [f"there twice: {name} is {other}" for name, other in self.again.items()]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Estimates of all recordings, one row each for recording and quantity."""
+        return pd.DataFrame(list(self._rows()))
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        for k, (name, date) in enumerate(zip(self.names, self.dates, strict=True)):
+            for track in self.tracks:
+                scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
+                yield {
+                    "recording": name,
+                    "date": date,
+                    "quantity": _named(track),
+                    "unit": track.unit,
+                    "estimate": track.values[k],
+                    "standard_error": scale * track.deviations[k],
+                    "off_its_past": track.surprises[k],
+                }
+
+    def alarms(self) -> pd.DataFrame:
+        """All alarms, in their order."""
+        columns = "told_at date quantity unit changed_after earliest latest before after change "
+        columns += "standard_error share_of_nominal since_the_first"
+        rows = [self._alarm(track, change) for track, change in self.changes]
+        return pd.DataFrame(rows, columns=columns.split())
+
+    def _alarm(self, track: Track, change: LevelChange) -> dict[str, Any]:
+        size, known = change.size
+        nominal = abs(self.system.values.get(track.name, 0.0))
+        return {
+            "told_at": self.names[change.raised],
+            "date": self.dates[change.raised],
+            "quantity": _named(track),
+            "unit": track.unit,
+            "changed_after": self.names[change.last],
+            "earliest": self.names[change.earliest],
+            "latest": self.names[change.latest],
+            "before": change.before[0],
+            "after": change.after[0],
+            "change": size,
+            "standard_error": known,
+            "share_of_nominal": size / nominal if nominal else np.nan,
+            "since_the_first": change.after[0] - track.changes[0].before[0],
+        }
+
+    def worked(self) -> pd.DataFrame:
+        """Work of friction in each recording [J], and seconds that the estimates rest on."""
+        labels = [f"{one.name} [J]" for one in self.system.work]
+        frame = pd.DataFrame(self.work, columns=labels)
+        frame.insert(0, "counted [s]", self.counted)
+        frame.insert(0, "date", self.dates)
+        frame.insert(0, "recording", self.names)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts; the keys of the first level are a contract."""
+        return {
+            "sentences": self.sentences,
+            "recordings": len(self.names),
+            "order": "dates" if self.dated else "names",
+            "first": self.names[0],
+            "last": self.names[-1],
+            "rate": self.rate,
+            "threshold": self.threshold,
+            "alarms": _plain(self.alarms().to_dict("records")),
+            "quantities": {
+                _named(track): _plain(
+                    {
+                        "label": track.label,
+                        "unit": track.unit,
+                        "level": track.level[0],
+                        "standard_error": track.level[1],
+                        "trend_by_recording": track.trend[0],
+                        "trend_standard_error": track.trend[1],
+                        "scatter": track.scatter,
+                        "told_in": int(np.isfinite(track.values).sum()),
+                    }
+                )
+                for track in self.tracks
+            },
+            "work": self._wear(),
+            "refused": dict(self.refused),
+            "again": dict(self.again),
+            "interrupted": self.interrupted,
+        }
+
+    def _wear(self) -> dict[str, dict[str, float | str]]:
+        """Work of friction in all recordings, and over the mean of all that wears."""
+        sums = self.work.sum(axis=0)
+        mean = float(sums.mean()) if sums.size else 0.0
+        return {
+            one.name: {
+                "label": one.label,
+                "work": float(total),
+                "of_the_mean": float(total / mean) if mean else 0.0,
+            }
+            for one, total in zip(self.system.work, sums, strict=True)
+        }
+
+    def _size(self, track: Track, size: float, known: float) -> str:
+        """A change with its 95 % range, and its share of the nominal value."""
+        low, high = size - BAND * known, size + BAND * known
+        text = f"{size:+.3g} ({low:.3g} to {high:.3g}) {track.unit}".removesuffix(" 1")
+        nominal = abs(self.system.values.get(track.name, 0.0))
+        return f"{text}, {size / nominal:+.1%} of nominal" if nominal else text
+
+    def plot(self) -> "Figure":
+        """Figure of all quantities over the recordings, with their changes."""
+        from workbench.studies.monitoring.report import history_figure
+
+        return history_figure(self)
+
+    def _repr_html_(self) -> str:
+        """What has changed, and all alarms, for notebooks."""
+        return f"<p>{escape(self.summary())}</p>{self.alarms().to_html(index=False)}"
+
+
+def concluded(
+    system: System, told: Sequence[Delivered], rate: float, folder: Path, *, interrupted: bool
+) -> Monitored:
+    """Watch all recordings that are known, in the order of their dates.
+
+    Of a recording that came several times, the last one that could be used counts; of those with
+    the same content, the first by name.
+
+    Raises
+    ------
+    InputError
+        If none can be used.
+    """
+    usable = {one.name: one for one in told if one.estimate is not None}
+    last = {one.name: one for one in told}
+    refused = {name: one.refusal for name, one in sorted(last.items()) if one.refusal}
+    first: dict[str, str] = {}
+    for name in sorted(usable):
+        first.setdefault(usable[name].content, name)
+    again = {
+        name: first[one.content]
+        for name, one in sorted(usable.items())
+        if name != first[one.content]
+    }
+    counted = [one for name, one in sorted(usable.items()) if name not in again]
+    if not counted:
+        why = next(iter(refused.values()), "none was estimated yet")
+        raise InputError(
+            where=str(folder),
+            found=f"no recording that can be used; the first: {why}",
+            expected="one or more",
+            remedy="repair that one first",
+        )
+    dated = all(one.date for one in counted)
+    if dated:
+        counted.sort(key=lambda one: one.date)
+    estimates = [one.estimate for one in counted if one.estimate is not None]
+    values = np.array([one.values for one in estimates])
+    covariances = [one.covariance for one in estimates]
+    tracks, threshold = watch(watched(system), values, covariances, rate)
+    return Monitored(
+        system=system,
+        names=tuple(one.name for one in counted),
+        dates=tuple(one.date for one in counted),
+        dated=dated,
+        tracks=tuple(tracks),
+        threshold=threshold,
+        rate=rate,
+        work=np.array([one.work for one in estimates]),
+        counted=np.array([one.counted for one in estimates]),
+        refused=refused,
+        again=again,
+        interrupted=interrupted,
+    )
+
+
+def _named(track: Track) -> str:
+    """A quantity as it is watched."""
+    return f"{track.name} against the others" if track.against else track.name
+
+
+def _called(track: Track) -> str:
+    return f"{track.label} ({_named(track)})"
+
+
+def _plain(value: Any) -> Any:
+    """The same with nothing where there is no number."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,0 +1,357 @@
+"""Files of condition monitoring: summary.json, tables, a figure of the history, the page."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from workbench.arrays import Vector
+from workbench.pages.answer import Answer, Measure, recordings, with_answer
+from workbench.pages.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.pages.parts import Cell, Heading, Part, Rows, Strip, number, write_parts
+from workbench.pages.recordings import placed
+from workbench.pages.views import capital
+from workbench.runtime.files import write_json, write_whole
+from workbench.studies.monitoring import Monitored, Track
+from workbench.system.units import BAND
+
+_POINT, _LEVEL, _CHANGED = "2", "measured", "7"
+
+
+_ENTRY = re.compile(r"(.+)\[(\d+)\]")
+
+
+def write_monitoring_page(found: Monitored, summary: Mapping[str, Any], out: Path) -> Path:
+    """Write the page into the folder; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to summary.json.
+    """
+    tracks = [one for one in found.tracks if np.isfinite(one.values).any()]
+    tracks.sort(key=_first_told)
+    figures = [_figure(one, found) for one in tracks] if len(found.names) > 1 else []
+    changed = sum(bool(one.changes) for one in tracks)
+    drawn = placed(figures, summary, out)
+    shown = drawn[: max(changed, 1)]
+    title = "What has changed" if changed else "The quantity that moved most; nothing has changed"
+    parts = [
+        Part(
+            "shown",
+            title,
+            (_EXPLAINED,),
+            strips=tuple(_strips(tracks, found)),
+            recordings=tuple(shown),
+        ),
+        Part("quantities", "Quantities now", tables=(_quantities(summary),), printed=True),
+        Part("definitions", "Definitions", terms=_TERMS),
+    ]
+    if drawn[len(shown) :]:
+        rest = Part("others", "Quantities as they were", recordings=tuple(drawn[len(shown) :]))
+        parts.insert(2, rest)
+    if summary["alarms"]:
+        alarms = (_alarms(summary["alarms"]),)
+        parts.insert(1, Part("alarms", "Alarms", tables=alarms, printed=True))
+    if summary["work"]:
+        parts.insert(-1, Part("work", "Work of friction", tables=(_work(summary["work"]),)))
+    path = out / "index.html"
+    write_parts(
+        f"One machine over its recordings, {found.names[0]} to {found.names[-1]}",
+        summary,
+        parts,
+        path,
+        file="summary.json",
+        warnings=_warnings(found),
+    )
+    return path
+
+
+_EXPLAINED = (
+    "One point for each recording, with a band that holds 95 %; the level that it is "
+    "compared with, red after a change that was told. The shaded recordings are where the last "
+    "change was, with 95 %. Each quantity is compared with its own past; one of several that are "
+    "alike against the others."
+)
+
+
+def _first_told(track: Track) -> tuple[float, float]:
+    """Order of tracks: changed ones as they were told, then those that were most off their past."""
+    told = track.changes[0].raised if track.changes else np.inf
+    surprises = np.abs(track.surprises[np.isfinite(track.surprises)])
+    return float(told), -float(surprises.max(initial=0.0))
+
+
+def _warnings(found: Monitored) -> list[str]:
+    said = []
+    if found.interrupted:
+        said.append("Interrupted: the same command goes on from here.")
+    said += [f"Not used: {name}: {why}" for name, why in found.refused.items()]
+    said += [f"There twice: {name} is {other}." for name, other in found.again.items()]
+    return said
+
+
+def _strips(tracks: Sequence[Track], found: Monitored) -> list[Strip]:
+    """Quantities that are entries of one array, in its order: which of them have changed."""
+    arrays: dict[str, dict[int, Track]] = {}
+    for track in tracks:
+        if track.against and (entry := _ENTRY.fullmatch(track.name)):
+            arrays.setdefault(entry[1], {})[int(entry[2])] = track
+    strips = []
+    for members in arrays.values():
+        if changed := [one.label for one in members.values() if one.changes]:
+            entries = tuple((str(k), _moved(one, found)) for k, one in sorted(members.items()))
+            finding = capital(f"{', '.join(changed)}: changed; the others are as they were.")
+            strips.append(Strip(finding, entries))
+    return strips
+
+
+def _moved(track: Track, found: Monitored) -> str:
+    """By how much a quantity is off its first level; empty where it is not."""
+    if not track.changes:
+        return ""
+    size = track.level[0] - track.changes[0].before[0]
+    if nominal := abs(found.system.values.get(track.name, 0.0)):
+        return f"{100.0 * size / nominal:+.1f} %"
+    return f"{size:+.3g} {track.unit}".removesuffix(" 1")
+
+
+def _figure(track: Track, found: Monitored) -> CaseFigure:
+    """Estimates of a quantity and its levels, over the recordings."""
+    count = len(found.names)
+    scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
+    sound, changed = _levels(track, count)
+    reach = BAND * scale * track.deviations
+    curves = (Curve(_POINT, track.values, reach), Curve(_LEVEL, sound), Curve(_CHANGED, changed))
+    low = float(np.nanmin(track.values - reach))
+    high = float(np.nanmax(track.values + reach))
+    room = 0.05 * (high - low) or 1.0
+    label = capital(f"{track.label} {track.name}".replace("  ", " "))
+    title = f"{label} [{track.unit}]".removesuffix(" [1]")
+    last = track.changes[-1] if track.changes else None
+    return CaseFigure(
+        name=label + " against the others" * track.against,
+        title=f"{np.isfinite(track.values).sum()} of {count} recordings tell it",
+        finding=_said(track, found),
+        time=np.arange(1.0, count + 1.0),
+        window=None if last is None else (last.earliest + 1.0, min(last.latest + 2.0, count)),
+        legend=((_POINT, "estimate"), (_LEVEL, "level"), (_CHANGED, "level after a change")),
+        panels=(Panel(title, track.unit, low - room, high + room, 1.4, curves),),
+        axis=("recording", ""),
+    )
+
+
+def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
+    """Level of each recording: before any change, and after one."""
+    sound, changed = np.full(count, np.nan), np.full(count, np.nan)
+    begin, kept = 0, sound
+    for change in track.changes:
+        kept[begin : change.last + 1] = change.before[0]
+        begin, kept = change.last + 1, sound if change.returns else changed
+    kept[begin:] = track.level[0]
+    return sound, changed
+
+
+def _said(track: Track, found: Monitored) -> str:
+    if not track.changes:
+        return "It has not changed."
+    first = track.changes[0]
+    return (
+        f"Changed by {_moved(track, found)} after {found.names[first.last]}, told at "
+        f"{found.names[first.raised]}."
+    )
+
+
+def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Rows:
+    columns = (
+        Heading("told at", number=False),
+        Heading("quantity", number=False),
+        Heading("changed after", number=False),
+        Heading("with 95 %, after", number=False),
+        Heading("change"),
+        Heading("95 % from"),
+        Heading("to"),
+        Heading("of nominal [%]"),
+        Heading("unit", number=False),
+    )
+    rows = []
+    for one in alarms:
+        size, sure, share = one["change"], one["standard_error"], one["share_of_nominal"]
+        between = dict.fromkeys((one["earliest"], one["latest"]))
+        cells = (
+            Cell(one["quantity"]),
+            Cell(one["changed_after"]),
+            Cell(" to ".join(between)),
+            number(size, "{:+.3g}".format),
+            number(size - BAND * sure, "{:+.3g}".format),
+            number(size + BAND * sure, "{:+.3g}".format),
+            number(None if share is None else 100.0 * share, "{:+.1f}".format),
+            Cell(one["unit"]),
+        )
+        rows.append((str(one["told_at"]), cells))
+    caption = "All alarms in their order: the recording at which each was told."
+    return Rows("alarm-table", caption, columns, tuple(rows))
+
+
+def _quantities(summary: Mapping[str, Any]) -> Rows:
+    columns = (
+        Heading("quantity", number=False),
+        Heading("what it is", number=False),
+        Heading("level"),
+        Heading("standard error"),
+        Heading("trend", meaning="by recording, since the last change"),
+        Heading("unit", number=False),
+        Heading("told in", meaning="recordings that tell it"),
+    )
+    rows = []
+    for name, one in summary["quantities"].items():
+        cells = (
+            Cell(one["label"]),
+            *(number(one[key], "{:.4g}".format) for key in ("level", "standard_error")),
+            number(one["trend_by_recording"], "{:+.2g}".format),
+            Cell(one["unit"]),
+            number(one["told_in"], "{:.0f}".format),
+        )
+        rows.append((name, cells))
+    caption = "Mean level of each quantity since its last change."
+    return Rows("quantity-table", caption, columns, tuple(rows))
+
+
+def _work(work: Mapping[str, Any]) -> Rows:
+    columns = (
+        Heading("where", number=False),
+        Heading("what it is", number=False),
+        Heading("work [MJ]"),
+        Heading("over the mean", meaning="wear relative to the others, of one material"),
+    )
+    rows = tuple(
+        (
+            name,
+            (
+                Cell(one["label"]),
+                number(1e-6 * one["work"], "{:.4g}".format),
+                number(one["of_the_mean"], "{:.3f}".format),
+            ),
+        )
+        for name, one in work.items()
+    )
+    return Rows("work-table", "Friction work in all recordings together.", columns, rows)
+
+
+_TERMS = {
+    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a sound "
+    "machine passes at the stated rate of false alarms (Page 1954).",
+    "Changed after": "The recording after which the change was most likely (Hinkley 1970).",
+    "Against the others": "Less the mean of those that are alike: what moves all of them cancels.",
+    "Standard error": "By the noise of the sensors and by the scatter that the past shows.",
+}
+
+_COLUMNS = 4  # of panels
+
+
+_POINT_COLOUR, _LEVEL_COLOUR, _ALARM_COLOUR = LIGHT["2"], LIGHT["measured"], LIGHT["7"]
+
+
+def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) -> Path:
+    """Write all files; returns the page.
+
+    Parameters
+    ----------
+    provenance : what was run.
+    """
+    summary = {**found.to_dict(), "provenance": provenance}
+    told = with_answer(watched(summary), summary)
+    write_json(out / "summary.json", told)
+    for name, frame in (
+        ("estimates", found.to_frame()),
+        ("alarms", found.alarms()),
+        ("work", found.worked()),
+    ):
+        write_whole(out / f"{name}.csv", frame.to_csv(index=False, float_format="%.8g"))
+    figure = out / "history.png"
+    save_figure(history_figure(found), [figure, figure.with_suffix(".svg")])
+    return write_monitoring_page(found, told, out)
+
+
+def history_figure(found: Monitored) -> Figure:
+    """Draw each quantity over the recordings: estimates, levels, changes and alarms."""
+    tracks = [one for one in found.tracks if np.isfinite(one.values).any()]
+    rows = -(-len(tracks) // _COLUMNS)
+    with mpl.rc_context(STYLE | {"font.size": 8}):
+        sheet = Figure(figsize=(11.0, 0.8 + 1.5 * rows), layout="constrained")
+        panels = list(sheet.subplots(rows, _COLUMNS, sharex=True, squeeze=False).flat)
+        heights = _heights(tracks)
+        for axes, track in zip(panels, tracks, strict=False):
+            middle = float(np.nanmedian(track.values))
+            _draw(axes, track, found)
+            height = heights[track.against, track.unit]
+            axes.set_ylim(middle - height, middle + height)
+            axes.set_title(f"{track.label} [{track.unit}]".replace(" [1]", ""), fontsize=7)
+        for axes in panels[len(tracks) :]:
+            axes.set_visible(False)
+        sheet.supxlabel(f"recording, {found.names[0]} to {found.names[-1]}")
+        sheet.suptitle(
+            "Estimates with 95 % bands, levels, changes (dashed, with 95 % range) and alarms (line)"
+        )
+    return sheet
+
+
+def _heights(tracks: list[Track]) -> dict[tuple[bool, str], float]:
+    """Half the range of panels by what they show: the same for all that are alike."""
+    heights: dict[tuple[bool, str], float] = {}
+    for track in tracks:
+        away = np.nanmax(np.abs(track.values - np.nanmedian(track.values)) + _half(track))
+        key = track.against, track.unit
+        heights[key] = max(heights.get(key, 0.0), 1.1 * float(away))
+    return heights
+
+
+def _half(track: Track) -> Vector:
+    """Half of the 95 % band of each estimate."""
+    scale = float(np.sqrt(np.nan_to_num(track.scatter, nan=1.0)))
+    half: Vector = BAND * scale * track.deviations
+    return half
+
+
+def _draw(axes: Axes, track: Track, found: Monitored) -> None:
+    numbers = np.arange(1, len(found.names) + 1)
+    axes.errorbar(
+        numbers,
+        track.values,
+        _half(track),
+        fmt=".",
+        color=_POINT_COLOUR,
+        ecolor=LIGHT["raw"],
+        elinewidth=0.6,
+        markersize=4,
+    )
+    begin = 0.5
+    for change in track.changes:
+        end = change.last + 1.5
+        axes.hlines(change.before[0], begin, end, color=_LEVEL_COLOUR)
+        axes.axvspan(change.earliest + 1.0, change.latest + 2.0, color=_ALARM_COLOUR, alpha=0.12)
+        axes.axvline(end, color=_ALARM_COLOUR, linestyle="--", linewidth=0.8)
+        axes.axvline(change.raised + 1.0, color=_ALARM_COLOUR, linewidth=1.2)
+        begin = end
+    if np.isfinite(track.level[0]):
+        axes.hlines(track.level[0], begin, numbers[-1] + 0.5, color=_LEVEL_COLOUR)
+
+
+def watched(summary: Mapping[str, Any]) -> Answer:
+    """The answer of `monitor`."""
+    said, count = summary["sentences"], recordings(summary["recordings"])
+    headline = {"alarms": Measure(len(summary["alarms"]), "1", "lower")}
+    details = {}
+    for name, one in summary["quantities"].items():
+        level, sure = one["level"], one["standard_error"]
+        ends = (None, None)
+        if level is not None and sure is not None:
+            ends = (level - BAND * sure, level + BAND * sure)
+        details[f"level of {name}"] = Measure(level, one["unit"], "", *ends)
+    return Answer(
+        "; ".join(said) + "." if said else f"Nothing changed in {count}.", headline, details
+    )

@@ -1,0 +1,130 @@
+"""What is known of a machine's recordings, in a file that a killed run leaves whole.
+
+Each recording is one transaction. What is concluded is no state: it follows from all recordings in
+the order of their dates, whichever came first.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.errors import InputError
+from workbench.studies.monitoring.estimate import RecordingEstimate
+from workbench.studies.monitoring.folder import Delivery
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS identity (said TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS deliveries (
+    number INTEGER PRIMARY KEY, name TEXT NOT NULL, content TEXT NOT NULL, date TEXT NOT NULL,
+    estimate TEXT, refusal TEXT, UNIQUE (name, content)
+);
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Delivered:
+    """What came of one delivery: an estimate, or why there is none."""
+
+    name: str
+    content: str
+    date: str
+    estimate: RecordingEstimate | None
+    refusal: str
+
+
+class State:
+    """The file of one machine; see `opened`."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+
+    def missing(self, found: list[Delivery]) -> list[Delivery]:
+        """Those that are not known by name and content."""
+        rows = self._connection.execute("SELECT name, content FROM deliveries")
+        known = set(rows)
+        return [one for one in found if (one.name, one.content) not in known]
+
+    def add(self, told: Delivered) -> None:
+        """Keep what came of a delivery; it is on the disk when this returns."""
+        estimate = None if told.estimate is None else json.dumps(_plain(told.estimate))
+        with self._connection:
+            self._connection.execute(
+                "INSERT OR IGNORE INTO deliveries (name, content, date, estimate, refusal) "
+                "VALUES (?, ?, ?, ?, ?)",
+                (told.name, told.content, told.date, estimate, told.refusal),
+            )
+
+    def all(self) -> list[Delivered]:
+        """All deliveries, as they came."""
+        rows = self._connection.execute(
+            "SELECT name, content, date, estimate, refusal FROM deliveries ORDER BY number"
+        )
+        return [
+            Delivered(name, content, date, _estimate(text) if text else None, refusal)
+            for name, content, date, text, refusal in rows
+        ]
+
+
+@contextmanager
+def opened(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
+    """Open the file of a machine, or make it.
+
+    Parameters
+    ----------
+    identity : what estimates depend on beside the recordings; others do not stand beside them.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or written, or holds estimates of another identity.
+    """
+    said = json.dumps(identity, sort_keys=True)
+    try:
+        with closing(sqlite3.connect(path)) as connection:
+            with connection:
+                connection.executescript(_TABLES)
+            with connection:
+                found = [text for (text,) in connection.execute("SELECT said FROM identity")]
+                if not found:
+                    connection.execute("INSERT INTO identity VALUES (?)", (said,))
+            if found not in ([], [said]):
+                raise InputError(
+                    where=str(path),
+                    found="estimates by another model, system file or version",
+                    expected="those of this one, because levels are compared",
+                    remedy="give another --out, into which all recordings are estimated anew",
+                )
+            yield State(connection)
+    except sqlite3.Error as error:
+        raise InputError(
+            where=str(path),
+            found=f"a state that cannot be read or written ({error})",
+            expected="what an earlier run left, or room for a new one",
+            remedy="make room; or remove it, and all recordings are estimated anew",
+        ) from None
+
+
+def _plain(estimate: RecordingEstimate) -> dict[str, Any]:
+    return {
+        "values": estimate.values.tolist(),
+        "covariance": estimate.covariance.tolist(),
+        "work": estimate.work.tolist(),
+        "counted": estimate.counted,
+    }
+
+
+def _estimate(text: str) -> RecordingEstimate:
+    content = json.loads(text)
+    q = len(content["values"])
+    return RecordingEstimate(
+        np.array(content["values"]),
+        np.reshape(content["covariance"], (q, q)),
+        np.array(content["work"]),
+        content["counted"],
+    )

@@ -1,0 +1,199 @@
+"""Which quantities are watched, and the pass over all recordings in the order of their dates.
+
+Of quantities that are alike, the entries of one array, each is watched against the others: what
+moves all of them, from recording to recording, is no change of one. Their mean is watched, too.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix, Vector
+from workbench.studies.monitoring.chart import LARGEST, Chart, LevelChange, Scatter, threshold
+from workbench.studies.monitoring.estimate import reach
+from workbench.system.system import Estimated
+
+_FEWEST = 3  # of an array: of two, nothing tells which has moved
+_TOLD = 0.5  # of what was not known before, as a variance, that a recording must take away
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One watched quantity over all recordings.
+
+    Attributes
+    ----------
+    name : of the quantity, or of the array for the mean of its entries.
+    unit : SI.
+    label : for people.
+    against : whether it is taken relative to the others of its array.
+    values, deviations : (n,) estimates of the recordings, and standard deviations as stated: by the
+        noise of the sensors and the usual scatter; NaN where a recording does not tell it.
+    surprises : (n,) standard deviations off its past, NaN without one.
+    changes : of its level.
+    level : mean since the last change, and its standard deviation.
+    trend : by recording since then, and its standard deviation.
+    scatter : ratio of the variance about the past to the stated one.
+    """
+
+    name: str
+    unit: str
+    label: str
+    against: bool
+    values: Vector
+    deviations: Vector
+    surprises: Vector
+    changes: tuple[LevelChange, ...]
+    level: tuple[float, float]
+    trend: tuple[float, float]
+    scatter: float
+
+
+@dataclass(eq=False)
+class _Group:
+    """Quantities that are alike, and directions in which they are watched.
+
+    Attributes
+    ----------
+    columns : (m,) of them in an estimate.
+    directions : (k, m) entries against the others, then their mean; of a single quantity, itself.
+    known : (k,) variance before a recording.
+    usual : (m,) variance from recording to recording of a sound machine.
+    moved : (m,) by which entries are off their first level, since they changed.
+    """
+
+    name: str
+    members: tuple[Estimated, ...]
+    columns: list[int]
+    directions: Matrix = field(init=False)
+    charts: list[Chart] = field(init=False)
+    known: Vector = field(init=False)
+    usual: Vector = field(init=False)
+    moved: Vector = field(init=False)
+    rows: list[tuple[Vector, Vector, Vector]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        m = len(self.members)
+        self.directions = np.ones((1, 1))
+        scatters = [Scatter(1.0)]
+        if m > 1:
+            against = (np.eye(m) * m - 1.0) / (m - 1.0)
+            self.directions = np.vstack([against, np.full((1, m), 1.0 / m)])
+            scatters = [Scatter((m - 1.0) / m)] * m + scatters
+        self.charts = [Chart(scatter) for scatter in scatters]
+        self.usual = np.array([one.scatter**2 for one in self.members])
+        self.moved = np.zeros(m)
+        before = np.array([reach(one) ** 2 for one in self.members])
+        self.known = np.square(self.directions) @ before
+
+    @property
+    def against(self) -> bool:
+        """Whether there are others."""
+        return len(self.members) > 1
+
+    def take(self, number: int, values: Vector, covariance: Matrix, level: float) -> None:
+        """Take the estimates of one recording, (m,) and (m, m)."""
+        told = np.diag(self.directions @ covariance @ self.directions.T)
+        spread = told + np.square(self.directions) @ self.usual
+        shown = told < (1.0 - _TOLD) * self.known
+        watched, surprises, squares = self._compared(values, spread, shown)
+        self.rows.append((watched, np.where(shown, np.sqrt(spread), np.nan), surprises))
+        for k in np.flatnonzero(np.isfinite(squares)):
+            self.charts[k].scatter.add(squares[k])
+        for k in np.flatnonzero(shown):
+            self.charts[k].add(number, watched[k], spread[k], surprises[k])
+        for k in np.flatnonzero(shown):
+            if self.charts[k].raised(level):
+                self.charts[k].part()
+            if self.against and k < len(self.members) and self.charts[k].changes:
+                self.moved[k] = self.charts[k].level[0] - self.charts[k].changes[0].before[0]
+
+    def _compared(
+        self, values: Vector, spread: Vector, shown: NDArray[np.bool_]
+    ) -> tuple[Vector, Vector, Vector]:
+        """What is watched, how far it is off, and that squared, (k,) each.
+
+        What has moved and was told is no news of the others, nor is more of a wild entry than
+        chance makes.
+        """
+        m, away = len(self.members), self.moved.copy()
+        for _ in range(1 + m // 2):  # of more than half, nobody could tell which are wild
+            watched = self.directions @ (values - away)
+            if self.against:
+                watched[:-1] += away
+            off = [
+                chart.surprise(*one) if there else (np.nan, np.nan)
+                for chart, there, *one in zip(self.charts, shown, watched, spread, strict=True)
+            ]
+            surprises, squares = np.array(off).T
+            left = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
+            if not self.against or not np.nanmax(left, initial=0.0) > LARGEST:
+                break
+            k = int(np.nanargmax(left))
+            bound = self.charts[k].bounded(watched[k], spread[k], surprises[k])
+            away[k] += watched[k] - bound
+        return np.where(shown, watched, np.nan), surprises, squares
+
+    def tracks(self) -> list[Track]:
+        """What was watched."""
+        values, deviations, surprises = (np.array(one).T for one in zip(*self.rows, strict=True))
+        names = [(one.name, one.label, self.against) for one in self.members]
+        names += [
+            (self.name, f"mean of {self.members[0].label} and the like", False)
+        ] * self.against
+        return [
+            Track(
+                name,
+                self.members[0].unit,
+                label,
+                against,
+                *(values[k], deviations[k], surprises[k]),
+                tuple(chart.changes),
+                chart.level,
+                chart.trend,
+                chart.scatter.variance,
+            )
+            for k, ((name, label, against), chart) in enumerate(
+                zip(names, self.charts, strict=True)
+            )
+        ]
+
+
+def grouped(estimated: Sequence[Estimated]) -> list[_Group]:
+    """Entries of one array together, where there are enough; all others alone."""
+    arrays: dict[str, list[int]] = {}
+    for column, one in enumerate(estimated):
+        arrays.setdefault(re.sub(r"\[\d+\]$", "", one.name), []).append(column)
+    groups = []
+    for name, columns in arrays.items():
+        alike = [columns] if len(columns) >= _FEWEST else [[column] for column in columns]
+        for own in alike:
+            members = tuple(estimated[column] for column in own)
+            groups.append(_Group(name if len(own) > 1 else members[0].name, members, own))
+    return groups
+
+
+def watch(
+    estimated: Sequence[Estimated], values: Matrix, covariances: Sequence[Matrix], rate: float
+) -> tuple[list[Track], float]:
+    """Watch all quantities over recordings in their order.
+
+    Parameters
+    ----------
+    values : (n, q) of the recordings; covariances : (q, q) of each.
+    rate : alarms per recording that a sound machine may raise, all quantities together.
+
+    Returns
+    -------
+    tracks : of what is watched.
+    level : threshold of the sums; rates of quantities add (Bonferroni).
+    """
+    groups = grouped(estimated)
+    level = threshold(rate / sum(len(one.charts) for one in groups))
+    for number, (row, covariance) in enumerate(zip(values, covariances, strict=True)):
+        for one in groups:
+            one.take(number, row[one.columns], covariance[np.ix_(one.columns, one.columns)], level)
+    return [track for one in groups for track in one.tracks()], level

@@ -1,0 +1,35 @@
+"""Power of the diagnosis: how often it is right, by Monte Carlo over a virtual rig.
+
+plan -> sets of recordings by the virtual rig -> verdicts -> statistics
+"""
+
+from workbench.studies.power.journal import Diagnosed, Journal, NamedCause
+from workbench.studies.power.planting import Findable, Plantable, Planting, Repertoire, plan
+from workbench.studies.power.run import diagnose_sets
+from workbench.studies.power.statistics import CLEAR, VISIBLE, share, summarise
+from workbench.studies.power.virtual_rig import (
+    RecordedSets,
+    VirtualRig,
+    open_virtual_rig,
+    read_recorded_sets,
+)
+
+__all__ = [
+    "CLEAR",
+    "VISIBLE",
+    "Diagnosed",
+    "Findable",
+    "Journal",
+    "NamedCause",
+    "Plantable",
+    "Planting",
+    "RecordedSets",
+    "Repertoire",
+    "VirtualRig",
+    "diagnose_sets",
+    "open_virtual_rig",
+    "plan",
+    "read_recorded_sets",
+    "share",
+    "summarise",
+]

@@ -1,0 +1,114 @@
+"""The diagnosis as its power is measured: all effects of the library in one FMU, set by set."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from workbench import diagnosis
+from workbench.diagnosis import Diagnosis, Effect, catalogue
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.rivals import Rivals, gathered
+from workbench.diagnosis.inference.search import Fitted, examine, extended
+from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.models.modelica import read_library
+from workbench.recordings.case import Case
+from workbench.system.system import System
+
+
+def library_effects(system: System) -> tuple[Effect, ...]:
+    """Effects of a system's library, which a diagnosis may find.
+
+    Raises
+    ------
+    InputError
+        If the library cannot be read.
+    """
+    return catalogue(system, read_library(system.library))
+
+
+def build_everything(system: System, effects: Sequence[Effect], path: Path) -> None:
+    """Build the FMU of the observer model with every effect, at zero.
+
+    Raises
+    ------
+    InputError
+        If the library has errors.
+    """
+    diagnosis.build_everything(system, read_library(system.library), effects, path)
+
+
+def diagnose_set(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> Diagnosis:
+    """Diagnose one set of recordings, in this process alone."""
+    with _fit(system, effects, everything, cases) as (_, fit):
+        return conclude(fit, effects, _silent)
+
+
+def rivals_of_set(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> tuple[Diagnosis, Rivals | None]:
+    """Diagnose one set, and keep what it leaves undecided; None where no cause is found."""
+    with _fit(system, effects, everything, cases) as (simulations, fit):
+        found = conclude(fit, effects, _silent)
+        left = gathered(simulations, fit, found.base, found.rivals) if found.rivals else None
+        return found, left
+
+
+def distances_in_set(
+    system: System,
+    effects: Sequence[Effect],
+    everything: Path,
+    cases: Sequence[Case],
+    true: str,
+    others: Sequence[str],
+) -> tuple[Diagnosis, dict[str, float]]:
+    """Diagnose one set, and tell how far effects stay from the true one, each fitted alone.
+
+    What an experiment promises is the least chi-squared of a wrong model, in units of what the
+    right one leaves wrong in each channel. The fit of a diagnosis is another one, which lets a
+    channel go that is wrong. So each is fitted again, in these units.
+
+    Returns
+    -------
+    distances : by name [standard deviations], negative if it is nearer than the true one; of those
+        that could be fitted.
+    """
+    with _fit(system, effects, everything, cases) as (_, fit):
+        found = conclude(fit, effects, _silent)
+        base, trial = examine(fit, found.base, effects, _silent)
+        fits: dict[str, Fitted | None] = {}
+        for score in trial.scores():
+            name = score.effect.name
+            if name in (true, *others) and name not in fits:
+                fits[name] = extended(fit, base, score)
+        if (right := fits.get(true)) is None:
+            return found, {}
+        _, settled = fit.least(right.linearised, right.active, right.linearised.inflation)
+        units = fit.at(settled.point).inflation
+        least = {
+            name: fit.least(one.linearised, one.active, units)[0]
+            for name, one in fits.items()
+            if one is not None
+        }
+        return found, {name: distance(c - least[true]) for name, c in least.items() if name != true}
+
+
+def distance(apart: float) -> float:
+    """Standard deviations of a difference of chi-squared, with its sign."""
+    return float(np.sign(apart) * np.sqrt(abs(apart)))
+
+
+@contextmanager
+def _fit(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> Iterator[tuple[Simulations, Fit]]:
+    with Simulations(everything, system, system.given, cases, 1) as simulations:
+        yield simulations, Fit(simulations, effects)
+
+
+def _silent(line: str) -> None:
+    """Progress of each set would hide that of all."""

@@ -1,0 +1,237 @@
+"""Whether the recording that is proposed next parts what a set leaves together."""
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from workbench.diagnosis import Diagnosis, Effect
+from workbench.diagnosis.inference.rivals import Rivals
+from workbench.errors import InputError, WorkerError
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.studies.design import RankedExperiment, foreseen, next_stop, with_sensor
+from workbench.studies.design.candidates import drawn
+from workbench.studies.power.diagnosing import (
+    build_everything,
+    distance,
+    distances_in_set,
+    rivals_of_set,
+)
+from workbench.studies.power.planting import Group, Planting
+from workbench.studies.power.run import Setup
+from workbench.studies.power.statistics import share
+from workbench.studies.power.virtual_rig import FollowingRig, VirtualRig
+from workbench.system.system import System
+
+_DRAWN = 2  # experiments that are drawn for each set, to compare with
+_NEAR = 0.2  # share of a separation
+_NOISE = 2.0  # deviations by which noise moves it, in 95 %
+
+SHARES = {
+    "proposed": "groups that the recording which is proposed first parts",
+    "drawn": "recordings that are drawn which part their group",
+    "sensed": "groups that it parts with a sensor that is named, of those where one is",
+    "answered": "groups that it parts, with that sensor where one is named",
+    "foreseen": "groups that it parts, of those that it is foreseen to part",
+    "never": "groups that it parts, of those that no experiment is foreseen to part",
+    "separations": "separations of these recordings shown as predicted, within a fifth or noise",
+}
+"""Shares of `summarise_following`, by what they count."""
+
+
+def follow_proposals(
+    groups: Sequence[Group],
+    system: System,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    *,
+    workers: int,
+    report: Callable[[str], None],
+) -> tuple[list[dict[str, Any]], bool]:
+    """Make sets with one cause each, make what is proposed next, and diagnose all of it.
+
+    Parameters
+    ----------
+    groups : as planned; of them, sets with one cause of the catalogue.
+    effects : of the library, which may be found.
+    report : takes a line on each set.
+
+    Returns
+    -------
+    rows : one for each set, as they are written to followed.json; sets whose cause is named alone
+        have no proposal.
+    interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
+
+    Raises
+    ------
+    InputError
+        If the rig cannot make what is proposed.
+    """
+    if not isinstance(rig, FollowingRig):
+        raise InputError(
+            where=f"{system.source}, the companion's module 'planting'",
+            found="a virtual rig that makes no experiments",
+            expected="one with the method 'following'",
+            remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",
+        )
+    sets = [one for group in groups for one in group if one.kind == "single"]
+    rows: dict[int, dict[str, Any]] = {}
+    begin = time.perf_counter()
+    with TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
+        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
+        build_everything(system, effects, setup.everything)
+        with Pool(workers, nullcontext, setup, isolated=True) as pool:
+            numbers = {pool.submit(_row, one): k for k, one in enumerate(sets)}
+            try:
+                for task in as_completed(numbers):
+                    k = numbers[task]
+                    try:
+                        rows[k] = task.result()
+                    except WorkerError as error:
+                        rows[k] = _begun(sets[k]) | {"error": repr(error)}
+                    left = (time.perf_counter() - begin) / len(rows) * (len(sets) - len(rows))
+                    report(f"[{len(rows)}/{len(sets)}] {_said(rows[k])}; {left:.0f} s left")
+            except KeyboardInterrupt:
+                return [rows[k] for k in sorted(rows)], True
+    return [rows[k] for k in sorted(rows)], False
+
+
+def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Shares, see `SHARES`, of groups that hold the planted effect."""
+    groups = [one for one in rows if one["proposed"] is not None]
+    made = [one["proposed"] for one in groups]
+    drawn_ = [one for row in groups for one in row["drawn"]]
+    away = [one for recording in (*made, *drawn_) for one in recording["separations"]]
+    return {
+        "proposed": share(one["parts"] for one in made),
+        "drawn": share(one["parts"] for one in drawn_),
+        "sensed": share(one["parts"] for row in groups if (one := row["sensed"]) is not None),
+        "answered": share((row["sensed"] or row["proposed"])["parts"] for row in groups),
+        "foreseen": share(one["parts"] for one in made if one["foreseen"]),
+        "never": share(one["parts"] for one in made if not one["foreseen"]),
+        "separations": share(map(_as_predicted, away)),
+    }
+
+
+def _as_predicted(one: dict[str, Any]) -> bool:
+    """Whether a separation is within a fifth, or what noise moves its square by: twice itself."""
+    predicted, shown = one["predicted"], one["shown"]
+    if shown is None:
+        return False
+    near = ((1.0 + _NEAR) ** 2 - 1.0) * predicted**2
+    noise = _NOISE * 2.0 * max(abs(predicted), 1.0)
+    return bool(abs(shown * abs(shown) - predicted * abs(predicted)) <= max(near, noise))
+
+
+def _begun(planting: Planting) -> dict[str, Any]:
+    return {
+        "rig": planting.options,
+        "planted": planting.effects[0],
+        "multiple": planting.multiple,
+        "verdict": "failed",
+        "group": [],
+        "sentence": "",
+        "sensors": [],
+        "proposed": None,
+        "drawn": [],
+        "sensed": None,
+        "error": "",
+    }
+
+
+def _said(row: dict[str, Any]) -> str:
+    group = " or ".join(row["group"]) or row["verdict"]
+    made = row["proposed"]
+    then = "" if made is None else f" -> {' or '.join(made['named']) or made['verdict']}"
+    return f"{row['planted']}: {group}{then}{row['error']}"
+
+
+def _row(setup: Setup, planting: Planting) -> dict[str, Any]:
+    """What is said of a set, what is proposed, and what is said then."""
+    row = _begun(planting)
+    try:
+        _fill(row, setup, planting)
+    except Exception as error:  # one set must not end a run of hours; it is counted
+        row["error"] = repr(error)
+    return row
+
+
+def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
+    (planted,) = planting.effects
+    cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
+    found, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
+    row["verdict"], row["group"] = found.verdict, _named(found)
+    if rivals is None or len(rivals.models) == 1:
+        return
+    experiments = setup.system.experiments
+    asked = next_stop(setup.system, rivals, 1, _silent)
+    row["sentence"], row["sensors"] = asked.sentence, list(asked.sensors)
+    if planted not in asked.names:
+        return
+    assert experiments is not None  # or nothing were proposed
+    rng = np.random.default_rng(planting.seed)
+    plan = [drawn(experiments, rng) for _ in range(_DRAWN)]
+    rest = (setup, planting, rivals, cases)
+    row["proposed"] = _made(asked.tried[0], *rest)
+    if not row["proposed"]["foreseen"]:
+        at = asked.names.index(planted)
+        for sensor in experiments.sensors:
+            sensed = asked.sensors.get(sensor.label)
+            if sensed is not None and (at,) in sensed.prediction.groups:
+                fitted = replace(setup, system=with_sensor(setup.system, sensor))
+                row["sensed"] = {"sensor": sensor.label, **_made(sensed, fitted, *rest[1:])}
+                break
+    row["drawn"] = [_made(one, *rest) for one in foreseen(setup.system, rivals, plan, 1)]
+
+
+def _made(
+    one: RankedExperiment,
+    setup: Setup,
+    planting: Planting,
+    rivals: Rivals,
+    cases: Sequence[Case],
+) -> dict[str, Any]:
+    """What is said of all recordings with one more, and what was foreseen."""
+    assert isinstance(setup.rig, FollowingRig)
+    (planted,) = planting.effects
+    names = [" with ".join(model.effects) for model in rivals.models]
+    at = names.index(planted)
+    rig = setup.rig.following(one.to_dict(), setup.system)
+    more = replace(setup, rig=rig).recorded(planting, rig.simulate(planting.seed, planting.gains))
+    others = [name for name in names if name != planted]
+    found, shown = distances_in_set(
+        *(setup.system, setup.effects, setup.everything, [*cases, *more], planted, others),
+    )
+    named = _named(found)
+    return {
+        "experiment": one.text,
+        "foreseen": (at,) in one.prediction.groups,
+        "verdict": found.verdict,
+        "named": named,
+        "parts": named == [planted],
+        "separations": [
+            {
+                "from": name,
+                "predicted": distance(float(one.prediction.apart[at, j])),
+                "shown": shown.get(name),
+            }
+            for j, name in enumerate(names)
+            if j != at
+        ],
+    }
+
+
+def _named(found: Diagnosis) -> list[str]:
+    """Causes, with those that are as good."""
+    return [name for cause in found.causes for name in (cause.effect.name, *cause.confusable_with)]
+
+
+def _silent(line: str) -> None:
+    """Progress of each set would hide that of all."""

@@ -1,0 +1,78 @@
+"""How far a proposed law is from the true one, along recordings that neither was fitted to."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis import Outcome, given_values
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.laws import Proposal
+from workbench.diagnosis.laws.scan import watching
+from workbench.diagnosis.laws.writing import extended_library
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.models.modelica import Library
+from workbench.recordings.case import Case
+from workbench.system.system import OBSERVER, System
+
+
+def function_error(
+    system: System,
+    library: Library,
+    cases: Sequence[Case],
+    known: Outcome,
+    found: Proposal,
+    effect: Effect,
+) -> float | None:
+    """Error of the first law that is proposed, over the range of what the true cause does.
+
+    Both are what the output of their slot becomes, as each was fitted, with the levels that were
+    calibrated beside it.
+
+    Parameters
+    ----------
+    cases : recordings that were not fitted.
+    known : of the diagnosis with the true cause in its catalogue.
+    effect : that cause, of the library.
+
+    Returns
+    -------
+    error : root mean square over range; None where the law acts elsewhere, the true cause was not
+        found, or phases are free in each recording.
+    """
+    if not found.laws or found.outcome is None:
+        return None
+    law = found.forms[found.laws[0].effect.name].law
+    true, proposed = known.diagnosis.best, found.outcome.diagnosis.best
+    every = {one.name: one for one in (*true.active, *proposed.active)}
+    elsewhere = law.place.slot.name not in effect.slots or effect not in true.active
+    if elsewhere or any(one.order_locked for one in every.values()):
+        return None
+    base = system.models[OBSERVER].name
+    with tempfile.TemporaryDirectory() as scratch:
+        written = [found.forms[cause.effect.name].written for cause in found.laws]
+        extended = extended_library(library, written, Path(scratch))
+        effects, path = list(every.values()), Path(scratch) / "Both.fmu"
+        text = source(extended, base, "Both", effects, {}, {}, "With the law and the true cause")
+        output = f"{law.place.slot.name}.{law.place.output.name}"
+        build(extended, "Both", watching(text, [output]), path, every_platform=False)
+        with Simulations(path, system, given_values(path, system), cases, 1) as simulations:
+            fit = Fit(simulations, effects)
+            without, right, seen = (
+                _along(simulations, fit, one) for one in (known.diagnosis.base, true, proposed)
+            )
+    return float(np.sqrt(np.mean((seen - right) ** 2)) / np.ptp(right - without))
+
+
+def _along(simulations: Simulations, fit: Fit, fitted: Fitted) -> Vector:
+    """What is watched, along all recordings, as a model was fitted, each recording as usual."""
+    usual = np.zeros((fit.unknowns.count, fitted.point.deviations.shape[1]))
+    point = replace(fitted.point, deviations=usual)
+    tables = simulations.along(fit.unknowns.values(point), ["watched0"])
+    return np.concatenate([table[:, 0] for table in tables])

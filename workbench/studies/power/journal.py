@@ -1,0 +1,187 @@
+"""Verdicts on sets of recordings, one line of a file each, which a killed run leaves whole."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from workbench.diagnosis import Diagnosis
+from workbench.errors import InputError
+from workbench.runtime.files import (
+    append_line,
+    before_last,
+    read_text,
+    sealed,
+    unsealed,
+    write_whole,
+)
+from workbench.studies.power.planting import Planting, Repertoire
+
+
+@dataclass(frozen=True)
+class NamedCause:
+    """A cause that was named.
+
+    Attributes
+    ----------
+    parameters : (value, low, high) by name, SI.
+    """
+
+    effect: str
+    parameters: Mapping[str, tuple[float, float, float]]
+    confusable_with: tuple[str, ...]
+
+    @property
+    def group(self) -> set[str]:
+        """All effects that this may be, by its own account."""
+        return {self.effect, *self.confusable_with}
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """What was said of one set of recordings.
+
+    Attributes
+    ----------
+    verdict : of the diagnosis, or "failed".
+    causes : strongest first.
+    before, after : held-out error of both models, None if nothing was found.
+    seconds : of computing.
+    error : why it failed.
+    clearness : size that was planted, over the standard deviation of its estimate about the
+        nominal model; None if that was not one effect of the catalogue.
+    """
+
+    planting: Planting
+    verdict: str
+    causes: tuple[NamedCause, ...]
+    before: float | None
+    after: float | None
+    seconds: float
+    error: str = ""
+    clearness: float | None = None
+
+    @property
+    def first(self) -> str:
+        """What is said first: the strongest cause, or the verdict."""
+        return self.causes[0].effect if self.causes else self.verdict
+
+
+def diagnosed(
+    planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire, seconds: float
+) -> Diagnosed:
+    """Keep what statistics need of a diagnosis."""
+    causes = tuple(
+        NamedCause(
+            cause.effect.name,
+            {
+                name: (float(one.value), float(one.low), float(one.high))
+                for name, one in cause.parameters.items()
+            },
+            cause.confusable_with,
+        )
+        for cause in diagnosis.causes
+    )
+    gain = diagnosis.gain
+    before, after = (None, None) if gain is None else (gain.before, gain.after)
+    clearness = _clearness(planting, diagnosis, repertoire)
+    return Diagnosed(
+        planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
+    )
+
+
+def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire) -> float | None:
+    if planting.kind != "single":
+        return None
+    ((name, gain),) = planting.gains.items()
+    planted = repertoire.plantable(name)
+    sigmas = [
+        score.sigma
+        for score in diagnosis.scores
+        if score.effect.name == planted.effect and dict(score.shape) == dict(planted.shapes)
+    ]
+    return float(abs(gain) / sigmas[0]) if sigmas else None
+
+
+class Journal:
+    """A file of verdicts: a line that says what they depend on, then one line for each set.
+
+    Each has a checksum; a line that is damaged is left out, so that its set is diagnosed again, and
+    so is a second one on a set. The file that an earlier run left is kept beside it.
+
+    Parameters
+    ----------
+    identity : all that a verdict depends on; only verdicts of the same may stand together.
+    resume : whether to go on from what is there, instead of beginning anew.
+
+    Attributes
+    ----------
+    results : in the order of the file.
+    damaged : numbers of the lines that were left out.
+
+    Raises
+    ------
+    InputError
+        If the file is no journal, or one of other verdicts.
+    """
+
+    def __init__(self, path: Path, identity: Mapping[str, Any], *, resume: bool) -> None:
+        self.results: list[Diagnosed] = []
+        self.damaged: list[int] = []
+        self._path = path
+        if path.exists():
+            text = read_text(path, "run without --resume, or give another --out")
+            if resume:
+                self._parse(text, identity)
+            write_whole(before_last(path), text)
+        lines = [sealed(identity), *(sealed(asdict(one)) for one in self.results)]
+        write_whole(path, "".join(f"{line}\n" for line in lines))
+
+    def append(self, result: Diagnosed) -> None:
+        """Add a verdict; it is on the disk when this returns."""
+        self.results.append(result)
+        append_line(self._path, sealed(asdict(result)))
+
+    def _parse(self, text: str, identity: Mapping[str, Any]) -> None:
+        # What follows the last line feed was being written when the run was killed.
+        head, *lines = text.split("\n")[:-1] or [""]
+        try:
+            found = unsealed(head)
+        except (ValueError, RecursionError) as error:
+            raise InputError(
+                where=f"{self._path}, line 1",
+                found=f"no verdicts as they were written ({error})",
+                expected="what an earlier run wrote",
+                remedy=f"put {before_last(self._path).name} in its place, if it is there, or run "
+                "without --resume",
+            ) from None
+        if found != identity:
+            other = next((key for key in identity if found.get(key) != identity[key]), "more")
+            raise InputError(
+                where=str(self._path),
+                found=f"verdicts of another run (other: {other})",
+                expected="the same seed, recordings, FMUs and code",
+                remedy="give another --out, or run without --resume",
+            )
+        for number, line in enumerate(lines, start=2):
+            try:
+                result = _result(unsealed(line))
+                if any(one.planting == result.planting for one in self.results):
+                    raise ValueError("a second verdict on a set")
+                self.results.append(result)
+            except (ValueError, KeyError, TypeError, RecursionError):
+                self.damaged.append(number)
+
+
+def _result(content: dict[str, Any]) -> Diagnosed:
+    causes = tuple(
+        NamedCause(
+            one["effect"],
+            {name: tuple(values) for name, values in one["parameters"].items()},
+            tuple(one["confusable_with"]),
+        )
+        for one in content["causes"]
+    )
+    planted = content["planting"]
+    planting = Planting(**{**planted, "effects": tuple(planted["effects"])})
+    return Diagnosed(**{**content, "planting": planting, "causes": causes})

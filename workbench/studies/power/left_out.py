@@ -1,0 +1,161 @@
+"""What is proposed for a cause that the catalogue lacks: each effect left out in turn."""
+
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from workbench.diagnosis import Effect, diagnose
+from workbench.diagnosis.laws import Proposal, needs_law, propose
+from workbench.models.modelica import Library
+from workbench.recordings.case import read_cases
+from workbench.studies.power.function_error import function_error
+from workbench.studies.power.planting import Group, Planting
+from workbench.studies.power.statistics import share
+from workbench.studies.power.virtual_rig import VirtualRig
+from workbench.system.system import System
+
+_WORTH = 0.8  # of what the true form gains
+_NEAR = 0.15  # of the range of what a cause does
+
+SHARES = {
+    "right_slot": "sets with the right slot, of those whose cause nothing else explains",
+    "gain": "laws that gain four fifths of what the true form gains",
+    "function": "laws within 15 % of the range of what the cause does, on recordings anew",
+    "outside": "of them, sets whose cause is in no catalogue",
+    "clean": "sets without a cause for which something is proposed",
+}
+"""Shares of `summarise_left_out`, by what they count."""
+
+
+def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Shares, see `SHARES`; what other effects or clocks explain as well asks for no law."""
+    asked = [row for row in rows if row["asked"] and row["slot_right"] is not None]
+    known = [row for row in asked if row["laws"] and row["after_with_it"] is not None]
+    clean = [row for row in rows if row["slot_right"] is None and not row["left_out"]]
+    return {
+        "right_slot": share(row["slot_right"] for row in asked),
+        "outside": share(row["slot_right"] for row in asked if not row["left_out"]),
+        "gain": share(map(_gains, known)),
+        "function": share(
+            row["function_error"] <= _NEAR for row in known if row["function_error"] is not None
+        ),
+        "clean": share(bool(row["laws"]) for row in clean),
+    }
+
+
+def _gains(row: Mapping[str, Any]) -> bool:
+    return bool(row["before"] - row["after"] >= _WORTH * (row["before"] - row["after_with_it"]))
+
+
+def propose_left_out(
+    groups: Sequence[Group],
+    system: System,
+    library: Library,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    *,
+    workers: int,
+    report: Callable[[str], None],
+) -> tuple[list[dict[str, Any]], bool]:
+    """Make sets with one cause each, and diagnose them with a catalogue that lacks it.
+
+    Parameters
+    ----------
+    groups : as planned; of each the first set is made, if it has one cause or none.
+    effects : of the library.
+    report : takes a line on what is being done.
+
+    Returns
+    -------
+    rows : one for each set, as they are written to left_out.json.
+    interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
+    """
+    sets = [group[0] for group in groups if group[0].kind != "pair"]
+    rows: list[dict[str, Any]] = []
+    begin = time.perf_counter()
+    try:
+        for number, planting in enumerate(sets):
+            rows.append(_row(planting, system, library, rig, effects, workers))
+            left = (time.perf_counter() - begin) / (number + 1) * (len(sets) - number - 1)
+            said = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
+            report(f"[{number + 1}/{len(sets)}] {planting.options}: {said}; {left:.0f} s left")
+    except KeyboardInterrupt:
+        return rows, True
+    return rows, False
+
+
+def _row(
+    planting: Planting,
+    system: System,
+    library: Library,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    workers: int,
+) -> dict[str, Any]:
+    planted = [one for one in effects if one.name in planting.effects]
+    others = [one for one in effects if one not in planted]
+    acting = {slot for one in planted for slot in one.slots}
+    acting |= {one.slot for one in rig.plantables if one.name in planting.gains and one.slot}
+    row: dict[str, Any] = {
+        "rig": planting.options,
+        "left_out": [one.name for one in planted],
+        "verdict": "failed",
+        "named": [],
+        "late": [],
+        "asked": False,
+        "laws": [],
+        "slots": [],
+        "slot_right": None,
+        "before": None,
+        "after": None,
+        "after_with_it": None,
+        "function_error": None,
+        "error": "",
+    }
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            recordings, out, new = (Path(scratch) / name for name in ("recordings", "out", "new"))
+            simulated = rig.simulate(planting.seed, planting.gains)
+            rig.write(simulated, planting.gains, recordings)
+            cases = read_cases([recordings], system)
+            before = diagnose(system, cases, library, others, out, workers, _silent)
+            row["verdict"] = before.diagnosis.verdict
+            row["named"] = [cause.effect.name for cause in before.diagnosis.causes]
+            late = before.diagnosis.late
+            row["late"] = [] if late is None else list(late.signals)
+            row["asked"] = needs_law(before)
+            if row["asked"]:
+                found = propose(before, library, others, out, workers, _silent)
+                row |= _told(found)
+                if planted and found.laws:
+                    known = diagnose(system, cases, library, effects, out, workers, _silent)
+                    gain = known.diagnosis.gain
+                    row["after_with_it"] = None if gain is None else gain.after
+                    rig.write(rig.simulate(planting.seed + 1, planting.gains), planting.gains, new)
+                    fresh = read_cases([new], system)
+                    row["function_error"] = function_error(
+                        system, library, fresh, known, found, planted[0]
+                    )
+    except Exception as error:  # one set must not end a run of hours; it is counted
+        row["error"] = repr(error)
+    if acting:
+        row["slot_right"] = bool(acting & {*row["slots"]})
+    return row
+
+
+def _told(found: Proposal) -> dict[str, Any]:
+    """What is proposed; its slots are also those of laws that are as good."""
+    laws = [one.law for one in found.forms.values()] if found.laws else []
+    gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
+    return {
+        "laws": [found.said(law) for law in found.laws],
+        "slots": list(dict.fromkeys(law.place.slot.name for law in laws)),
+        "before": None if gain is None else gain.before,
+        "after": None if gain is None else gain.after,
+    }
+
+
+def _silent(line: str) -> None:
+    """Progress of each set would hide that of all."""

@@ -1,0 +1,125 @@
+"""What a campaign of recordings would show, before one of them is made."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.special import chndtrinc
+from scipy.stats import ncx2
+
+from workbench.diagnosis import Diagnosis, Effect
+from workbench.diagnosis.inference.thresholds import Thresholds, of_system
+from workbench.studies.power.diagnosing import build_everything, diagnose_set
+from workbench.studies.power.planting import Plantable, Planting
+from workbench.studies.power.run import Setup
+from workbench.studies.power.virtual_rig import VirtualRig
+from workbench.system.system import System
+
+SURE = 0.95  # chance from which on a size is called found
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What a campaign would show of one effect.
+
+    Attributes
+    ----------
+    effect, unit : of the library, and of its sizes, SI.
+    matters : least size that is worth a finding [unit].
+    sigma : standard deviation of its estimate [unit]; None where the campaign cannot show it.
+    chances : (size, chance that it is named) [unit, 1].
+    least : size from which on it is named with the chance `SURE` [unit]; None as `sigma`.
+    """
+
+    effect: str
+    unit: str
+    matters: float
+    sigma: float | None
+    chances: tuple[tuple[float, float], ...]
+    least: float | None
+
+
+def foresee(
+    system: System,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    wanted: Sequence[Plantable],
+    sizes: Sequence[float],
+    seed: int,
+) -> list[Foreseen]:
+    """Chances that effects are named, from one set of recordings without any.
+
+    Parameters
+    ----------
+    rig : makes the recordings of the campaign.
+    effects : of the system's library, which may be found.
+    wanted : those that the campaign is asked for.
+    sizes : multiples of what matters.
+    seed : of the machine's tolerances and the sensors' noise.
+
+    Raises
+    ------
+    InputError
+        If a model or the library is not what it should be.
+    """
+    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
+        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
+        build_everything(system, effects, setup.everything)
+        cases = setup.recorded(Planting("clean", seed, 0.0, {}, ()), rig.simulate(seed, {}))
+        found = diagnose_set(system, effects, setup.everything, cases)
+    decides = of_system(system.comparison, len(effects))
+    known = {one.name: one for one in effects}
+    return [
+        _foreseen(known[one.effect], one, found, sizes, decides)
+        for one in wanted
+        if one.effect in known
+    ]
+
+
+def _foreseen(
+    effect: Effect,
+    planted: Plantable,
+    found: Diagnosis,
+    sizes: Sequence[float],
+    decides: Thresholds,
+) -> Foreseen:
+    asked = [factor * effect.matters for factor in sizes]
+    for score in found.scores:
+        if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
+            unknowns = 1 + len(score.phases) * effect.order_locked
+            return Foreseen(
+                *(effect.name, planted.unit, effect.matters, score.sigma),
+                chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in asked),
+                least=max(effect.matters, score.sigma * clear(unknowns, decides)),
+            )
+    return Foreseen(effect.name, planted.unit, effect.matters, None, (), None)
+
+
+def chance(distance: float, unknowns: int, decides: Thresholds) -> float:
+    """Chance that an effect is significant.
+
+    By what it lowers chi-squared is non-central chi-squared, of as many degrees of freedom as it
+    has unknowns (S. S. Wilks, 1938; A. Wald, 1943, Trans. Amer. Math. Soc. 54, 426-482).
+
+    Parameters
+    ----------
+    distance : size over the standard deviation of its estimate.
+    unknowns : size, and phases of an effect that turns.
+
+    Examples
+    --------
+    What stands at the threshold itself is found in every other set:
+
+    >>> from workbench.diagnosis.inference.thresholds import thresholds
+    >>> decides = thresholds(28)
+    >>> round(chance(decides.significant, 1, decides), 3), round(chance(0.0, 1, decides), 6)
+    (0.5, 7.1e-05)
+    """
+    return float(ncx2.sf(decides.fall_of(unknowns), unknowns, distance**2))
+
+
+def clear(unknowns: int, decides: Thresholds) -> float:
+    """Size from which on an effect is found with the chance `SURE` [standard deviations]."""
+    return float(np.sqrt(chndtrinc(decides.fall_of(unknowns), unknowns, 1.0 - SURE)))

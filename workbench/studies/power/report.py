@@ -1,0 +1,532 @@
+"""Power of the diagnosis: figures, file and table."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from workbench.diagnosis.outcome import draw_heat
+from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.figures import LIGHT, STYLE, save_figure
+from workbench.pages.measures import share_measure, share_with_interval
+from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
+from workbench.runtime.files import write_json
+from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
+from workbench.studies.power.planned import SURE, Foreseen
+from workbench.studies.power.sensitivity import FACTORS, Varied
+from workbench.system.units import with_unit
+
+
+def write_thresholds(
+    results: Sequence[Varied],
+    usual: Mapping[str, float],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write thresholds.json.
+
+    Parameters
+    ----------
+    usual : value of each threshold.
+    """
+    sets = [
+        {
+            "rig": one.planting.options,
+            "kind": one.planting.kind,
+            "planted": one.planting.effects,
+            "said": one.said,
+            "changed": [asdict(other) for other in one.changed],
+        }
+        for one in results
+    ]
+    changes = sum(bool(one.changed) for one in results)
+    sentence = (
+        f"Half or twice of a threshold changes what is said of {changes} of {len(results)} sets."
+    )
+    headline = {"sets of which something else is said": Measure(float(changes), "1", "lower")}
+    content = {"provenance": provenance, "usual": usual, "sets": sets}
+    write_json(out / "thresholds.json", with_answer(Answer(sentence, headline), content))
+
+
+def format_thresholds(results: Sequence[Varied], usual: Mapping[str, float]) -> str:
+    """Table of what changes, and the thresholds that change nothing."""
+    lines = [f"{len(results)} sets, each threshold times {' and '.join(map(str, FACTORS))}", ""]
+    idle = []
+    for name, value in usual.items():
+        rows = [
+            (change, one) for one in results for change in one.changed if change.threshold == name
+        ]
+        if not rows:
+            idle.append(f"{name} {value:.4g}")
+        for change, one in rows:
+            lines.append(
+                f"{name} {value:.4g} -> {change.value:.4g}: {', '.join(one.said)} becomes "
+                f"{', '.join(change.said)} ({one.planting.options})"
+            )
+    return "\n".join([*lines, "", f"nothing changes by: {', '.join(idle)}"])
+
+
+def write_sheet(
+    rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
+) -> None:
+    """Write sheet_error.json."""
+    wrong = sum(row["wrong_name"] for row in rows)
+    sentence = f"A wrong data sheet leads to a wrong name in {wrong} of {len(rows)} sets."
+    headline = {"sets with a wrong name": Measure(float(wrong), "1", "lower")}
+    content = {"provenance": provenance, "sets": list(rows)}
+    write_json(out / "sheet_error.json", with_answer(Answer(sentence, headline), content))
+
+
+def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was said, and the number of wrong names."""
+    lines = [f"{'wrong in the sheet':<26} {'verdict':<12} causes"]
+    for row in rows:
+        error = " ".join(f"{name}={gain:+g}" for name, gain in row["wrong"].items())
+        causes = ", ".join(" or ".join(group) for group in row["causes"])
+        mark = "  WRONG NAME" if row["wrong_name"] else ""
+        lines.append(f"{error:<26} {row['verdict']:<12} {causes or row['error']}{mark}")
+    wrong = sum(row["wrong_name"] for row in rows)
+    return "\n".join([*lines, "", f"{wrong} of {len(rows)} sets have a wrong name"])
+
+
+def write_left_out(
+    summary: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write left_out.json.
+
+    Parameters
+    ----------
+    summary : shares of all.
+    """
+    right = summary["right_slot"]
+    sentence = (
+        f"The slot of the cause that was left out is proposed in {right['hits']} of {right['of']} "
+        "sets that nothing else explains."
+    )
+    answer = Answer(sentence, _measures(summary, left_out.SHARES, lower=("clean",)))
+    content = {"provenance": provenance, **summary, "sets": list(rows)}
+    write_json(out / "left_out.json", with_answer(answer, content))
+
+
+def format_left_out(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was proposed, and how often it acts where the cause did."""
+    lines = []
+    for row in rows:
+        what = ", ".join(row["left_out"]) or row["rig"]
+        mark = {True: "right slot", False: "NOT THE SLOT", None: "no cause"}[row["slot_right"]]
+        said = "; ".join(row["laws"]) or row["error"] or _nothing(row)
+        lines.append(f"{what:<30} {mark if row['asked'] else '':<16} {said}")
+    return "\n".join([*lines, "", *_shares(summary, left_out.SHARES)])
+
+
+def _nothing(row: Mapping[str, Any]) -> str:
+    named = f", {' and '.join(row['named'])}" * bool(row["named"])
+    late = f", {' and '.join(row['late'])} late" * bool(row["late"])
+    return f"nothing proposed ({row['verdict']}{named}{late})"
+
+
+def _measures(
+    summary: Mapping[str, Any], texts: Mapping[str, str], lower: Sequence[str]
+) -> dict[str, Measure]:
+    """Shares as numbers of an answer."""
+    return {
+        texts[name]: Measure(
+            one["share"], "1", "lower" if name in lower else "higher", one["low"], one["high"]
+        )
+        for name, one in summary.items()
+    }
+
+
+def _shares(summary: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
+    return [
+        f"{one['hits']} of {one['of']} {texts[name]} ({one['low']:.0%} to {one['high']:.0%})"
+        for name, one in summary.items()
+    ]
+
+
+def write_followed(
+    summary: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write followed.json.
+
+    Parameters
+    ----------
+    summary : shares of all.
+    """
+    made, drawn = summary["proposed"], summary["drawn"]
+    sentence = (
+        f"The recording that is proposed parts {made['hits']} of {made['of']} groups, one that is "
+        f"drawn {drawn['hits']} of {drawn['of']}."
+    )
+    headline = _measures(summary, following.SHARES, lower=("drawn", "never"))
+    content = {"provenance": provenance, **summary, "sets": list(rows)}
+    write_json(out / "followed.json", with_answer(Answer(sentence, headline), content))
+
+
+def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Table of what was left together and what was said then, and all shares."""
+    lines = []
+    for row in rows:
+        made = row["proposed"]
+        said = " or ".join(row["group"]) or row["error"] or row["verdict"]
+        if made is not None:
+            then = " or ".join(made["named"]) or made["verdict"]
+            drawn = ["parts" if one["parts"] else "does not" for one in row["drawn"]]
+            said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+        if (sensed := row["sensed"]) is not None:
+            then = " or ".join(sensed["named"]) or sensed["verdict"]
+            said += f"; with a sensor of {sensed['sensor']}: {then}"
+        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
+    return "\n".join([*lines, "", *_shares(summary, following.SHARES)])
+
+
+def write_plan(
+    rows: Sequence[Foreseen], sizes: Sequence[float], provenance: Mapping[str, Any], out: Path
+) -> None:
+    """Write plan.json and the figure of chances.
+
+    Parameters
+    ----------
+    sizes : multiples of what matters.
+    """
+    seen = sum(one.least is not None and one.least <= sizes[-1] * one.matters for one in rows)
+    sentence = (
+        f"Of {len(rows)} effects, these recordings show {seen} with a chance of {SURE:.0%} or more "
+        f"at {sizes[-1]:g} times the size that matters."
+    )
+    headline = {f"effects shown at {sizes[-1]:g} times": Measure(float(seen), "1", "higher")}
+    content = {"provenance": provenance, "sizes": list(sizes), "effects": list(map(asdict, rows))}
+    write_json(out / "plan.json", with_answer(Answer(sentence, headline), content))
+    with mpl.rc_context(STYLE):
+        save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
+
+
+def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
+    """Table of chances, by size."""
+    lines = [f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
+    lines[0] += f"{f'found by {SURE:.0%} from':>24}"
+    for one in rows:
+        row = f"{one.effect:<30}{with_unit(one.matters, one.unit):>18}"
+        if one.least is None:
+            lines.append(f"{row}  these recordings cannot show it")
+            continue
+        row += "".join(f"{f'{chance:.0%}':>8}" for _, chance in one.chances)
+        lines.append(f"{row}{with_unit(one.least, one.unit):>24}")
+    return "\n".join(lines)
+
+
+def _chances(rows: Sequence[Foreseen], sizes: Sequence[float]) -> Figure:
+    """Chance that an effect is named [%], by effect and size."""
+    table = np.array(
+        [[100.0 * c for _, c in one.chances] or [0.0] * len(sizes) for one in rows]
+    ).reshape(len(rows), len(sizes))
+    sheet = Figure(figsize=(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)), layout="constrained")
+    axes = sheet.subplots()
+    axes.grid(visible=False)
+    draw_heat(axes, table, 100.0)
+    axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
+    axes.set_yticks(range(len(rows)), [one.effect for one in rows])
+    axes.set_xlabel("size over the least that matters")
+    sheet.suptitle("Chance that the planned recordings show it [%]")
+    return sheet
+
+
+_STYLE = "2"
+
+
+_INTERVAL = (
+    "Intervals hold the true share in at least 95 % of such runs, however few sets there are "
+    "(Clopper and Pearson 1934)."
+)
+
+
+def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
+    """Write the page into the folder; returns its path.
+
+    Parameters
+    ----------
+    summary : as written to power.json.
+    """
+    provenance = summary["provenance"]
+    warnings = []
+    if provenance["interrupted"]:
+        warnings.append("Interrupted: the same command with --resume goes on from here.")
+    if summary["failed"]:
+        warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
+    parts = [
+        Part("shown", "How often it is right", (_INTERVAL,), dots=(_share_dots(summary),)),
+        Part("definitions", "Definitions", terms=_TERMS),
+    ]
+    if summary["effects"]:
+        tables = (_effects(summary),)
+        parts.insert(1, Part("effects", "By effect and size", tables=tables, printed=True))
+    if summary["confusion"]:
+        parts.insert(
+            -1, Part("confusion", "What is taken for what", tables=(_confusion_rows(summary),))
+        )
+    path = out / "index.html"
+    title = f"How often the diagnosis is right: {summary['sets']} sets of recordings"
+    write_parts(title, summary, parts, path, file="power.json", warnings=warnings)
+    return path
+
+
+def _share_dots(summary: Mapping[str, Any]) -> Dots:
+    """The headline as dots with their intervals."""
+    rows = []
+    for name, one in summary["answer"]["headline"].items():
+        known = one["value"] is not None
+        dot = (Dot(one["value"], _STYLE, one["low"], one["high"]),) if known else ()
+        rows.append((name, dot))
+    told = [
+        f"{name} {one['value']:.0f} %"
+        for name, one in summary["answer"]["headline"].items()
+        if one["value"] is not None
+    ]
+    finding = "Shares of sets with their 95 % intervals: " + (", ".join(told) or "none") + "."
+    return Dots(finding, "share of sets [%]", tuple(rows), high=100.0)
+
+
+def _effects(summary: Mapping[str, Any]) -> Rows:
+    """Effects by sizes, a cell for each share."""
+    effects = summary["effects"]
+    sizes = sorted({size for one in effects.values() for size in one["right_first"]}, key=float)
+    columns = [
+        Heading("effect", number=False),
+        Heading("1 is", number=False, meaning="least size that is worth a finding"),
+        *(Heading(f"x {size} [%]") for size in sizes),
+        Heading("intervals hold [%]"),
+        Heading("remark", number=False),
+    ]
+    rows = []
+    for name, one in effects.items():
+        cells = [Cell(with_unit(one["size"], one["unit"]))]
+        cells += [_share(one["right_first"].get(size)) for size in sizes]
+        cells += [_share(one["coverage"]), Cell("hidden" if one["hidden"] else "")]
+        rows.append((name, tuple(cells)))
+    caption = (
+        "Share of sets in which the planted effect, or a group that it is in, is named first, by "
+        "its size over the least that is worth a finding; hits and sets in brackets."
+    )
+    return Rows("effect-table", caption, tuple(columns), tuple(rows))
+
+
+def _share(one: Mapping[str, Any] | None) -> Cell:
+    if one is None or not one["of"]:
+        return Cell("n/a")
+    counts = f"({one['hits']}/{one['of']})"
+    return number(
+        100.0 * one["share"], lambda percent: f"{percent:.0f} {counts}", heat=one["share"]
+    )
+
+
+def _confusion_rows(summary: Mapping[str, Any]) -> Rows:
+    """Planted by named."""
+    said = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
+    rows = []
+    for planted, row in summary["confusion"].items():
+        of = sum(row.values())
+        cells = tuple(
+            number(float(row.get(name, 0)), "{:.0f}".format, row.get(name, 0) / of if of else 0.0)
+            for name in said
+        )
+        rows.append((planted, cells))
+    caption = f"Sets by what was planted (rows, from size {VISIBLE:g} on) and what was named first."
+    columns = (Heading("planted", number=False), *(Heading(name) for name in said))
+    return Rows("confusion-table", caption, columns, tuple(rows))
+
+
+_TERMS = {
+    "Set": "Recordings of one virtual machine, with tolerances of its own, in which one effect, "
+    "two, one that the catalogue lacks, or none was planted.",
+    "Right": "The effect that was planted is named first, or is in the group of those that the "
+    "data cannot tell from the one named.",
+    "False alarm": "A cause is named, or something called unexplained, in a set without any.",
+    "Hidden": "No recording of this kind can show it; it counts as neither right nor wrong.",
+}
+
+_COLUMNS = 5  # of power curves
+
+
+_LINE, _MARK = LIGHT["2"], LIGHT["0"]
+
+
+def write_power(
+    summary: Mapping[str, Any],
+    effects: Sequence[Findable],
+    provenance: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Write power.json and, as PNG and SVG, what there is of curves, confusion and coverage.
+
+    Parameters
+    ----------
+    effects : of the library, in whose order they stand.
+    """
+    content = {"provenance": provenance, **summary}
+    told = with_answer(powered(summary), content)
+    write_json(out / "power.json", told)
+    write_power_page(told, out)
+    names = [effect.name for effect in effects]
+    measured = summary["effects"]
+    with mpl.rc_context(STYLE | {"font.size": 8}):
+        figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
+        if measured:
+            figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
+        for name, figure in figures.items():
+            save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
+
+
+def _curves(effects: Mapping[str, Any]) -> Figure:
+    """Share named right against size, one panel for each effect."""
+    columns = min(_COLUMNS, len(effects))
+    rows = -(-len(effects) // columns)
+    sheet = Figure(figsize=(0.6 + 2.1 * columns, 1.0 + 1.4 * rows), layout="constrained")
+    panels = sheet.subplots(rows, columns, sharey=True, squeeze=False)
+    for axes in panels.flat[len(effects) :]:
+        axes.set_visible(False)
+    for axes, (name, one) in zip(panels.flat, effects.items(), strict=False):
+        shares = list(one["right_first"].values())
+        places = range(len(shares))
+        low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
+        axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
+        axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
+        hidden = ", hidden" if one["hidden"] else ""
+        axes.set_title(f"{name}\n1 = {with_unit(one['size'], one['unit'])}{hidden}", fontsize=6.5)
+        axes.set_xticks(places, list(one["right_first"]))
+        axes.set_ylim(-5.0, 105.0)
+    for row in panels:
+        row[0].set_ylabel("[%]")
+    sheet.suptitle("Named right, with 95 % interval, against size over the least that matters")
+    return sheet
+
+
+def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> Figure:
+    """Planted by named, each row in percent."""
+    said = {name for row in confusion.values() for name in row}
+    order = ["nothing", *names, "unexplained", "failed"]
+    columns = [name for name in order if name in said or name in confusion]
+    table = np.array(
+        [
+            [100.0 * row.get(name, 0) / max(sum(row.values()), 1) for name in columns]
+            for row in confusion.values()
+        ]
+    ).reshape(len(confusion), len(columns))
+    sheet = Figure(
+        figsize=(3.0 + 0.3 * len(columns), 2.5 + 0.25 * len(confusion)), layout="constrained"
+    )
+    axes = sheet.subplots()
+    axes.grid(visible=False)
+    draw_heat(axes, table, 100.0)
+    axes.set_xticks(range(len(columns)), columns, rotation=90)
+    labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
+    axes.set_yticks(range(len(confusion)), labels)
+    axes.set_xlabel("named first; twins under their own name")
+    axes.set_ylabel("planted (sets)")
+    sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
+    return sheet
+
+
+def _coverage(summary: Mapping[str, Any]) -> Figure:
+    """Share of the 95 % intervals that hold the truth, by effect."""
+    rows = {name: one["coverage"] for name, one in summary["effects"].items()}
+    rows = {name: one for name, one in rows.items() if one["of"]} | {"all": summary["coverage"]}
+    sheet = Figure(figsize=(7.5, 1.2 + 0.22 * len(rows)), layout="constrained")
+    axes = sheet.subplots()
+    heights = range(len(rows))
+    low, high = ([100.0 * one[key] for one in rows.values()] for key in ("low", "high"))
+    axes.hlines(heights, low, high, color=LIGHT["raw"], linewidth=2.0)
+    values = [np.nan if one["share"] is None else 100.0 * one["share"] for one in rows.values()]
+    axes.plot(values, heights, "o", color=_LINE)
+    axes.axvline(95.0, color=_MARK, linewidth=0.8)
+    axes.set_yticks(heights, [f"{name} ({one['of']})" for name, one in rows.items()])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 101.0)
+    axes.set_xlabel("95 % intervals that hold the planted value [%]")
+    return sheet
+
+
+def format_power(summary: Mapping[str, Any]) -> str:
+    """Table for the terminal."""
+    effects, outside = summary["effects"], summary["outside"]
+    sizes = sorted({float(s) for one in effects.values() for s in one["right_first"]})
+    header = f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
+    lines = [
+        f"{summary['sets']} sets of recordings, {len(summary['failed'])} failed",
+        f"false alarms on clean sets          {_text(summary['false_alarms'])}",
+        f"right cause or its group first      {_text(summary['right_first'])}   from {VISIBLE:g} "
+        "times the size that matters",
+        f"... where it is above noise         {_text(summary['right_first_above_noise'])}   from "
+        f"{CLEAR:g} standard deviations on",
+        f"... and no other cause              {_text(summary['right_alone'])}",
+        f"both of a pair                      {_text(summary['pairs']['both'])}",
+        f"... each of which is found alone    {_text(summary['pairs']['both_seen_alone'])}",
+        f'unknown cause is "unexplained"      {_text(summary["unexplained"])}',
+        f"95 % intervals that hold the truth  {_text(summary['coverage'])}",
+        "",
+        header + f"{'coverage':>11}",
+        "-" * (len(header) + 11),
+    ]
+    for name, one in effects.items():
+        row = f"{name:<30}{with_unit(one['size'], one['unit']):>18}"
+        row += "".join(f"{_count(one['right_first'].get(f'{size:g}')):>8}" for size in sizes)
+        lines.append(row + f"{_count(one['coverage']):>11}" + "  hidden" * one["hidden"])
+    for name, one in outside.items():
+        said = (
+            f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
+            for size, verdicts in one["verdicts"].items()
+        )
+        lines.append(f"{name:<30}{with_unit(one['size'], one['unit']):>18}  {'; '.join(said)}")
+    return "\n".join(lines)
+
+
+def _count(one: Mapping[str, Any] | None) -> str:
+    return f"{one['hits']}/{one['of']}" if one and one["of"] else "-"
+
+
+def _text(one: Mapping[str, Any]) -> str:
+    if not one["of"]:
+        return f"{'-':>8}"
+    low, high = 100.0 * one["low"], 100.0 * one["high"]
+    return f"{100.0 * one['share']:6.1f} % ({low:.1f} to {high:.1f} %, {_count(one)})"
+
+
+def powered(summary: Mapping[str, Any]) -> Answer:
+    """The answer of `power`."""
+    shares = {
+        "right cause or its group first": summary["right_first"],
+        "right cause first, above noise": summary["right_first_above_noise"],
+        "right cause and no other": summary["right_alone"],
+        "both of a pair": summary["pairs"]["both"],
+        "unknown cause is unexplained": summary["unexplained"],
+        "intervals that hold the truth": summary["coverage"],
+    }
+    headline = {"false alarms on clean sets": share_measure(summary["false_alarms"], "lower")}
+    headline |= {name: share_measure(one, "higher") for name, one in shares.items()}
+    details = {
+        f"{effect} x {size}: named right": share_measure(one, "higher")
+        for effect, values in summary["effects"].items()
+        for size, one in values["right_first"].items()
+    }
+    words = []
+    if (right := summary["right_first"])["of"]:
+        words.append(
+            f"the diagnosis names the right cause, or its group, in {share_with_interval(right)}"
+        )
+    if (false := summary["false_alarms"])["of"]:
+        words.append(f"names one where there is none in {share_with_interval(false)}")
+    if (hold := summary["coverage"])["of"]:
+        words.append(
+            f"its 95 % intervals hold the truth in {share_with_interval(hold, 'intervals')}"
+        )
+    said = "; ".join(words) or "too few sets for a share"
+    return Answer(f"{said[:1].upper()}{said[1:]}.", headline, details)

@@ -1,0 +1,176 @@
+"""Sets of recordings, made by a virtual rig and diagnosed, in worker processes."""
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from workbench import diagnosis
+from workbench.diagnosis import Effect
+from workbench.errors import WorkerError
+from workbench.recordings.case import Case, read_cases
+from workbench.runtime.pool import Pool
+from workbench.studies.power.diagnosing import build_everything, diagnose_set
+from workbench.studies.power.journal import Diagnosed, Journal, diagnosed
+from workbench.studies.power.planting import Group, Planting, Repertoire
+from workbench.studies.power.virtual_rig import VirtualRig
+from workbench.system.system import System
+
+_JOURNAL = "sets.jsonl"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How every set is made and diagnosed.
+
+    Attributes
+    ----------
+    rig : makes the recordings.
+    everything : FMU of the observer model with every effect at zero, which diagnoses them.
+    effects : that it has.
+    """
+
+    system: System
+    rig: VirtualRig
+    everything: Path
+    effects: tuple[Effect, ...]
+
+    def recorded(self, planting: Planting, simulated: Any) -> list[Case]:
+        """What the rig's sensors make of what happened, read back from files."""
+        with tempfile.TemporaryDirectory() as folder:
+            self.rig.write(simulated, planting.gains, Path(folder))
+            return read_cases([Path(folder)], self.system)
+
+    @property
+    def repertoire(self) -> Repertoire:
+        """What can be planted, and what can be found."""
+        return Repertoire(self.rig.plantables, self.effects)
+
+
+def diagnose_sets(
+    groups: Sequence[Group],
+    system: System,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    out: Path,
+    *,
+    seed: int,
+    workers: int,
+    resume: bool,
+    report: Callable[[str], None],
+) -> tuple[list[Diagnosed], bool]:
+    """Make and diagnose sets of recordings.
+
+    Parameters
+    ----------
+    groups : as planned; sets that are diagnosed already are left out.
+    rig : makes the recordings.
+    effects : of the system's library, which may be found.
+    out : folder of the verdicts, and where a run resumes from.
+    seed : of the plan.
+    report : takes a line on each set.
+
+    Returns
+    -------
+    results : of this and of resumed runs.
+    interrupted : whether Ctrl-C ended the run; sets that were under way are in the results.
+
+    Raises
+    ------
+    InputError
+        If a model is not what it should be, or verdicts of another run are there.
+    """
+    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
+        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
+        build_everything(system, effects, setup.everything)
+        identity = {
+            "seed": seed,
+            **rig.identity,
+            "observer": _hash([setup.everything]),
+            "effects": [repr(effect) for effect in effects],
+            "code": _hash(sorted(f for p in diagnosis.__path__ for f in Path(p).rglob("*.py"))),
+        }
+        journal = Journal(out / _JOURNAL, identity, resume=resume)
+        if journal.damaged:
+            numbers = ", ".join(map(str, journal.damaged))
+            report(f"warning: {_JOURNAL}, lines {numbers} are damaged; these sets are made again")
+        known = {one.planting.options for one in journal.results}
+        left = [tuple(p for p in group if p.options not in known) for group in groups]
+        interrupted = _run([one for one in left if one], setup, workers, journal, report)
+        return journal.results, interrupted
+
+
+def _run(
+    groups: Sequence[Group],
+    setup: Setup,
+    workers: int,
+    journal: Journal,
+    report: Callable[[str], None],
+) -> bool:
+    """Diagnose all groups; returns whether the run was interrupted."""
+    total = sum(map(len, groups))
+    begin, done = time.perf_counter(), 0
+
+    def collect(task: Future[list[Diagnosed]]) -> None:
+        nonlocal done
+        for result in _results(task, open_tasks.pop(task)):
+            journal.append(result)
+            done += 1
+            left = (time.perf_counter() - begin) / done * (total - done)
+            name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
+            said = ", ".join(one.effect for one in result.causes) or result.verdict
+            report(f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left")
+
+    # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
+    with Pool(workers, nullcontext, setup, isolated=True) as pool:
+        open_tasks = {pool.submit(_evaluate, group): group for group in groups}
+        try:
+            for task in as_completed(list(open_tasks)):
+                collect(task)
+        except KeyboardInterrupt:
+            report("interrupted, finishing the sets that are under way")
+            pool.finish()
+            for task in [one for one in open_tasks if not one.cancelled()]:
+                collect(task)
+            return True
+    return False
+
+
+def _results(task: "Future[list[Diagnosed]]", group: Group) -> list[Diagnosed]:
+    """What became of a group; a crash must not end a run of hours, and is counted."""
+    try:
+        return task.result()
+    except WorkerError as error:
+        return [Diagnosed(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
+
+
+def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
+    """Simulate once, then record and diagnose each set of a group, in a process of its own."""
+    results: list[Diagnosed] = []
+    simulated: Any = None
+    for planting in group:
+        begin = time.perf_counter()
+        try:
+            if simulated is None:
+                simulated = setup.rig.simulate(planting.seed, planting.gains)
+            cases = setup.recorded(planting, simulated)
+            found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+        except Exception as error:  # one set must not end a run of hours; it is counted
+            seconds = time.perf_counter() - begin
+            results.append(Diagnosed(planting, "failed", (), None, None, seconds, repr(error)))
+        else:
+            seconds = time.perf_counter() - begin
+            results.append(diagnosed(planting, found, setup.repertoire, seconds))
+    return results
+
+
+def _hash(paths: Sequence[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,216 @@
+"""Which thresholds of the diagnosis matter: half and twice of each, on the same recordings."""
+
+import dataclasses
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Matrix
+from workbench.diagnosis import Effect
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, of_system
+from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.prediction import Variation
+from workbench.diagnosis.simulation.simulator import Evidence
+from workbench.errors import InputError, WorkerError
+from workbench.recordings.case import Case
+from workbench.runtime.pool import Pool
+from workbench.studies.power.diagnosing import build_everything
+from workbench.studies.power.planting import Planting
+from workbench.studies.power.run import Setup
+from workbench.studies.power.virtual_rig import VirtualRig
+from workbench.system.system import System
+
+FACTORS = (0.5, 2.0)
+_SAMPLES = "samples"
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What another threshold makes of a set.
+
+    Attributes
+    ----------
+    threshold, factor, value : which one, times what, and what it is then.
+    said : verdict, and names of causes, strongest first.
+    """
+
+    threshold: str
+    factor: float
+    value: float
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What was said of one set, by the usual thresholds and by others.
+
+    Attributes
+    ----------
+    said : verdict, and names of causes, strongest first.
+    changed : thresholds by which the verdict or the first name is another.
+    """
+
+    planting: Planting
+    said: tuple[str, ...]
+    changed: tuple[Changed, ...]
+
+
+def values(one: Thresholds) -> dict[str, float]:
+    """Each threshold by its name."""
+    found = dataclasses.asdict(one)
+    samples = found.pop(_SAMPLES)
+    return {**found, **samples}
+
+
+def changed(one: Thresholds, name: str, factor: float) -> Thresholds:
+    """The same with one threshold times a factor; what is counted stays a whole number, above 0."""
+    old = values(one)[name]
+    new = max(1, round(factor * old)) if isinstance(old, int) else factor * old
+    change: dict[str, Any] = {name: new}
+    if name in {field.name for field in dataclasses.fields(Soundness)}:
+        change = {_SAMPLES: dataclasses.replace(one.samples, **change)}
+    return dataclasses.replace(one, **change)
+
+
+class Remembering(Simulations):
+    """Simulations that are made once: most thresholds lead a diagnosis along the same points."""
+
+    def __init__(
+        self, path: Path, system: System, cases: Sequence[Case], samples: Soundness
+    ) -> None:
+        super().__init__(path, system, system.given, cases, 1, samples)
+        self._points: dict[Any, list[Evidence]] = {}
+        self._columns: dict[Any, list[Matrix]] = {}
+
+    def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
+        """Errors of every recording at its own point."""
+        key = _key(points)
+        if key not in self._points:
+            self._points[key] = super().at(points)
+        return self._points[key]
+
+    def derivatives(
+        self,
+        points: Sequence[Mapping[str, float]],
+        columns: Sequence[Variation],
+        sizes: Mapping[str, Sequence[str]] | None = None,
+    ) -> list[Matrix]:
+        """Derivatives of every recording's errors by the columns."""
+        point = _key(points)
+        keys = [(point, one.variables, _key([one.setting])) for one in columns]
+        new = [i for i, key in enumerate(keys) if key not in self._columns]
+        if new:
+            made = super().derivatives(points, [columns[i] for i in new], sizes)
+            for j, i in enumerate(new):
+                self._columns[keys[i]] = [one[:, j : j + 1] for one in made]
+        found = [self._columns[key] for key in keys]
+        return [np.hstack([one[k] for one in found]) for k in range(len(self.cases))]
+
+
+def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, float]], ...]:
+    return tuple(frozenset(one.items()) for one in points)
+
+
+def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
+    """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
+    cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
+    usual = of_system(setup.system.comparison, len(setup.effects))
+    variants = {
+        (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
+    }
+    said = _said(setup, cases, usual.samples, [usual, *variants.values()])
+    for samples in {one.samples for one in variants.values()} - {usual.samples}:
+        said |= _said(setup, cases, samples, variants.values())
+    return Varied(
+        planting,
+        said[usual],
+        tuple(
+            Changed(name, factor, values(one)[name], said[one])
+            for (name, factor), one in variants.items()
+            if said[one][:2] != said[usual][:2]
+        ),
+    )
+
+
+def _said(
+    setup: Setup, cases: Sequence[Case], samples: Soundness, some: Iterable[Thresholds]
+) -> dict[Thresholds, tuple[str, ...]]:
+    """Verdict and causes by each of some thresholds that take the same samples."""
+    said: dict[Thresholds, tuple[str, ...]] = {}
+    mine = [one for one in some if one.samples == samples]
+    try:
+        with Remembering(setup.everything, setup.system, cases, samples) as simulations:
+            for one in mine:
+                fit = Fit(simulations, setup.effects, one)
+                found = conclude(fit, setup.effects, _silent)
+                said[one] = (found.verdict, *(cause.effect.name for cause in found.causes))
+    except InputError:  # too few samples are left
+        return dict.fromkeys(mine, ("refused",))
+    return said
+
+
+def _silent(_: str) -> None:
+    """Say nothing."""
+
+
+def vary_sets(
+    plantings: Sequence[Planting],
+    system: System,
+    rig: VirtualRig,
+    effects: Sequence[Effect],
+    *,
+    workers: int,
+    report: Callable[[str], None],
+) -> tuple[list[Varied], bool]:
+    """Diagnose sets of recordings by half and twice of each threshold.
+
+    Parameters
+    ----------
+    plantings : what each set hides.
+    rig : makes the recordings, once for all thresholds.
+    effects : of the system's library, which may be found.
+    report : takes a line on each set.
+
+    Returns
+    -------
+    results : of the sets that were diagnosed; one that failed is reported and left out.
+    interrupted : whether Ctrl-C ended the run; sets that were under way are in the results.
+
+    Raises
+    ------
+    InputError
+        If a model is not what it should be.
+    """
+    results: list[Varied] = []
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
+        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
+        build_everything(system, effects, setup.everything)
+        with Pool(workers, nullcontext, setup, isolated=True) as pool:
+            names = list(values(of_system(system.comparison, len(effects))))
+            tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
+            try:
+                for done, task in enumerate(as_completed(tasks), start=1):
+                    left = (time.perf_counter() - begin) / done * (len(tasks) - done)
+                    name = tasks[task].options
+                    try:
+                        one = task.result()
+                    except WorkerError as error:
+                        said = f"failed: {error}"
+                    else:
+                        results.append(one)
+                        said = f"{', '.join(one.said)}; {len(one.changed)} changes"
+                    report(f"[{done:>3}/{len(tasks)}] {name}: {said}  about {left:.0f} s left")
+            except KeyboardInterrupt:
+                report("interrupted")
+                return results, True
+    return results, False

@@ -1,0 +1,196 @@
+"""How often the diagnosis was right, with intervals, from verdicts on sets that hide something."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import permutations
+from typing import Any
+
+from scipy.stats import binomtest
+
+from workbench.studies.power.journal import Diagnosed
+from workbench.studies.power.planting import Repertoire
+
+VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
+CLEAR = 4.0  # standard deviations that a size must have to be more than noise
+
+
+def share(outcomes: Iterable[bool]) -> dict[str, Any]:
+    """Hits, trials, their ratio and its 95 % interval.
+
+    The interval is that of C. J. Clopper and E. S. Pearson (1934), Biometrika 26, 404-413: it
+    covers in at least 95 %, however few trials there are.
+
+    >>> found = share([False] * 10)
+    >>> found["share"], found["low"], round(found["high"], 4)
+    (0.0, 0.0, 0.3085)
+    """
+    values = list(outcomes)
+    hits, of = sum(values), len(values)
+    if not of:
+        return {"hits": 0, "of": 0, "share": None, "low": 0.0, "high": 1.0}
+    low, high = binomtest(hits, of).proportion_ci(0.95, method="exact")
+    return {"hits": hits, "of": of, "share": hits / of, "low": float(low), "high": float(high)}
+
+
+def named_right(result: Diagnosed) -> bool:
+    """Whether what was planted, or a group that it is in, is named first."""
+    return bool(result.causes) and any(
+        effect in result.causes[0].group for effect in result.planting.effects
+    )
+
+
+def above_noise(result: Diagnosed) -> bool:
+    """Whether anything was seen, or could have been: the planted size is clear of its scatter.
+
+    The scatter is the least that any estimate from these stops has, by the noise of their sensors,
+    the tolerances of the plant and all other effects at sizes that do not matter.
+    """
+    return result.verdict != "nothing" or (result.clearness or 0.0) > CLEAR
+
+
+def named_all(result: Diagnosed) -> bool:
+    """Whether each effect that was planted has a cause of its own that is it, or its group."""
+    planted = result.planting.effects
+    return any(
+        all(effect in cause.group for effect, cause in zip(planted, chosen, strict=True))
+        for chosen in permutations(result.causes, len(planted))
+    )
+
+
+def intervals_cover(result: Diagnosed, repertoire: Repertoire) -> list[bool]:
+    """For each interval of the planted effect, if it was named first: whether it holds the truth.
+
+    A size within the interval of its twin is no claim, and is not judged.
+    """
+    ((name, gain),) = result.planting.gains.items()
+    plantable = repertoire.plantable(name)
+    if result.first != plantable.effect:
+        return []
+    label = repertoire.label(plantable.effect)
+    true = {**plantable.shapes, label: abs(gain) if label == "amplitude" else gain}
+    stated = result.causes[0].parameters
+    return [low <= true[key] <= high for key, (_, low, high) in stated.items() if key in true]
+
+
+def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
+    """All statistics of a run, as they are written to power.json.
+
+    A share has `hits`, `of`, `share` and the 95 % interval `low` to `high`. Sizes are multiples of
+    the size that matters. A diagnosis that failed counts as neither right nor "nothing".
+    """
+    kinds: dict[str, list[Diagnosed]] = {"clean": [], "single": [], "pair": [], "outside": []}
+    for result in results:
+        kinds[result.planting.kind].append(result)
+    by_name: dict[str, list[Diagnosed]] = {}
+    for result in kinds["single"] + kinds["outside"]:
+        by_name.setdefault(next(iter(result.planting.gains)), []).append(result)
+    visible = [
+        result
+        for one in repertoire.plantables
+        if one.effect and one.effect not in repertoire.hidden
+        for result in _large(by_name.get(one.name, []))
+    ]
+    return {
+        "sets": len(results),
+        "failed": [
+            {"rig": one.planting.options, "error": one.error}
+            for one in results
+            if one.verdict == "failed"
+        ],
+        "false_alarms": share(one.verdict != "nothing" for one in kinds["clean"]),
+        "right_first": share(map(named_right, visible)),
+        "right_first_above_noise": share(map(named_right, filter(above_noise, visible))),
+        "right_alone": share(named_right(one) and len(one.causes) == 1 for one in visible),
+        "pairs": _pairs(kinds["pair"], by_name),
+        "unexplained": share(one.verdict == "unexplained" for one in _large(kinds["outside"])),
+        "coverage": _coverage(kinds["single"], repertoire),
+        "effects": _by_effect(by_name, repertoire),
+        "outside": _outside(by_name, repertoire),
+        "confusion": {
+            row: dict(Counter(one.first for one in some))
+            for row, some in _confused(kinds["clean"], by_name, repertoire).items()
+        },
+        "wrong": [
+            {"rig": one.planting.options, "said": [cause.effect for cause in one.causes]}
+            for one in results
+            if one.causes and not named_right(one)
+        ],
+    }
+
+
+def _coverage(results: Iterable[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
+    """Share of intervals that hold what was planted."""
+    return share(held for one in results for held in intervals_cover(one, repertoire))
+
+
+def _by_effect(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+    """What was said of each effect of the library that was planted."""
+    return {
+        one.effect: {
+            "rig": one.name,
+            "size": repertoire.size(one),
+            "unit": one.unit,
+            "hidden": one.effect in repertoire.hidden,
+            "right_first": {
+                size: share(map(named_right, some))
+                for size, some in _by_size(by_name[one.name]).items()
+            },
+            "coverage": _coverage(by_name[one.name], repertoire),
+        }
+        for one in repertoire.plantables
+        if one.effect and one.name in by_name
+    }
+
+
+def _outside(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+    """What was said of each effect that the library does not have."""
+    return {
+        one.name: {
+            "size": repertoire.size(one),
+            "unit": one.unit,
+            "verdicts": {
+                size: dict(Counter(result.verdict for result in some))
+                for size, some in _by_size(by_name[one.name]).items()
+            },
+        }
+        for one in repertoire.plantables
+        if not one.effect and one.name in by_name
+    }
+
+
+def _confused(
+    clean: list[Diagnosed], by_name: dict[str, list[Diagnosed]], repertoire: Repertoire
+) -> dict[str, list[Diagnosed]]:
+    """Sets of each row of the confusion matrix."""
+    rows = {
+        one.effect or one.name: _large(by_name[one.name])
+        for one in repertoire.plantables
+        if one.name in by_name
+    }
+    return {"none": clean, **rows}
+
+
+def _pairs(pairs: Sequence[Diagnosed], by_name: dict[str, list[Diagnosed]]) -> dict[str, Any]:
+    """Shares of pairs; those `seen_alone` have effects that mostly are found alone, as large."""
+
+    def seen(name: str, multiple: float) -> bool:
+        alone = [one for one in by_name.get(name, []) if one.planting.multiple == multiple]
+        return 2 * sum(map(named_right, alone)) > len(alone)
+
+    return {
+        "both": share(map(named_all, pairs)),
+        "both_seen_alone": share(
+            named_all(one)
+            for one in pairs
+            if all(seen(name, one.planting.multiple) for name in one.planting.gains)
+        ),
+    }
+
+
+def _large(results: Sequence[Diagnosed]) -> list[Diagnosed]:
+    return [one for one in results if one.planting.multiple >= VISIBLE]
+
+
+def _by_size(results: Sequence[Diagnosed]) -> dict[str, list[Diagnosed]]:
+    sizes = sorted({one.planting.multiple for one in results})
+    return {f"{size:g}": [r for r in results if r.planting.multiple == size] for size in sizes}

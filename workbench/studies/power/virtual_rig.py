@@ -1,0 +1,113 @@
+"""What a system's companion provides for recordings in which something is planted."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol, Self, runtime_checkable
+
+from workbench.errors import InputError
+from workbench.studies.power.planting import Group, Plantable, SheetError
+from workbench.system.registry import companion_part
+from workbench.system.system import System
+
+
+class VirtualRig(Protocol):
+    """Makes sets of recordings; it is sent to worker processes.
+
+    A companion has one in its module `planting`, which it opens by
+    `virtual_rig(names, model) -> VirtualRig`: the recordings that a set is made of, the usual ones
+    if none is named, and the FMU that makes them, None where there is none. Wrong names or files it
+    refuses there.
+    """
+
+    @property
+    def plantables(self) -> tuple[Plantable, ...]:
+        """What can be planted."""
+
+    @property
+    def sheet_errors(self) -> tuple[SheetError, ...]:
+        """Ways in which the machine may differ from its data sheet."""
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings of a set."""
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """All that recordings depend on besides a seed and what is planted, for JSON."""
+
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> Any:
+        """What happens in the recordings of a set; effects that are sensed may change after it."""
+
+    def write(self, simulated: Any, gains: Mapping[str, float], folder: Path) -> None:
+        """Write what sensors make of it, as case folders."""
+
+
+@runtime_checkable
+class FollowingRig(VirtualRig, Protocol):
+    """A virtual rig that also makes what `workbench next` proposes."""
+
+    def following(self, experiment: Mapping[str, Any], system: System) -> Self:
+        """The rig whose only recording is an experiment, as it stands in next.json.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError
+            If it asks for what the rig cannot do.
+        """
+
+
+def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -> VirtualRig:
+    """The virtual rig of a system.
+
+    Parameters
+    ----------
+    names : of the recordings of a set; the usual ones if none is named.
+    model : FMU that makes them; None where the rig has equations of its own.
+
+    Raises
+    ------
+    InputError
+        If the system has none, or it refuses what is asked.
+    """
+    planting = companion_part(system.companion, "planting")
+    if planting is None:
+        raise InputError(
+            where=str(system.source),
+            found="no companion that can plant effects",
+            expected="a Python package with a module 'planting', which makes recordings",
+            remedy='name it as companion = "...", or choose a system that has one',
+        )
+    found: VirtualRig = planting.virtual_rig(names, model)
+    return found
+
+
+class RecordedSets(VirtualRig, Protocol):
+    """Sets that were recorded, of which somebody says what is wrong in them.
+
+    A companion has them in its module `recorded`, which it reads by
+    `recorded_sets(folders) -> RecordedSets`.
+    """
+
+    @property
+    def groups(self) -> list[Group]:
+        """What each set hides."""
+
+
+def read_recorded_sets(system: System, folders: Sequence[Path]) -> RecordedSets:
+    """Recorded sets of a system, with what is wrong in them.
+
+    Raises
+    ------
+    InputError
+        If the system's companion reads none, or a folder is not understood.
+    """
+    recorded = companion_part(system.companion, "recorded")
+    if recorded is None:
+        raise InputError(
+            where=f"{system.source}, --recorded",
+            found="no companion that reads what is wrong in recorded sets",
+            expected="a Python package with a module 'recorded'",
+            remedy="leave --recorded out: sets are made on the virtual rig",
+        )
+    found: RecordedSets = recorded.recorded_sets(folders)
+    return found

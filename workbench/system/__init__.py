@@ -1,0 +1,1 @@
+"""One machine as a value: what its system file says."""

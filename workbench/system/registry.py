@@ -1,0 +1,183 @@
+"""Systems by name or file, and their models."""
+
+import tomllib
+from contextlib import suppress
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from workbench.errors import InputError, closest
+from workbench.models import fmu_cache
+from workbench.models.fmu import FMU
+from workbench.models.modelica import read_library
+from workbench.runtime import resources
+from workbench.system.parts import Model
+from workbench.system.reader import read_system, with_built
+from workbench.system.system import OBSERVER, System
+
+
+def companion_part(companion: str, name: str) -> ModuleType | None:
+    """A module of a companion package; None where it has none.
+
+    Parameters
+    ----------
+    companion : dotted name, empty for none. Only a part that is there is imported.
+    """
+    spec = find_spec(companion) if companion else None
+    if spec is None or spec.submodule_search_locations is None:
+        return None
+    part = f"{companion}.{name}"
+    return import_module(part) if find_spec(part) else None
+
+
+FILE = "system.toml"
+
+
+def system_files() -> dict[str, Path]:
+    """System files by name."""
+    return {content.get("name", path.parent.name): path for path, content in _contents().items()}
+
+
+def usual_system() -> str:
+    """Name of the system that is meant where none is named: the first that comes with recordings.
+
+    Commands without any arguments work on it.
+    """
+    with_cases = [path for path, content in _contents().items() if "cases" in content]
+    return next(name for name, path in system_files().items() if path in with_cases)
+
+
+def built_models() -> dict[Path, list[str]]:
+    """Models whose FMUs come with the workbench: dotted names by library, its `package.mo`."""
+    found = {}
+    for path, content in _contents().items():
+        models = content["models"].values()
+        built = [one["class"] for one in models if _is_kept(path.parent / one.get("fmu", ""))]
+        if built:
+            found[path.with_name("package.mo")] = [f"{path.parent.name}.{one}" for one in built]
+    return found
+
+
+def companions() -> list[str]:
+    """Python packages that these systems bring along."""
+    found = (content.get("companion") for content in _contents().values())
+    return [name for name in found if name]
+
+
+def _is_kept(fmu: Path) -> bool:
+    return fmu.resolve().is_relative_to(resources.fmus())
+
+
+@cache
+def _contents() -> dict[Path, dict[str, Any]]:
+    paths = sorted(resources.modelica().glob(f"*/{FILE}"))
+    return {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in paths}
+
+
+def load_system(which: str | Path) -> System:
+    """Read a system by its name, its file, or the folder that holds its file.
+
+    A model without an FMU is compiled from the system's library, once for each state of it; that
+    needs the extra [compiler].
+
+    Raises
+    ------
+    InputError
+        If there is none of this name, or its file or its library has a mistake.
+    """
+    return _built(read_system(system_path(which)))
+
+
+def system_path(which: str | Path) -> Path:
+    """The file of a system, by its name, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known, path = system_files(), Path(which)
+    if str(which) in known:
+        return known[str(which)]
+    with suppress(OSError):  # a name that is too long is none
+        path = path / FILE if path.is_dir() else path
+        if path.is_file():
+            return path
+    raise InputError(
+        where=f"system '{which}'",
+        found=f"no such file, and no system of this name{closest(str(which), known)}",
+        expected=f"a system file, or one of {', '.join(known)}",
+        remedy="correct the name or path; 'workbench systems' lists what is installed",
+    )
+
+
+def _built(system: System) -> System:
+    missing = {role: model for role, model in system.models.items() if model.path is None}
+    if not missing:
+        return system
+    return with_built(system, {role: _build(system, model) for role, model in missing.items()})
+
+
+def _build(system: System, model: Model) -> Path:
+    """The FMU of a model for this machine, from where built ones are kept."""
+    if not system.library.is_file():
+        raise InputError(
+            where=f"{system.source}, [models]",
+            found=f"no FMU of {model.name}, and no library {system.library.name} beside the file",
+            expected="an FMU, or the Modelica library that the model is compiled from",
+            remedy='write fmu = "FILE", or put package.mo beside the system file',
+        )
+    library = read_library(system.library)
+    name = f"{library.name}.{model.name}"
+
+    def make(path: Path) -> None:
+        from workbench.models import compiler  # an extra: everything else runs without it
+
+        compiler.build(system.library, name, path, platforms=[compiler.native()])
+
+    return fmu_cache.keep(fmu_cache.key(system.library, name), make)
+
+
+def model_path(system: System, role: str) -> Path:
+    """The FMU of a role.
+
+    Raises
+    ------
+    InputError
+        If the system has no model in this role.
+    """
+    model = system.models.get(role)
+    if model is None or model.path is None:
+        raise InputError(
+            where=f"{system.source}, [models] {role}",
+            found="no such model",
+            expected=f"a model in the role '{role}'",
+            remedy=f'write {role} = {{ class = "NAME" }}',
+        )
+    return model.path
+
+
+def open_model(system: System, role: str = OBSERVER) -> FMU:
+    """Open the model of a role, with the parameters of this machine that it has.
+
+    Raises
+    ------
+    InputError
+        If its file is no FMU.
+    """
+    path = system.model(role).path
+    assert path is not None
+    return open_file(path, system)
+
+
+def open_file(path: Path, system: System) -> FMU:
+    """Open a model file as one of a system; see `open_model`."""
+    fmu = FMU(path, system.names)
+    given = {name: value for name, value in system.given.items() if name in fmu.parameters}
+    if given:
+        fmu.close()
+        fmu = FMU(path, system.names, given)
+    return fmu

@@ -1,0 +1,276 @@
+"""Units of measured columns and of conditions: anything accepted becomes a factor to SI."""
+
+import math
+import re
+from collections.abc import Sequence
+from functools import cache
+from tokenize import TokenError
+
+import pint
+
+from workbench.errors import InputError
+
+_EXAMPLES = {
+    "s": "s or ms",
+    "Pa": "Pa, kPa or bar",
+    "N.m": "N.m or kN.m",
+    "rad/s": "rad/s, deg/s, rpm or 1/min",
+    "N": "N or kN",
+    "m/s": "m/s or km/h",
+    "m": "m or mm",
+    "K": "K",
+}
+
+# Angles have a dimension of their own here, so that Hz and 1/s are not taken for rad/s.
+_DEFINITIONS = f"""\
+micro- = 1e-6 = \u00b5- = \u03bc- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+deci- = 1e-1 = d-
+deca- = 1e1 = da-
+hecto- = 1e2 = h-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+second = [time] = s
+minute = 60 * second = min
+hour = 3600 * second = h
+meter = [length] = m
+gram = [mass] = g
+newton = kilogram * meter / second ** 2 = N
+newton_meter = newton * meter = Nm
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+radian = [angle] = rad
+degree = {math.pi!r} / 180 * radian = deg = °
+revolution = {2 * math.pi!r} * radian = rev
+rpm = revolution / minute
+hertz = 1 / second = Hz
+liter = 1e-3 * meter ** 3 = l = L
+tonne = 1000 * kilogram = t
+joule = newton * meter = J
+watt = joule / second = W
+ampere = [current] = A
+volt = watt / ampere = V
+ohm = volt / ampere = Ohm
+farad = ampere * second / volt = F
+henry = volt * second / ampere = H
+kelvin = [temperature] = K
+mole = [substance] = mol
+percent = 0.01
+permille = 1e-3
+"""
+
+
+# As Modelica and people write them: N.m, kg.m2, m3/s, J/(kg.K), W/m^2.
+_UNIT = re.compile(
+    r"(1/|\()*[A-Za-z\u00b5\u03bc°%]+(\^?-?[1-9])?"
+    r"([.·*/]\(?[A-Za-z\u00b5\u03bc°]+(\^?-?[1-9])?\)*)*"
+)
+
+
+_LONGEST = 60  # characters, twice what any unit has; pint takes the square of them
+
+
+_REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
+
+
+_QUANTITY = re.compile(
+    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?)"
+    r"(?: *(?=[^0-9., ])| +(?=1/))(?P<unit>.*)"
+)
+
+
+def si_factor(unit: str, si: str, where: str) -> float:
+    """Return the factor from a unit to the SI unit of its dimension.
+
+    Per minute means revolutions where `si` is rad/s; Hz and 1/s are refused there.
+
+    Parameters
+    ----------
+    unit : as a file spells it; case matters.
+    si : such as s, Pa, N.m, rad/s, kg.m2; 1 for a number without a unit.
+    where : place for the message of an error.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown, of another dimension, or ambiguous.
+
+    Examples
+    --------
+    >>> si_factor("kPa", "Pa", "measured.csv")
+    1000.0
+    """
+    if unit == si:
+        return 1.0
+    remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
+    parsed, expected = _parsed(unit), _parsed(si)
+    if parsed is None or expected is None:
+        found = f"unknown unit [{unit}]"
+    elif parsed.is_compatible_with(expected):
+        return float(_units().Quantity(1.0, parsed).to(expected).magnitude)
+    elif si == "rad/s" and parsed.is_compatible_with("Hz"):
+        found = f"[{unit}], which leaves open whether it counts revolutions or radians"
+    else:
+        found = f"[{unit}], a unit of another dimension"
+    raise InputError(
+        where=where, found=found, expected=f"a unit such as {_EXAMPLES.get(si, si)}", remedy=remedy
+    )
+
+
+def check_unit(unit: str, where: str) -> None:
+    """Refuse a text that is no unit; 1 is that of a number.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown.
+    """
+    if unit != "1" and _parsed(unit) is None:
+        raise InputError(
+            where=where,
+            found=f"unknown unit [{unit}]",
+            expected="a unit as Modelica writes it, such as Pa, N.m, rad/s, kg.m2, or 1 for none",
+            remedy="correct the unit (case matters)",
+        )
+
+
+def quotient(unit: str, divisor: str) -> str:
+    """Unit of a quantity over another one, as Modelica writes it.
+
+    >>> quotient("1/s", "(rad/s).s")
+    '1/(rad.s)'
+    >>> quotient("rad/s", "rad/s"), quotient("m/s2", "s")
+    ('1', 'm/s3')
+    """
+    registry = _units()
+    ratio = registry.Quantity(1.0, _spelled(unit)) / registry.Quantity(1.0, _spelled(divisor))
+    above: list[str] = []
+    below: list[str] = []
+    for name, power in ratio.to_reduced_units().unit_items():
+        size = f"{abs(power):g}" if abs(power) != 1 else ""
+        (above if power > 0 else below).append(registry.get_symbol(name) + size)
+    whole = ".".join(above) or "1"
+    if not below:
+        return whole
+    return f"{whole}/({'.'.join(sorted(below))})" if len(below) > 1 else f"{whole}/{below[0]}"
+
+
+def _parsed(unit: str) -> "pint.Unit | None":
+    """A unit, or None if it is none."""
+    if unit == "1":
+        return _units().Unit("")
+    if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
+        return None
+    try:
+        return _units().parse_units(_spelled(unit))
+    except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
+        return None
+
+
+def _spelled(unit: str) -> str:
+    """A unit as pint reads it."""
+    if unit in _REVOLUTIONS_PER_MINUTE:
+        return "rpm"
+    powers = re.sub(r"([A-Za-z\u00b5\u03bc°])\^?(-?\d)", r"\1**\2", unit)
+    return powers.replace(".", "*").replace("·", "*").replace("%", "percent")
+
+
+@cache
+def _units() -> pint.UnitRegistry[float]:
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
+    registry.load_definitions(_DEFINITIONS.splitlines())
+    return registry
+
+
+def quantity(text: str, si: str, where: str) -> float:
+    """Read a quantity such as '4.2 bar' in the SI unit `si`; see `si_factor`.
+
+    Examples
+    --------
+    >>> quantity("4.2 bar", "Pa", "case.toml")
+    420000.0
+    >>> quantity("0.3 1/s", "1/s", "system.toml")
+    0.3
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise InputError(
+            where=where,
+            found=repr(text),
+            expected=f"a number with a decimal point and a unit, {_EXAMPLES.get(si, si)}",
+            remedy="write for instance '4.2 bar' or '160 km/h'",
+        )
+    return float(match["number"]) * si_factor(match["unit"], si, where)
+
+
+BAND = 1.96  # standard deviations of half a 95 % band, of a normal distribution
+
+# Units that are said, largest first, by the SI unit of a model; the last one takes what is less.
+_SAID = {
+    "1": (("%", 0.01),),
+    "Pa": (("bar", 1e5), ("mbar", 1e2)),
+    "Pa/s": (("mbar/s", 1e2), ("mbar/min", 1e2 / 60.0)),
+    "m": (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)),
+    "m2": (("m2", 1.0), ("mm2", 1e-6)),
+    "s": (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)),
+    "N": (("kN", 1e3), ("N", 1.0)),
+    "N.m": (("kN.m", 1e3), ("N.m", 1.0)),
+    "N/m": (("N/mm", 1e3), ("N/m", 1.0)),
+    "rad": (("°", math.pi / 180.0),),
+    "J": (("MJ", 1e6), ("kJ", 1e3), ("J", 1.0)),
+    "K/s": (("K/s", 1.0), ("K/min", 1.0 / 60.0), ("K/h", 1.0 / 3600.0)),
+    "kg/s": (("kg/s", 1.0), ("g/s", 1e-3), ("g/min", 1e-3 / 60.0), ("mg/min", 1e-6 / 60.0)),
+    "kg/(s.Pa)": (("g/(min.bar)", 1e-8 / 60.0), ("mg/(min.bar)", 1e-11 / 60.0)),
+    "m3/(s.Pa)": (("l/(min.bar)", 1e-8 / 60.0), ("ml/(min.bar)", 1e-11 / 60.0)),
+}
+
+
+_STEPS = (1, 10, 100)  # of what a share is said per
+
+
+_WHOLE = 0.01  # share from which on it reads as whole percents
+
+
+def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
+    """Values in the unit in which people say the first of them.
+
+    Parameters
+    ----------
+    values : in the SI `unit`; the first decides, others are ends of its interval.
+
+    >>> said([7.07e-4], "1/K"), said([0.0021, 0.002], "m")
+    (([7.07], '% per 100 K'), ([2.1, 2.0], 'mm'))
+    >>> said([150.0], "N"), said([12e3], "Pa"), said([4.05e-4], "m2/s")
+    (([150.0], 'N'), ([120.0], 'mbar'), ([0.000405], 'm2/s'))
+    """
+    size = abs(values[0])
+    one, _, divisor = unit.partition("/")
+    if one == "1" and divisor:
+        step = next((n for n in _STEPS if size * n >= _WHOLE), _STEPS[-1])
+        per = divisor if step == 1 else f"{step} {divisor}"
+        return [round(100.0 * step * value, 12) for value in values], f"% per {per}"
+    choices = _SAID.get(unit, ((unit, 1.0),))
+    shown, factor = next((c for c in choices if size >= c[1] * (1.0 - 1e-9)), choices[-1])
+    return [round(value / factor, 12) if factor != 1.0 else value for value in values], shown
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A value in the unit in which people say it.
+
+    >>> with_unit(4e-4, "1/K"), with_unit(0.02, "1"), with_unit(150.0, "N")
+    ('4 % per 100 K', '2 %', '150 N')
+    """
+    (shown,), name = said([value], unit)
+    return f"{shown:.3g} {name}"
+
+
+def with_interval(value: float, low: float, high: float, unit: str) -> str:
+    """A value with its 95 % interval, in one unit.
+
+    >>> with_interval(7.07e-4, 6.8e-4, 7.4e-4, "1/K")
+    '7.07 % per 100 K (95 %: 6.8 to 7.4)'
+    """
+    (middle, first, last), shown = said([value, low, high], unit)
+    further = f", {3.6 * value:.3g} km/h" if unit == "m/s" else ""
+    return f"{middle:.3g} {shown} (95 %: {first:.3g} to {last:.3g}{further})"
