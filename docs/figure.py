@@ -31,4 +31,4 @@ class Figure:
     @property
     def recorded(self) -> bool:
         """Whether recordings are needed that are not part of the repository."""
-        return any("{recordings}" in one for one in self.commands)
+        return any("{recordings}" in command for command in self.commands)

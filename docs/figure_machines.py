@@ -44,7 +44,7 @@ class Machine:
 
     def diagnose(self, name: str) -> str:
         """The command that diagnoses it."""
-        cases = " ".join(f"{self._folder}/{one}" for one in self.cases) or self._folder
+        cases = " ".join(f"{self._folder}/{case}" for case in self.cases) or self._folder
         held_out = " --held-out " + " ".join(self.held_out) if self.held_out else ""
         return f"diagnose --system {self.system} {cases}{held_out} --out {{out}}/real/{name}"
 
@@ -55,9 +55,9 @@ class Machine:
     def errors(self, summary: Summary) -> tuple[float, float]:
         """Of the nominal and of the extended model [unit]."""
         some = [
-            one
-            for one in summary["errors"]
-            if one["held_out"] == bool(self.held_out) and self.channel in ("", one["channel"])
+            error
+            for error in summary["errors"]
+            if error["held_out"] == bool(self.held_out) and self.channel in ("", error["channel"])
         ]
         power = 2 if self.measure == "rms" else 1
         samples = sum(one["samples"] for one in some)
@@ -142,10 +142,10 @@ def machines(*summaries: Summary) -> Table:
     """What is found in each, and what that is worth on recordings that were not fitted."""
     error = "machine, error on recordings that were not fitted"
     rows: Table = [[error, "published", "nominal", "extended", "named"]]
-    for one, summary in zip(MACHINES.values(), summaries, strict=True):
+    for machine, summary in zip(MACHINES.values(), summaries, strict=True):
         nominal, extended = (
-            f"{float(f'{error:.3g}'):g} {one.unit}" for error in one.errors(summary)
+            f"{float(f'{error:.3g}'):g} {machine.unit}" for error in machine.errors(summary)
         )
         after = extended if summary["causes"] else ""
-        rows.append([one.said, one.published, nominal, after, verdict(summary)])
+        rows.append([machine.said, machine.published, nominal, after, verdict(summary)])
     return rows

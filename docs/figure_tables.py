@@ -53,7 +53,9 @@ def errors(summary: Summary) -> Table:
     rows: Table = [["case", *(titled(name) for name in names)]]
     for case, found in cases.items():
         shares = [found["estimators"][name][key] for name in names]
-        rows.append([case, *("n/a" if one is None else f"{100.0 * one:.2f} %" for one in shares)])
+        rows.append(
+            [case, *("n/a" if share is None else f"{100.0 * share:.2f} %" for share in shares)]
+        )
     return rows
 
 
@@ -76,12 +78,12 @@ def coverage(summary: Summary) -> Table:
     """Share of samples whose truth a 95 % band holds, mean of the stops, and the least of them."""
     shares: dict[str, dict[str, list[float]]] = {}
     for stop in summary["stops"].values():
-        for name, one in stop["estimators"].items():
-            for quantity, share in one.get("covers", {}).items():
+        for name, estimator in stop["estimators"].items():
+            for quantity, share in estimator.get("covers", {}).items():
                 shares.setdefault(name, {}).setdefault(quantity, []).append(share)
     rows: Table = [[f"{len(summary['stops'])} stops", *(titled(name) for name in shares)]]
     for quantity in COVERED:
-        known = [one.get(quantity) for one in shares.values()]
+        known = [share.get(quantity) for share in shares.values()]
         texts = [
             "" if one is None else f"{100.0 * np.mean(one):.1f} % ({100.0 * min(one):.0f} %)"
             for one in known
@@ -104,17 +106,17 @@ def widths(summary: Summary) -> Table:
 def sizes(cause: Summary) -> str:
     """Parameters of a cause with their intervals, as a laboratory says them."""
     texts = []
-    for name, one in cause["parameters"].items():
-        ends = [one[key] for key in ("value", "low", "high")]
+    for name, parameter in cause["parameters"].items():
+        ends = [parameter[key] for key in ("value", "low", "high")]
         # Four digits: three may hide that an interval misses.
-        (value, low, high), unit = said(ends, one["unit"])
+        (value, low, high), unit = said(ends, parameter["unit"])
         texts.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
     return "; ".join(texts)
 
 
 def verdict(summary: Summary) -> str:
     """Causes that a diagnosis names, each with what it cannot be told from, or its verdict."""
-    groups = ([one["effect"], *one["confusable_with"]] for one in summary["causes"])
+    groups = ([cause["effect"], *cause["confusable_with"]] for cause in summary["causes"])
     return "; ".join(map(" or ".join, groups)) or str(summary["verdict"])
 
 
@@ -145,7 +147,7 @@ def labelled(sets: Mapping[str, str], *summaries: Summary) -> Table:
 
 def change(form: str, *ends: float | None) -> str:
     """Numbers before and after."""
-    return " → ".join("n/a" if one is None else form.format(one) for one in ends)
+    return " → ".join("n/a" if end is None else form.format(end) for end in ends)
 
 
 def folds(*summaries: Summary) -> Table:
@@ -170,10 +172,10 @@ def folds(*summaries: Summary) -> Table:
 def shares(summary: Summary) -> Table:
     """What the command found, with its intervals."""
     rows: Table = [["", "goal", "measured", "95 % interval (Clopper-Pearson)"]]
-    for name, one in summary["answer"]["headline"].items():
-        known = one["value"] is not None
-        value = f"{one['value']:.0f} {one['unit']}" if known else "n/a"
-        ends = f"{one['low']:.1f} to {one['high']:.1f} %" if known else ""
+    for name, measure in summary["answer"]["headline"].items():
+        known = measure["value"] is not None
+        value = f"{measure['value']:.0f} {measure['unit']}" if known else "n/a"
+        ends = f"{measure['low']:.1f} to {measure['high']:.1f} %" if known else ""
         rows.append([name, ASKED.get(name, ""), value, ends])
     return rows
 
@@ -207,8 +209,8 @@ def followed(summary: Summary) -> Table:
     return [*rows, ["all", "", "", f"{ends}; together {answered}", drawn]]
 
 
-def _of(one: Summary) -> str:
-    return f"{one['hits']} of {one['of']}"
+def _of(summary: Summary) -> str:
+    return f"{summary['hits']} of {summary['of']}"
 
 
 def laws(summary: Summary) -> Table:
@@ -250,9 +252,9 @@ def tuned(untuned: Summary, *summaries: Summary) -> Table:
     columns = [["", "z", *(f"error of {text}" for text in texts), "work saved by dropping"]]
     for name, tuning, after in zip(TUNED, summaries[::2], summaries[1::2], strict=True):
         errors = [by_case(one, name) for one in (untuned, after)]
-        dry = [[v for case, v in one.items() if "_dry_" in case] for one in errors]
-        wet = [[v for case, v in one.items() if "_dry_" not in case] for one in errors]
-        worst = [max(one.values()) for one in errors]
+        dry = [[v for case, v in error.items() if "_dry_" in case] for error in errors]
+        wet = [[v for case, v in error.items() if "_dry_" not in case] for error in errors]
+        worst = [max(error.values()) for error in errors]
         means = ([float(np.mean(end)) for end in some] for some in (wet, dry))
         columns.append(
             [
@@ -275,7 +277,7 @@ def tuned_elsewhere(*summaries: Summary) -> Table:
             [max(by_case(run, name).values()) for run in (before, one)]
             for name, one in zip(TUNED, after, strict=True)
         )
-        rows.append([text, *(change("{:.2f} %", *one) for one in ends)])
+        rows.append([text, *(change("{:.2f} %", *end) for end in ends)])
     return rows
 
 
@@ -284,9 +286,9 @@ def judged_by(*summaries: Summary) -> Table:
     name = TUNED[0]
     rows: Table = [["gains", "z", f"worst error of {SYSTEM.objective.judged}"]]
     texts = ("untuned", "tuned by the load cells", "tuned by the smoother")
-    for text, one in zip(texts, summaries, strict=True):
-        z = max(case["estimators"][name]["z"] for case in one["cases"].values())
-        rows.append([text, f"{z:.3f}", f"{max(by_case(one, name).values()):.2f} %"])
+    for text, summary in zip(texts, summaries, strict=True):
+        z = max(case["estimators"][name]["z"] for case in summary["cases"].values())
+        rows.append([text, f"{z:.3f}", f"{max(by_case(summary, name).values()):.2f} %"])
     return rows
 
 
@@ -320,14 +322,14 @@ def timed_observers(summary: Summary) -> Table:
 
 def timed_horizon(summary: Summary) -> Table:
     """A sample of the moving horizon, and the same problem by CasADi and IPOPT."""
-    one = summary["observers"]["horizon"]
+    observer = summary["observers"]["horizon"]
     return [
         ["samples", "states and frictions", "us per sample", "by CasADi and IPOPT"],
         [
-            f"{one['samples']}",
-            f"{one['unknowns']}",
-            f"{1e6 * one['ours']:.1f}",
-            f"{one['ratios']['ipopt']:.0f} times",
+            f"{observer['samples']}",
+            f"{observer['unknowns']}",
+            f"{1e6 * observer['ours']:.1f}",
+            f"{observer['ratios']['ipopt']:.0f} times",
         ],
     ]
 

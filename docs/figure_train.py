@@ -40,9 +40,9 @@ def _distance(name: str, told: str, out: str) -> str:
 _SAFETY = _distance("healthy", "--samples 1000", "healthy")
 
 
-def ends(one: Summary, form: str) -> str:
+def ends(summary: Summary, form: str) -> str:
     """A value with its interval."""
-    value, low, high = (format(one[key], form) for key in ("ratio", "low", "high"))
+    value, low, high = (format(summary[key], form) for key in ("ratio", "low", "high"))
     return f"{value} ({low} to {high})"
 
 
@@ -62,7 +62,7 @@ def plain(summary: Summary) -> Table:
     """The safety level beside that of stops that were drawn by themselves."""
     drawn = f"{summary['plain']['samples']:,} plain stops (95 %)".replace(",", " ")
     rows: Table = [["one stop in", "subset simulation (95 %)", drawn]]
-    counted = {one["decade"]: ends(one, ".4f") for one in summary["plain"]["levels"]}
+    counted = {level["decade"]: ends(level, ".4f") for level in summary["plain"]["levels"]}
     for one in summary["safety"]:
         decade = one["decade"]
         rows.append([f"1e{decade}", ends(one, ".4f"), counted.get(decade, "too few")])
@@ -75,9 +75,9 @@ def predicted(*summaries: Summary) -> Table:
     rows: Table = [["stops, each by the others", "in the 95 % band", width, "beyond the claim"]]
     for text, summary in zip(PREDICTED.values(), summaries, strict=True):
         held, stops = summary["held"], summary["stops"]
-        widths = [one["width"] for one in stops if not one["outside"]]
+        widths = [stop["width"] for stop in stops if not stop["outside"]]
         low, middle, high = np.quantile(widths, (0.0, 0.5, 1.0))
-        away = [one["outside"] for one in stops if one["outside"]]
+        away = [stop["outside"] for stop in stops if stop["outside"]]
         reasons = f": {'; '.join(sorted(set(away)))}" if away else ""
         rows.append(
             [
@@ -102,9 +102,9 @@ def monitored(history: Summary, cause: Summary, healthy: Summary) -> Table:
     return rows
 
 
-def _share(one: Summary) -> str:
-    interval = f"{100.0 * one['low']:.0f} to {100.0 * one['high']:.0f} %"
-    return f"{one['hits']} of {one['of']} ({interval})"
+def _share(summary: Summary) -> str:
+    interval = f"{100.0 * summary['low']:.0f} to {100.0 * summary['high']:.0f} %"
+    return f"{summary['hits']} of {summary['of']} ({interval})"
 
 
 def named(summary: Summary) -> Table:

@@ -157,8 +157,8 @@ FIGURES = {
     ),
     "machines": Figure(
         (
-            *dict.fromkeys(one.prepare for one in MACHINES.values()),
-            *(one.diagnose(name) for name, one in MACHINES.items()),
+            *dict.fromkeys(machine.prepare for machine in MACHINES.values()),
+            *(machine.diagnose(name) for name, machine in MACHINES.items()),
         ),
         tuple(Path("real", name, "summary.json") for name in MACHINES),
         machines,
@@ -196,7 +196,7 @@ def written(name: str, *summaries: Summary) -> str:
 def origin(commands: Sequence[str]) -> str:
     """What stands below a table: the commands that made it."""
     places = {"out": RESULTS.as_posix(), "recordings": "FOLDER"}
-    told = [f"workbench {one}".format_map(places) for one in commands]
+    told = [f"workbench {command}".format_map(places) for command in commands]
     if len(told) == 1:
         return f"*Written by `make figures` from `{told[0]}`.*"
     lines = "\n".join(told)
@@ -237,20 +237,22 @@ def main() -> int:
     options = parser.parse_args()
     if unknown := [name for name in options.names if name not in FIGURES]:
         parser.error(f"{', '.join(unknown)}: expected some of {', '.join(FIGURES)}")
-    usual = [n for n, one in FIGURES.items() if options.long or not one.long]
+    usual = [n for n, figure in FIGURES.items() if options.long or not figure.long]
     names = list(options.names) or usual
     if options.recordings is None and not options.kept:
-        for name in [one for one in names if FIGURES[one].recorded]:
+        for name in [name for name in names if FIGURES[name].recorded]:
             print(f"{name}: stays as it is, for it needs --recordings")
             names.remove(name)
     failed: dict[str, str] = {}
     if not options.kept:
-        failed = _failing([one for name in names for one in FIGURES[name].commands], options)
+        failed = _failing(
+            [command for name in names for command in FIGURES[name].commands], options
+        )
     for name in names:
-        if missing := [one for one in FIGURES[name].commands if one in failed]:
+        if missing := [command for command in FIGURES[name].commands if command in failed]:
             print(f"{name}: stays as it is, for {failed[missing[0]]}")
             continue
-        files = [ROOT / RESULTS / one for one in FIGURES[name].summaries]
+        files = [ROOT / RESULTS / summary for summary in FIGURES[name].summaries]
         summaries = [json.loads(file.read_text()) for file in files]
         page = PAGES / FIGURES[name].page
         page.write_text(placed(page.read_text(), name, *summaries))

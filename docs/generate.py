@@ -107,17 +107,17 @@ def tutorial(path: Path) -> str:
 def commands() -> str:
     """Every command with its options, from the parsers that read them."""
     text = ["# Commands", "", *textwrap.dedent(_COMMANDS).strip().splitlines()]
-    for one in parsers(command_line(""))[1:]:
-        if one.description is None:  # one that only has jobs
+    for parser in parsers(command_line(""))[1:]:
+        if parser.description is None:  # one that only has jobs
             continue
-        text += ["", f"## {one.prog}", "", _cell(one.description), ""]
+        text += ["", f"## {parser.prog}", "", _cell(parser.description), ""]
         text += ["| option | default | meaning |", "| --- | --- | --- |"]
-        for action in one._actions:
+        for action in parser._actions:
             if {"--help", "--json", "--quiet"} & set(action.option_strings):
                 continue
-            text.append(_option(one, action))
-        if one.epilog:
-            text += ["", "```console", textwrap.dedent(one.epilog.partition("\n")[2]), "```"]
+            text.append(_option(parser, action))
+        if parser.epilog:
+            text += ["", "```console", textwrap.dedent(parser.epilog.partition("\n")[2]), "```"]
     return "\n".join(text) + "\n"
 
 
@@ -242,18 +242,18 @@ def catalogue(systems: list[System]) -> str:
         text += ["", f"## {system.name}", "", f"{system.title}.", ""]
         text += ["| effect | what it is | size | matters from | what tells it from its twins |"]
         text += ["| --- | --- | --- | --- | --- |"]
-        for one in effects:
-            unit = _unit(library, one)
+        for effect in effects:
+            unit = _unit(library, effect)
             cells = (
-                f"`{one.kind}`",
-                f"{one.text} (any of {one.places})" if one.places else one.text,
-                one.label,
-                f"{one.matters:g} {unit}",
-                one.separation,
+                f"`{effect.kind}`",
+                f"{effect.text} (any of {effect.places})" if effect.places else effect.text,
+                effect.label,
+                f"{effect.matters:g} {unit}",
+                effect.separation,
             )
             text.append(f"| {' | '.join(map(_cell, cells))} |")
-        for one in effects:
-            text += ["", f"### {system.name}: {one.kind}", "", *_effect(library, one)]
+        for effect in effects:
+            text += ["", f"### {system.name}: {effect.kind}", "", *_effect(library, effect)]
     return "\n".join(text) + "\n"
 
 
@@ -270,7 +270,7 @@ def _effect(library: Library, effect: Effect) -> Iterator[str]:
     if equations:
         yield f"```modelica\n{textwrap.dedent(equations[1]).rstrip()}\n```"
     elif extends:
-        bases = "\n".join(" ".join(one.split()) for one in extends)
+        bases = "\n".join(" ".join(extend.split()) for extend in extends)
         yield f"Law of the class that it extends:\n\n```modelica\n{bases}\n```"
     if info := re.search(r'info="<html>(.*?)</html>"', source, re.S):
         yield "\n" + re.sub(r"h4>", "h5>", info[1].replace('\\"', '"')).strip()
@@ -318,8 +318,8 @@ def schemas(systems: list[System]) -> dict[str, dict[str, Any]]:
     """JSON Schema of every file that is read or written, by its name in the site."""
     return {
         "system.json": system_schema(),
-        **{f"{one.name}.case.json": case_schema(one) for one in systems},
-        **{f"{one.name}.gains.json": gains_schema(one) for one in systems},
+        **{f"{system.name}.case.json": case_schema(system) for system in systems},
+        **{f"{system.name}.gains.json": gains_schema(system) for system in systems},
         **{f"{name}.summary.json": schema for name, schema in summaries().items()},
     }
 
@@ -330,9 +330,9 @@ def formats(systems: list[System]) -> str:
     text += ["| file | written by | schema |", "| --- | --- | --- |"]
     link = "[{0}](schemas/{0})"
     text.append(f"| `system.toml` | people, `workbench new` | {link.format('system.json')} |")
-    for one in systems:
-        name = link.format(f"{one.name}.gains.json")
-        text.append(f"| `gains.toml` of {one.name} | `workbench tune` | {name} |")
+    for system in systems:
+        name = link.format(f"{system.name}.gains.json")
+        text.append(f"| `gains.toml` of {system.name} | `workbench tune` | {name} |")
     files = {"thresholds": "power --thresholds", "sheet_error": "power --sheet-error"}
     for name in summaries():
         file = "summary" if name in ("simulate", "tune", "diagnose") else name
@@ -353,10 +353,10 @@ def case_files(systems: list[System]) -> str:
     """What a `case.toml` of each system says, and its schema."""
     text = ["# case.toml", "", *textwrap.dedent(_CASE).strip().splitlines(), ""]
     text += ["| system | conditions | schema |", "| --- | --- | --- |"]
-    for one in systems:
-        conditions = ", ".join(f"`{c.name}`" for c in one.conditions) or "none"
-        name = f"{one.name}.case.json"
-        text.append(f"| `{one.name}` | {conditions} | [{name}](schemas/{name}) |")
+    for system in systems:
+        conditions = ", ".join(f"`{c.name}`" for c in system.conditions) or "none"
+        name = f"{system.name}.case.json"
+        text.append(f"| `{system.name}` | {conditions} | [{name}](schemas/{name}) |")
     return "\n".join(text) + "\n"
 
 

@@ -99,8 +99,8 @@ def anything_goes(system: System) -> System:
 
     def unknown(signals: Sequence[Signal]) -> tuple[Signal, ...]:
         return tuple(
-            replace(one, noise=0.0, relative_noise=0.0, plausible=infinite, possible=infinite)
-            for one in signals
+            replace(signal, noise=0.0, relative_noise=0.0, plausible=infinite, possible=infinite)
+            for signal in signals
         )
 
     return replace(
@@ -108,7 +108,7 @@ def anything_goes(system: System) -> System:
         inputs=unknown(system.inputs),
         outputs=unknown(system.outputs),
         judged=unknown(system.judged),
-        conditions=tuple(replace(one, agrees=None) for one in system.conditions),
+        conditions=tuple(replace(condition, agrees=None) for condition in system.conditions),
         redundancies=(),
         sampling=Sampling(np.inf, np.inf, np.inf),
     )

@@ -117,7 +117,10 @@ def hdf5(path: Path, stops: Stops) -> None:
             slow = inner.create_group("hydraulics"), ("Bremsdruck", "Temperatur")
             fast = inner.create_group("drive"), set(columns) - set(slow[1])
             for group, names in (slow, fast):
-                for name in ("Zeit", *(one for one in columns if one in names and one != "Zeit")):
+                for name in (
+                    "Zeit",
+                    *(column for column in columns if column in names and column != "Zeit"),
+                ):
                     unit, values = columns[name]
                     group.create_dataset(name, data=values).attrs["unit"] = unit
 

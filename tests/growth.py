@@ -48,7 +48,7 @@ def model_of(vehicles: int, *, pitching: bool) -> str:
     inputs += ['curve(unit="1")', 'dbias(unit="m/s2")']
     states = [f'omega{i}(unit="rad/s", nominal=50.0' for i in range(1, axles + 1)]
     states += ['a(unit="m/s2", nominal=1.0', 'vTrain(unit="m/s", nominal=20.0']
-    states = [f"{one}, start=0.0, fixed=true)" for one in states]
+    states = [f"{state}, start=0.0, fixed=true)" for state in states]
     outputs = ['slip(unit="m/s") = v - rA[1]*omega1', 'force(unit="N") = sum(Fx)']
     outputs += ['vGNSS(unit="m/s") = v']
     return "\n".join(
@@ -94,7 +94,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
     ]
     speed, accelerometer = system.outputs[0], system.outputs[-1]
     speeds = [replace(speed, name=f"omega{i}", reading=f"omega{i}") for i in axles]
-    known = {one.name: one for one in system.estimated}
+    known = {quantity.name: quantity for quantity in system.estimated}
 
     def estimated(name: str) -> list[Estimated]:
         one = known[f"{name}[1]"]
@@ -123,8 +123,8 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
     levels = {"pB": 2.2e5 * (t >= _BEGIN), "mass": 48e3 + 0.0 * t, "slope": 0.0 * t}
     levels |= {"omega": v / 0.46, "a": np.gradient(v, step), "curve": 0.0 * t}
     u = [levels[one.name.rstrip("0123456789")] for one in system.inputs]
-    y = [levels[one.name.rstrip("0123456789")] for one in system.outputs]
-    noise = [one.noise * random.standard_normal(t.size) for one in system.outputs]
+    y = [levels[output.name.rstrip("0123456789")] for output in system.outputs]
+    noise = [output.noise * random.standard_normal(t.size) for output in system.outputs]
     inputs: Matrix = np.column_stack(u)
     outputs: Matrix = np.column_stack(y) + np.column_stack(noise)
     return t, inputs, outputs

@@ -44,8 +44,13 @@ def blocks(page: Path) -> list[Block]:
     """All of a page, in order."""
     text = page.read_text(encoding="utf-8")
     return [
-        Block(one["kind"], one["code"], one["mark"] or "", text.count("\n", 0, one.start("code")))
-        for one in _FENCE.finditer(text)
+        Block(
+            match["kind"],
+            match["code"],
+            match["mark"] or "",
+            text.count("\n", 0, match.start("code")),
+        )
+        for match in _FENCE.finditer(text)
     ]
 
 

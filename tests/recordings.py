@@ -46,5 +46,5 @@ def record(scenario: Scenario, seed: int, effects: Effects, folder: Path, every:
         part = Path(tempfile.mkdtemp(dir=shelf))
         shutil.copytree(folder, part, dirs_exist_ok=True)
         part.replace(kept)
-        for old in sorted(shelf.iterdir(), key=lambda one: -one.stat().st_mtime)[_MOST:]:
+        for old in sorted(shelf.iterdir(), key=lambda path: -path.stat().st_mtime)[_MOST:]:
             shutil.rmtree(old, ignore_errors=True)

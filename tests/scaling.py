@@ -44,7 +44,7 @@ def watch(fleet: Path, workers: int) -> tuple[int, float]:
         with redirect_stdout(io.StringIO()):
             status = workbench([*words, cluster.scheduler_address])
         said = json.loads(Path(out, "fleet.json").read_text())
-    refused = [one["machine"] for one in said["machines"] if one["refusal"]]
+    refused = [machine["machine"] for machine in said["machines"] if machine["refusal"]]
     if status or refused:
         raise SystemExit(f"not watched: {', '.join(refused) or status}")
     return said["recordings"], said["seconds"]

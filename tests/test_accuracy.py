@@ -102,14 +102,14 @@ def test_the_band_of_a_filter_holds_what_it_says(stops: dict[str, KnownStop], fi
     """Stops of seeds 8 to 14 say how wide they are; these are of seed 1."""
     shares = [held(stop, filter_) for stop in stops.values()]
     for quantity in COVERED:
-        known = [one[quantity].share for one in shares if quantity in one]
+        known = [share[quantity].share for share in shares if quantity in share]
         if quantity != "muWR":  # which is claimed in the few stops that use much of the adhesion
             # Of single seeds the slip asks for bands 9 % narrower to 9 % wider, 2 % more or less.
             assert 0.93 < np.mean(known) < 0.97, quantity
     # Noise of the pressure sensor moves the force and no speed: without it one held 58 %. A
     # roller's inertia three tolerances off, which no band holds, takes one of other seeds to 82 %.
-    for name, one in zip(stops, shares, strict=True):
-        assert one["Fx"].share > 0.85, name
+    for name, share in zip(stops, shares, strict=True):
+        assert share["Fx"].share > 0.85, name
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)

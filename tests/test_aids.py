@@ -165,7 +165,7 @@ def test_an_empty_field_of_an_aid_is_a_sample_that_is_missing(
 ) -> None:
     header = "time [s],filling [m/s],coarse [m],fine [cm]"
     fields = ["" if k % 3 else f"{150 + k}" for k in range(30)]
-    rows = "\n".join(f"{k},0,1.{k:02d},{one}" for k, one in enumerate(fields))
+    rows = "\n".join(f"{k},0,1.{k:02d},{field}" for k, field in enumerate(fields))
     case = read_case(recorded(tmp_path, rows, header), still)
     there = np.arange(30) % 3 == 0
     assert_array_equal(np.isfinite(case["fine"]), there)
@@ -196,7 +196,7 @@ def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(
 ) -> None:
     """It has none at first, nor at last; and a fine sensor that is slower is in lines between."""
     fields = ["" if k < 5 or k > 90 or k % 2 else f"{1.5 + 0.01 * k:.3f}" for k in range(100)]
-    rows = [f"{k};0.0;1.{k:02d};{one}" for k, one in enumerate(fields)]
+    rows = [f"{k};0.0;1.{k:02d};{field}" for k, field in enumerate(fields)]
     table = "\n".join(["t [s];filling [m/s];coarse [m];fine [m]", *rows])
     (tmp_path / "logged.csv").write_text(table + "\n")
     command = ["import", str(tmp_path / "logged.csv"), "--system", str(still.source)]
@@ -224,7 +224,7 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop: tuple[Case, M
         plain = kind(variant, TRAIN, kind.reasoned(variant, TRAIN))
         plain.tell({"rail": "unknown"})
         expected = plain.run(case.time[part], case.u[part], case.y[part]).values
-    corrections = [list(told.system.columns).index(one) for one in TRAIN.corrections]
+    corrections = [list(told.system.columns).index(correction) for correction in TRAIN.corrections]
     # The friction that is estimated is a deviation from another nominal value.
     same = np.delete(np.arange(expected.shape[1]), corrections)
     assert_allclose(values[0][:, same], expected[:, same], rtol=1e-7, atol=1e-9)
@@ -238,8 +238,8 @@ def test_who_finds_a_condition_is_not_told(stop: tuple[Case, Made]) -> None:
         bank = kind(model, TRAIN, kind.reasoned(model, TRAIN))
         found = []
         conditions: list[dict[str, Value]] = [{"rail": "dry"}, {"rail": "wet"}]
-        for one in conditions:
-            bank.tell(one)
+        for condition in conditions:
+            bank.tell(condition)
             found.append(bank.run(case.time[part], case.u[part], case.y[part]).values)
     assert_array_equal(found[0], found[1])
 

@@ -336,7 +336,7 @@ def stops(
     h, axles, samples = system.sample_time, 8, 240
     inputs = fmu.variables([one.name for one in system.inputs])
     corrections = fmu.variables(system.corrections)
-    outputs = [fmu.states.index(one.name) for one in system.outputs]
+    outputs = [fmu.states.index(output.name) for output in system.outputs]
     speed = fmu.states.index("vTrain")
     walk = walks(fmu, system)[speed]
     for seed in range(count):
@@ -359,8 +359,8 @@ def stops(
             x[speed] += walk * np.sqrt(h) * random.standard_normal()
             fmu.set_states(x)
             y[k] = x[outputs]
-        for j, one in enumerate(system.outputs):
-            y[:, j] += one.deviation(y[:, j]) * random.standard_normal(samples)
+        for j, output in enumerate(system.outputs):
+            y[:, j] += output.deviation(y[:, j]) * random.standard_normal(samples)
         truth = np.concatenate([pads, radii, [bias]])
         yield (h * np.arange(samples), u, y), truth
 

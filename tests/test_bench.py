@@ -76,7 +76,9 @@ def test_the_schema_of_times_has_what_is_written_of_them() -> None:
         (WorkerRates, tuning["workers"]),
         (TuningMemory, tuning["memory"]),
     ):
-        assert set(schema["properties"]) - beside == {one.name for one in dataclasses.fields(kind)}
+        assert set(schema["properties"]) - beside == {
+            field.name for field in dataclasses.fields(kind)
+        }
         assert schema["required"] == list(schema["properties"])
         assert not schema["additionalProperties"]
 

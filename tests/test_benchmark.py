@@ -47,7 +47,7 @@ def test_the_model_alone_goes_the_same_way_by_fmpy(
     with open_loop(minimal, system) as loop:
         theirs = loop(*samples)
     columns = list(system.columns)
-    read = [one.name for one in system.outputs] + list(system.reported)
+    read = [output.name for output in system.outputs] + list(system.reported)
     ours = ours[:, [columns.index(name) for name in read]]
     scale = np.abs(theirs).max(axis=0)
     assert_allclose(ours / scale, theirs / scale, rtol=0, atol=1e-9)

@@ -31,7 +31,9 @@ def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
     if kind == "full disk" and not can_starve():
         pytest.skip("this machine lets users mount no disk of their own")
     failures = disturb(tune, kind, Random(kind), tmp_path)
-    assert [str(one) for one in failures if one.what in ("end", "process", "results")] == []
+    assert [
+        str(failure) for failure in failures if failure.what in ("end", "process", "results")
+    ] == []
 
 
 # --- what the harness itself must not miss ---
@@ -77,7 +79,7 @@ def test_what_an_ended_command_must_not_do_is_named(
     command = Command("toy", ("toy",), (), lambda out: (out / "r").read_text())
     usual = Undisturbed(command, "False" if wrote == "again" else "1", 1.0)
     failures = disturb(usual, "interrupt", _Moment(tmp_path / "out" / "r"), tmp_path)
-    assert {one.what for one in failures} == what
+    assert {failure.what for failure in failures} == what
 
 
 class _Moment(Random):

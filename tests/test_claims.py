@@ -74,7 +74,7 @@ def test_every_claim_is_listed(library: Path) -> None:
 
 @pytest.mark.parametrize(
     ("library", "claim"),
-    [parameters(*one) for one in CLAIMS],
+    [parameters(*claim) for claim in CLAIMS],
     ids=lambda value: getattr(value, "name", value),
 )
 def test_claim(library: Path, claim: str, tmp_path: Path) -> None:

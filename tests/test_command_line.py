@@ -15,7 +15,7 @@ from workbench.cli.extras import PURPOSES
 from workbench.cli.parser import command_line, parsers
 
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
-PARSERS = [one for one in parsers(command_line("")) if " " in one.prog]
+PARSERS = [parser for parser in parsers(command_line("")) if " " in parser.prog]
 
 
 @pytest.fixture(autouse=True)
@@ -107,8 +107,8 @@ def test_what_lists_or_describes_tells_programs_the_same(
 def test_an_option_takes_the_same_everywhere() -> None:
     """Kind of value and number of values by option; only files and folders differ by command."""
     meant: dict[str, set[tuple[object, ...]]] = {}
-    for one in PARSERS:
-        for action in one._actions:
+    for parser in PARSERS:
+        for action in parser._actions:
             for option in action.option_strings:
                 kind = (type(action).__name__, action.type, action.nargs)
                 meant.setdefault(option, set()).add(kind)
@@ -128,7 +128,8 @@ def test_every_command_knows_json_and_quiet(parser: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "asked", [["--version"], ["--help"], *([*one.prog.split()[1:], "--help"] for one in PARSERS)]
+    "asked",
+    [["--version"], ["--help"], *([*parser.prog.split()[1:], "--help"] for parser in PARSERS)],
 )
 def test_help_imports_nothing_that_takes_time(root: Path, asked: list[str]) -> None:
     """numba and what it needs take two seconds; half a second is what people wait for."""
@@ -188,7 +189,9 @@ def test_every_extra_has_a_purpose(root: Path) -> None:
 
 
 def test_a_sound_installation_has_nothing_wrong(capsys: pytest.CaptureFixture[str]) -> None:
-    found = {one["name"]: one for one in document(["doctor"], capsys)["result"]["findings"]}
+    found = {
+        finding["name"]: finding for finding in document(["doctor"], capsys)["result"]["findings"]
+    }
     assert {one["state"] for one in found.values()} <= {"ok", "missing"}
     assert found["fmus/fmi2/Reference.fmu"]["state"] == "ok"
     if found["extra [compiler]"]["state"] == "ok":

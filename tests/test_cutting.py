@@ -203,7 +203,7 @@ def drive(stops: list[tuple[float, float]], system: System) -> tuple[np.ndarray,
 def test_each_stop_of_a_day_is_a_recording(system: System) -> None:
     time, signals = drive([(25.0, 1.0), (15.0, 2.0), (5.0, 1.0), (25.0, 1.0)], system)
     parts = cut(time, signals, system)
-    kept = [(time[one.first], time[one.end - 1]) for one in parts if not one.reason]
+    kept = [(time[part.first], time[part.end - 1]) for part in parts if not part.reason]
     rule = system.cutting
     assert rule is not None
     # A stop begins with its pressure and ends at standstill, by the speed over the rate.
@@ -211,10 +211,10 @@ def test_each_stop_of_a_day_is_a_recording(system: System) -> None:
     lasts = [(20.0 - 0.1) / 1.0, (20.0 - 0.1) / 2.0, (20.0 - 0.1) / 1.0]
     expected = [(b - rule.before, b + d + rule.after) for b, d in zip(begins, lasts, strict=True)]
     assert_allclose(kept, expected, atol=2.5 / RATE)  # samples at both ends
-    assert [one.reason for one in parts if one.reason and "between" not in one.reason] == [
+    assert [part.reason for part in parts if part.reason and "between" not in part.reason] == [
         "it was released before its end"
     ]
-    assert_array_equal([one.first for one in parts[1:]], [one.end for one in parts[:-1]])
+    assert_array_equal([part.first for part in parts[1:]], [part.end for part in parts[:-1]])
     assert (parts[0].first, parts[-1].end) == (0, time.size)
 
 
@@ -229,7 +229,7 @@ def test_a_part_without_its_beginning_or_its_end_is_left_out(system: System) -> 
     time, signals = drive([(25.0, 1.0)] * 4, system)
     piece = slice(round(15 * RATE), round(162 * RATE))  # within the first, within the last
     cuts = cut(time[piece], {name: v[piece] for name, v in signals.items()}, system)
-    reasons = [one.reason for one in cuts if "between" not in one.reason]
+    reasons = [cut.reason for cut in cuts if "between" not in cut.reason]
     assert reasons == [
         "it had begun before this recording",
         "",
@@ -242,7 +242,7 @@ def test_a_gap_parts_recordings_without_any_rule(system: System) -> None:
     time = np.concatenate([np.arange(0.0, 5.0, 0.01), 100.0 + np.arange(0.0, 5.0, 0.01)])
     signals = {"pB": np.zeros(time.size), **rolling(system, time, np.full(time.size, 20.0))}
     parts = cut(time, signals, replace(system, cutting=None))
-    assert [(one.first, one.end) for one in parts] == [(0, 500), (500, 1000)]
+    assert [(part.first, part.end) for part in parts] == [(0, 500), (500, 1000)]
 
 
 def test_a_long_file_becomes_cases_and_a_figure(tmp_path: Path, system: System, root: Path) -> None:
@@ -251,14 +251,14 @@ def test_a_long_file_becomes_cases_and_a_figure(tmp_path: Path, system: System, 
     write(tmp_path / "day.csv", twice)
     out = tmp_path / "out"
     assert main(["import", str(tmp_path / "day.csv"), "--out", str(out), "--yes"]) == 0
-    assert [one.name for one in wb.read_cases(out, system)] == ["01_day", "02_day"]
+    assert [read_case.name for read_case in wb.read_cases(out, system)] == ["01_day", "02_day"]
     assert (out / "day_cuts.png").stat().st_size > 10_000
     (one,) = json.loads((out / "import.json").read_text())["imports"]
     assert [part["case"] for part in one["cut"] if part["case"]] == ["01_day", "02_day"]
     assert sum(part["samples"] for part in one["cut"]) == 2 * twice[0].time.size
     again = ["import", str(tmp_path / "day.csv"), "--out", str(tmp_path / "w"), "--yes", "--whole"]
     assert main(again) == 0
-    assert [one.name for one in wb.read_cases(tmp_path / "w", system)] == ["day"]
+    assert [read_case.name for read_case in wb.read_cases(tmp_path / "w", system)] == ["day"]
 
 
 def write(path: Path, cases: list[Case]) -> None:

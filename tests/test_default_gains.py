@@ -45,7 +45,9 @@ def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
     tuned = read_gains(path, {name: job.gains})
     after, before = evaluate_gains(inline(job), job, [tuned.values, job.gains.values])
     # The last digits depend on the processor.
-    assert_allclose(after, [claimed["z_k"][one.name] for one in job.recordings], rtol=1e-6)
+    assert_allclose(
+        after, [claimed["z_k"][recording.name] for recording in job.recordings], rtol=1e-6
+    )
     assert after.max() == pytest.approx(claimed["z"], rel=1e-6)
     assert after.max() < before.max()
 

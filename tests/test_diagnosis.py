@@ -127,8 +127,8 @@ def test_a_wheel_load_that_is_said_is_no_finding_and_one_that_is_not_said_is(
     cases = read_cases([tmp_path], SYSTEM)
     assert diagnosed(cases).verdict == "nothing"
     unsaid = [
-        replace(one, conditions={n: c for n, c in one.conditions.items() if n != "wheel_load"})
-        for one in cases
+        replace(case, conditions={n: c for n, c in case.conditions.items() if n != "wheel_load"})
+        for case in cases
     ]
     (cause,) = diagnosed(unsaid).causes
     assert {cause.effect.name, *cause.confusable_with} == {"WheelLoad", "CreepStiffness"}

@@ -376,11 +376,11 @@ def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> 
     step, local = joint.solve(np.full(2, -9.0), np.full(2, 9.0))
     # The same by an independent solver, all local unknowns side by side.
     matrix, right = np.zeros((4 * 43, 2 + 4 * 3)), np.zeros(4 * 43)
-    for k, one in enumerate(systems):
+    for k, system in enumerate(systems):
         at, own = slice(43 * k, 43 * k + 40), slice(2 + 3 * k, 5 + 3 * k)
-        matrix[at, :2], matrix[at, own], right[at] = one.J, one.P, one.r
+        matrix[at, :2], matrix[at, own], right[at] = system.J, system.P, system.r
         matrix[43 * k + 40 : 43 * k + 43, own] = np.eye(3)
-        right[43 * k + 40 : 43 * k + 43] = one.deviations
+        right[43 * k + 40 : 43 * k + 43] = system.deviations
     begun = np.concatenate([np.zeros(2), *begun])
     reach = np.append([9.0, 9.0], np.full(12, far))
     best = lsq_linear(matrix, -right, (-reach - begun, reach - begun), tol=1e-13).x
@@ -462,8 +462,8 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
             both = [
                 [fit.unknowns.presence.at(one, k) for k in range(len(of))] for one in (film, lag)
             ]
-            assert [one["padFriction.waterFilm.film"] > 0.0 for one in values] == both[0]
-            wet = [one.get("padFriction.waterFilm.wet") for one in values]
+            assert [value["padFriction.waterFilm.film"] > 0.0 for value in values] == both[0]
+            wet = [value.get("padFriction.waterFilm.wet") for value in values]
             return both[0], both[1], wet, fit.unknowns.presence.unseen(single)
 
     reason = "the conditions of the stops say which discs are wet"

@@ -163,9 +163,15 @@ def test_dependences_are_those_of_the_summary_before_and_after(
     page: Any, summary: dict[str, Any]
 ) -> None:
     table = data(page.get_element_by_id("dependence-table"))
-    for one in summary["dependences"]:
-        assert float(table.at[one["influence"], f"{one['channel']}, nominal"]) == one["before"]
-        assert float(table.at[one["influence"], f"{one['channel']}, extended"]) == one["after"]
+    for dependence in summary["dependences"]:
+        assert (
+            float(table.at[dependence["influence"], f"{dependence['channel']}, nominal"])
+            == dependence["before"]
+        )
+        assert (
+            float(table.at[dependence["influence"], f"{dependence['channel']}, extended"])
+            == dependence["after"]
+        )
     assert table.size == 2 * len(summary["dependences"])
 
 
@@ -175,11 +181,11 @@ def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
     (cause,) = summary["causes"]
     article = section(page, "causes").xpath(".//article")[0]
     assert cause["effect"] in text(article.find("h3"))
-    for name, one in cause["parameters"].items():
+    for name, parameter in cause["parameters"].items():
         row = article.xpath(f".//tr[th='{name}']")[0]
         value, low, high = (float(cell.get("data-value")) for cell in row[1:4])
-        assert (value, low, high) == (one["value"], one["low"], one["high"])
-        assert text(row[4]) == one["unit"]
+        assert (value, low, high) == (parameter["value"], parameter["low"], parameter["high"])
+        assert text(row[4]) == parameter["unit"]
     assert cause["confusable_with"]
     assert cause["confusable_with"][0] in text(article)
     assert cause["separation"] in text(article)
@@ -213,7 +219,9 @@ def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_wit
 def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str, Any]) -> None:
     table = data(page.get_element_by_id("candidate-table"))
     falls = table["fall, held out"].astype(float)
-    assert sorted(table.index) == sorted({one["effect"] for one in summary["candidates"]})
+    assert sorted(table.index) == sorted(
+        {candidate["effect"] for candidate in summary["candidates"]}
+    )
     assert falls.is_monotonic_decreasing
     units = {text(row[0]): text(row[3]) for row in page.xpath("//*[@id='candidate-table']//tr")}
     assert (units["FxOffset"], units["WheelRadius"], units["BrakeFade"]) == ("N", "m", "1/K")
@@ -255,7 +263,7 @@ def test_gain_is_drawn_for_every_stop_and_for_all(page: Any, summary: dict[str, 
         for d in dots.xpath("./path[contains(@class, 'diamond')]/@d")
     ]
     # One scale for both: position is linear in the logarithm.
-    logs = np.log([*(one["before"] for one in values), *(one["after"] for one in values)])
+    logs = np.log([*(value["before"] for value in values), *(value["after"] for value in values)])
     slope, start = np.polyfit(logs, [*circles, *diamonds], 1)
     assert slope > 0.0
     assert_allclose([*circles, *diamonds], start + slope * logs, atol=0.1)  # [px] as rounded
@@ -277,7 +285,7 @@ def test_extended_model_is_shown_as_written_with_the_next_command(
 def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str, Any]) -> None:
     entries = section(page, "baseline").xpath(".//dt")
     shown = {text(entry): text(entry.getnext()).split()[0] for entry in entries}
-    assert shown == {name: f"{one['value']:.4g}" for name, one in summary["levels"].items()}
+    assert shown == {name: f"{level['value']:.4g}" for name, level in summary["levels"].items()}
     aside = data(page.get_element_by_id("aside-table"))
     for name, counts in summary["set_aside"].items():
         assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
@@ -475,8 +483,8 @@ def test_the_matrix_and_all_else_fit_a_narrow_screen(
 
 def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, Any]) -> None:
     best: dict[str, float] = {}
-    for one in summary["candidates"]:
-        best.setdefault(one["effect"], one["gain"])
+    for candidate in summary["candidates"]:
+        best.setdefault(candidate["effect"], candidate["gain"])
     first, by_name, down, up = browser["orders"]
     assert first == list(best)
     assert by_name == sorted(best)

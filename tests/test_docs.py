@@ -18,7 +18,9 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES.append(ROOT / "tutorials" / "README.md")
 RUN = [
-    page for page in PAGES if any(one.kind in ("sh", "python", "modelica") for one in blocks(page))
+    page
+    for page in PAGES
+    if any(block.kind in ("sh", "python", "modelica") for block in blocks(page))
 ]
 
 
@@ -30,7 +32,7 @@ def test_the_examples_of_a_page_run_and_print_what_it_says(page: Path, tmp_path:
 @pytest.mark.long
 @pytest.mark.parametrize(
     "page",
-    [page for page in RUN if any(one.mark == "long" for one in blocks(page))],
+    [page for page in RUN if any(block.mark == "long" for block in blocks(page))],
     ids=lambda page: page.name,
 )
 def test_the_long_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
@@ -41,7 +43,7 @@ def test_the_long_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
 def test_every_example_is_in_a_block_that_says_what_it_is(page: Path) -> None:
     text = page.read_text()
     assert not re.findall(r"^    (?:python -m workbench|workbench|make|pip) .*", text, re.MULTILINE)
-    assert {one.kind for one in blocks(page)} <= {
+    assert {block.kind for block in blocks(page)} <= {
         "sh",
         "python",
         "toml",
@@ -49,8 +51,8 @@ def test_every_example_is_in_a_block_that_says_what_it_is(page: Path) -> None:
         "modelica",
         "console",
     }
-    for one in blocks(page):
-        check_calls(one.code, page.name, ROOT)
+    for block in blocks(page):
+        check_calls(block.code, page.name, ROOT)
 
 
 def test_a_wrong_example_is_found(tmp_path: Path) -> None:
@@ -113,10 +115,10 @@ def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -
     from workbench.diagnosis.inference.thresholds import Thresholds
 
     commands = (site / "commands.html").read_text()
-    for one in parsers(command_line(""))[1:]:
-        if one.description is not None:
-            assert f"{one.prog}<" in commands
-            for action in one._actions:
+    for parser in parsers(command_line(""))[1:]:
+        if parser.description is not None:
+            assert f"{parser.prog}<" in commands
+            for action in parser._actions:
                 for option in action.option_strings[:1]:
                     assert option in commands
     python = (site / "python.html").read_text()

@@ -211,7 +211,7 @@ def test_the_command_lists_the_effects_of_a_library(
 
 def test_effects_of_a_library_of_one_file_are_read_in_its_order(tmp_path: Path) -> None:
     effects = read_effects(tank(tmp_path), "Base")
-    assert [(one.name, one.slots) for one in effects] == [
+    assert [(effect.name, effect.slots) for effect in effects] == [
         ("Clogging", ("orifice",)),
         ("Leak", ("orifice",)),
         ("GaugeOffset", ("gauge",)),

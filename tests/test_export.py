@@ -378,8 +378,8 @@ def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(
 def test_start_values_of_the_package_cover_the_observer(package: Path) -> None:
     ssp = str(package / "out" / "DisturbanceObserver.ssp")
     values = {
-        one.name: float(one.value)
-        for one in read_ssv(ssp, resource="resources/start.ssv").parameters
+        parameter.name: float(parameter.value)
+        for parameter in read_ssv(ssp, resource="resources/start.ssv").parameters
     }
     for name in ("omegaW", "omegaR"):
         assert values[f"observer.{name}"] == values[f"machine.{name}"] > 0.0

@@ -284,7 +284,7 @@ def assert_described(own: Exported) -> None:
         f"{n}Estimate" if n in ("omegaW", "omegaR") else n: unit
         for n, unit in SYSTEM.columns.items()
     }
-    expected = {one.name: ("input", one.unit) for one in (*SYSTEM.inputs, *SYSTEM.outputs)}
+    expected = {signal.name: ("input", signal.unit) for signal in (*SYSTEM.inputs, *SYSTEM.outputs)}
     expected |= {name: ("output", unit) for name, unit in shown.items()}
     expected |= {f"sigma_{name}": ("output", unit) for name, unit in SYSTEM.columns.items()}
     expected |= {f"probability_{name}": ("output", "1") for name in own.python.modes}
@@ -295,7 +295,7 @@ def assert_described(own: Exported) -> None:
 def test_a_tool_without_python_of_ours_gets_the_same(exported: Exported, dry_case: Case) -> None:
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     time = np.arange(1500) * 0.005
-    names = ("time", *(one.name for one in (*SYSTEM.inputs, *SYSTEM.outputs)))
+    names = ("time", *(signal.name for signal in (*SYSTEM.inputs, *SYSTEM.outputs)))
     signals = np.column_stack([time, dry_case.u[:1500], dry_case.y[:1500]])
     recorded = np.array([tuple(row) for row in signals], [(n, float) for n in names])
     result = fmpy.simulate_fmu(
@@ -385,7 +385,7 @@ def test_a_machine_whose_output_is_no_state_exports(tmp_path: Path) -> None:
     u = np.array([one.scale for one in system.inputs]) * rng.standard_normal(
         (300, len(system.inputs))
     )
-    y = np.array([one.scale for one in system.outputs]) * rng.standard_normal(
+    y = np.array([output.scale for output in system.outputs]) * rng.standard_normal(
         (300, len(system.outputs))
     )
     with opened(system, "ekf") as estimator:
@@ -494,7 +494,7 @@ def test_the_command_writes_a_bank_with_gains_of_its_filters(
         libraries = [n for n in archive.namelist() if n.startswith("binaries/")]
     assert len(libraries) == 1
     elements = read_ssd(str(tmp_path / "out" / f"{model}.ssp"), validate=True).system.elements
-    assert [one.source for one in elements][1] == f"resources/{model}.fmu"
+    assert [element.source for element in elements][1] == f"resources/{model}.fmu"
 
 
 def test_gains_of_another_estimator_are_refused(

@@ -144,20 +144,24 @@ def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it(
         {
             "causes": [{"effect": "Leak", "confusable_with": []}],
             "errors": [
-                error(units.get(one.unit, one.unit), one.channel, held_out=bool(one.held_out)),
-                error("m", "other", held_out=not one.held_out),
+                error(
+                    units.get(machine.unit, machine.unit),
+                    machine.channel,
+                    held_out=bool(machine.held_out),
+                ),
+                error("m", "other", held_out=not machine.held_out),
             ],
         }
-        for one in MACHINES.values()
+        for machine in MACHINES.values()
     ]
     _, *rows = machines(*summaries)
     found = dict(zip(MACHINES, (row[2:] for row in rows), strict=True))
     assert found["cascaded_tanks"] == ["0.3 V", "0.04 V", "Leak"]
     assert found["servo_pendulum"] == ["200 mrad", "20 mrad", "Leak"]
     # Of two recordings the rms is that of all their samples: sqrt((100*0.3^2 + 300*0.5^2)/400).
-    one = MACHINES["O-ring"]
+    machine = MACHINES["O-ring"]
     longer = error("N", samples=300, rms=[0.5, 0.5])
-    assert one.errors({"errors": [error("N"), longer]})[0] == pytest.approx(0.458, abs=5e-4)
+    assert machine.errors({"errors": [error("N"), longer]})[0] == pytest.approx(0.458, abs=5e-4)
 
 
 def test_without_their_recordings_tables_stay(

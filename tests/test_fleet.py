@@ -32,7 +32,7 @@ def watched(where: str, out: Path, *more: str) -> dict[str, dict[str, object]]:
     assert main([*words, "--quiet"]) == 0
     said = json.loads((out / "fleet.json").read_text())
     check("fleet", said)
-    return {one["machine"]: one for one in said["machines"]}
+    return {machine["machine"]: machine for machine in said["machines"]}
 
 
 @pytest.fixture(scope="module")

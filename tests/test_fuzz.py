@@ -43,7 +43,7 @@ COUNTS = {
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Target]]:
     with one_process():
-        yield {one.name: one for one in targets(tmp_path_factory.mktemp("originals"))}
+        yield {target.name: target for target in targets(tmp_path_factory.mktemp("originals"))}
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())

@@ -80,7 +80,7 @@ def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
     base = system.models[OBSERVER].name
     law = of_heat(pads)[span]
     extended = extended_library(library, [law.written], tmp_path)
-    (own,) = [one for one in read_effects(extended, base) if one.name == law.written.name]
+    (own,) = [effect for effect in read_effects(extended, base) if effect.name == law.written.name]
     names = [f"padFriction.{name}" for name in ("Fperp", "v", "mu")]
     text = watching(source(extended, base, "Heat", [own], {}, {}, "A law of heat"), names)
     path = tmp_path / "Heat.fmu"

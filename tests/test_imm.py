@@ -105,7 +105,7 @@ def case(vessel: System) -> Case:
 
 
 def bank(fmu: FMU, system: System, lasts: float) -> InteractingMultipleModel:
-    conditions = tuple(replace(one, lasts=lasts) for one in system.conditions)
+    conditions = tuple(replace(condition, lasts=lasts) for condition in system.conditions)
     given = replace(system, conditions=conditions)
     return InteractingMultipleModel(fmu, given, InteractingMultipleModel.reasoned(fmu, given))
 
@@ -201,7 +201,7 @@ def rails() -> dict[str, Run]:
 
 
 def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
-    conditions = tuple(replace(one, parameters={}) for one in WHEELSET.conditions)
+    conditions = tuple(replace(condition, parameters={}) for condition in WHEELSET.conditions)
     plain = replace(WHEELSET, conditions=conditions, bands={})
     case = read_case(ROOT / "cases" / "09_wet_160_4.2_wsp", plain)
     with open_model(plain) as opened:

@@ -105,13 +105,15 @@ def test_a_state_that_nobody_measured_starts_where_the_recording_says(
 def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_path: Path) -> None:
     recordings = cases(heater, [simulated(k, LOSS, 3.0 * k) for k in range(4)])
     outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
-    assert [one.recording for one in outcome.errors if one.held_out] == ["02", "03"]
-    for one in outcome.errors:
-        assert one.rms[0] > 10.0 * NOISE
+    assert [error.recording for error in outcome.errors if error.held_out] == ["02", "03"]
+    for error in outcome.errors:
+        assert error.rms[0] > 10.0 * NOISE
         # Sampling scatter of a standard deviation over a thousand samples is 2 %.
-        assert one.rms[1] == pytest.approx(NOISE, rel=0.1)
+        assert error.rms[1] == pytest.approx(NOISE, rel=0.1)
         # Of normal errors.
-        assert one.mean_absolute[1] == pytest.approx(one.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05)
+        assert error.mean_absolute[1] == pytest.approx(
+            error.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05
+        )
     assert "2 recordings held out" in outcome.summary()
 
 
@@ -210,10 +212,12 @@ def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path: Path) -> 
         frame["T [K]"] = np.minimum(frame["T [K]"], limit)
     outcome = diagnosed(cut_off, cases(cut_off, frames), tmp_path / "out")
     # A right model saturates where the sensor does: all samples are told, those errors are none.
-    for one, frame in zip(outcome.errors, frames, strict=True):
-        assert one.samples > 0.99 * SECONDS  # a sample between two at the limit may pass for wrong
+    for error, frame in zip(outcome.errors, frames, strict=True):
+        assert (
+            error.samples > 0.99 * SECONDS
+        )  # a sample between two at the limit may pass for wrong
         below = float((frame["T [K]"] < limit).mean())
-        assert one.rms[0] == pytest.approx(NOISE * np.sqrt(below), rel=0.1)
+        assert error.rms[0] == pytest.approx(NOISE * np.sqrt(below), rel=0.1)
 
 
 def test_a_fast_rise_between_slow_falls_is_no_spike(heater: System) -> None:

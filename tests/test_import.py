@@ -242,7 +242,7 @@ def test_nothing_is_claimed_of_a_condition_that_nobody_knows(
         (case,) = wb.read_cases(tmp_path / said, system)
         runs[said] = wb.observe(system, case, "ekf")
     np.testing.assert_array_equal(runs["dry"].estimate, runs["unknown"].estimate)
-    (rail,) = [one.name for one in system.estimated if "wheel_rail" in one.claimed]
+    (rail,) = [quantity.name for quantity in system.estimated if "wheel_rail" in quantity.claimed]
     assert runs["dry"].claimed[rail].any()
     assert not runs["unknown"].claimed[rail].any()
 
@@ -272,7 +272,7 @@ def test_channels_confirmed_for_a_folder_hold_for_its_files(
         csv_of_a_german_rig(tmp_path / name, recorded(stop, system))
     assert main(["import", str(tmp_path / "a.csv"), "--out", str(out), "--yes"]) == 0
     assert main(["import", str(tmp_path / "b.csv"), "--out", str(out)]) == 0  # nobody answers
-    assert [one.name for one in wb.read_cases(out, system)] == ["a", "b"]
+    assert [read_case.name for read_case in wb.read_cases(out, system)] == ["a", "b"]
     (tmp_path / "columns.toml").write_bytes((out / "columns.toml").read_bytes())
     unknown = {"wheel_rail": "unknown", "discs": "unknown"}
     (case,) = wb.read_cases(tmp_path / "b.csv", system, conditions=unknown)
@@ -454,7 +454,7 @@ def test_of_several_files_one_that_is_refused_leaves_the_others(
     good = table("good.csv")
     command = ["import", str(bad), str(good), "--out", str(tmp_path / "out"), "--yes"]
     assert main(command) == 2
-    assert [one.name for one in wb.read_cases(tmp_path / "out", system)] == ["good"]
+    assert [read_case.name for read_case in wb.read_cases(tmp_path / "out", system)] == ["good"]
 
 
 def test_a_folder_with_other_files_is_left_as_it_is(

@@ -59,7 +59,7 @@ def test_a_header_that_is_narrower_than_its_samples_is_refused(
 def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
     rows = [f"{i};{i}.5;;" for i in range(60)]
     (group,) = read_foreign(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
-    assert [one.name for one in group.channels] == ["time", "h"]
+    assert [channel.name for channel in group.channels] == ["time", "h"]
 
 
 # --- times ---
@@ -271,7 +271,7 @@ def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
         str(tmp_path / "o"),
     ]
     columns = ("time=t [s]", "h=h [mm]", "inflow=inflow [l/s]")
-    assert main([*command, *(part for one in columns for part in ("--column", one))]) == 0
+    assert main([*command, *(part for column in columns for part in ("--column", column))]) == 0
     told = [line for line in capsys.readouterr().err.splitlines() if "as named" in line]
     assert [line.partition("channel ")[2] for line in told] == [
         "'h': taken in [mm], as named, and the file states [Zoll]",

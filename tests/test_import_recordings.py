@@ -38,7 +38,7 @@ def cases(root: Path, system: System) -> list[Case]:
 
 @pytest.fixture(scope="module")
 def stops(cases: list[Case], system: System) -> dict[str, Columns]:
-    return {name: recorded(one, system) for name, one in zip(NAMES, cases, strict=True)}
+    return {name: recorded(case, system) for name, case in zip(NAMES, cases, strict=True)}
 
 
 @pytest.fixture(autouse=True)
@@ -107,8 +107,8 @@ def test_one_question_asks_for_all_recordings_and_what_it_says_is_kept(
 
     monkeypatch.setattr(builtins, "input", answer)
     unnamed = {
-        title: {name.replace("Bremsdruck", "Kanal 7"): column for name, column in one.items()}
-        for title, one in stops.items()
+        title: {name.replace("Bremsdruck", "Kanal 7"): column for name, column in stop.items()}
+        for title, stop in stops.items()
     }
     for name in ("a.xlsx", "b.xlsx"):
         workbook(tmp_path / name, unnamed)
@@ -348,7 +348,7 @@ def test_channels_of_two_loggers_on_two_sheets_are_one_recording(
     columns = stops["Stop 1"]
     pressure = {name: columns[name] for name in ("Zeit", "Bremsdruck", "Temperatur")}
     others = {
-        name: one for name, one in columns.items() if name not in ("Bremsdruck", "Temperatur")
+        name: column for name, column in columns.items() if name not in ("Bremsdruck", "Temperatur")
     }
     workbook(tmp_path / "a.xlsx", {"hydraulics": pressure, "drive": others})
     assert take("a.xlsx") == 0
@@ -375,7 +375,7 @@ def test_vectors_without_a_time_of_their_own_are_no_recordings(
     """TDMS without waveforms."""
     with TdmsWriter(tmp_path / "a.tdms") as file:
         for title, columns in stops.items():
-            held = {name: one for name, one in columns.items() if name != "Zeit"}
+            held = {name: column for name, column in columns.items() if name != "Zeit"}
             channels = [
                 ChannelObject(title, name, values, {"unit_string": unit})
                 for name, (unit, values) in held.items()

@@ -64,7 +64,9 @@ def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
 
 def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
     of = block(folder / "block", f"[diagnosis.levels]\n{HALVES}")
-    return [one.effect.name for one in diagnosed(of, cases(of, frames), folder).diagnosis.causes]
+    return [
+        cause.effect.name for cause in diagnosed(of, cases(of, frames), folder).diagnosis.causes
+    ]
 
 
 def test_what_no_block_of_its_kind_has_is_a_cause(tmp_path: Path) -> None:

@@ -91,7 +91,10 @@ end P;
     assert n.prefixes == {"final", "parameter"}
     assert M.modifier.value == "[1, 2; 3, 4]"
     assert n.modifier.value == "if 1 > 0 then 3 else 4"
-    assert [one.value for one in a.modifier.inner.values()] == ["-1.0", '{f(1, "x"), 2}']
+    assert [modification.value for modification in a.modifier.inner.values()] == [
+        "-1.0",
+        '{f(1, "x"), 2}',
+    ]
     assert (b.modifier.value, b.description, b.type) == ("2.0*a[1]", "Second", "Real")
     assert "input" in u.prefixes
     assert (s.modifier.value, s.description) == ('"text"', "Label")
@@ -208,7 +211,7 @@ def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path: Path) -> N
     )
     parts = found.components("P.C")
     assert list(parts) == ["u", "w", "p"]
-    assert {key: one.value for key, one in parts["u"].modifier.inner.items()} == {
+    assert {key: modification.value for key, modification in parts["u"].modifier.inner.items()} == {
         "unit": '"m"',
         "min": "1",
     }

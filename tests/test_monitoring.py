@@ -97,16 +97,16 @@ class Machine:
 def changed(tracks: Sequence[Track]) -> dict[str, list[int]]:
     """Recordings at which alarms were raised, by quantity."""
     return {
-        f"{one.name} against" if one.against else one.name: [c.raised for c in one.changes]
-        for one in tracks
-        if one.changes
+        f"{track.name} against" if track.against else track.name: [c.raised for c in track.changes]
+        for track in tracks
+        if track.changes
     }
 
 
 def test_a_sound_machine_raises_alarms_at_the_stated_rate() -> None:
     """One in a hundred recordings: of 25 machines over 100 recordings each, 25 are expected."""
     machines = [Machine(seed, 100).watched() for seed in range(25)]
-    alarms = [c for tracks in machines for one in tracks for c in one.changes if not c.returns]
+    alarms = [c for tracks in machines for track in tracks for c in track.changes if not c.returns]
     # By chance, more or fewer in one seed of a thousand.
     assert 11 <= len(alarms) <= 42
 
@@ -206,11 +206,11 @@ def usual(history: Path, train: System, tmp_path_factory: pytest.TempPathFactory
     return wb.monitor(train, history, out=tmp_path_factory.mktemp("usual"), workers=1)
 
 
-def same(one: Monitored, other: Monitored) -> None:
+def same(monitored: Monitored, other: Monitored) -> None:
     """Everything, to the last bit."""
-    assert one.to_dict() == other.to_dict()
-    pd.testing.assert_frame_equal(one.to_frame(), other.to_frame(), check_exact=True)
-    pd.testing.assert_frame_equal(one.worked(), other.worked(), check_exact=True)
+    assert monitored.to_dict() == other.to_dict()
+    pd.testing.assert_frame_equal(monitored.to_frame(), other.to_frame(), check_exact=True)
+    pd.testing.assert_frame_equal(monitored.worked(), other.worked(), check_exact=True)
 
 
 def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: Monitored) -> None:
@@ -353,7 +353,7 @@ def test_the_page_shows_what_has_changed_and_where(
 
 
 def test_a_machine_that_has_not_changed_says_so(usual: Monitored, tmp_path: Path) -> None:
-    sound = replace(usual, tracks=tuple(replace(one, changes=()) for one in usual.tracks))
+    sound = replace(usual, tracks=tuple(replace(track, changes=()) for track in usual.tracks))
     page = write_monitored(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
     told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
     assert "nothing has changed" in told.xpath("string(//h2[@id='shown'])")
@@ -417,4 +417,7 @@ def test_the_cause_of_a_slow_loss_is_named_with_its_axle(tmp_path: Path) -> None
     words = ["monitor", str(RECORDINGS / "history"), "--system", "train", "--diagnose"]
     assert main([*words, "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "cause" / "summary.json").read_text())
-    assert [one["effect"] for one in summary["causes"]] in (["WeakPads[7]"], ["IsolatedUnit[7]"])
+    assert [cause["effect"] for cause in summary["causes"]] in (
+        ["WeakPads[7]"],
+        ["IsolatedUnit[7]"],
+    )

@@ -45,7 +45,7 @@ def test_it_is_simulated_on_its_recordings(folder: Path, tmp_path: Path) -> None
     assert isinstance(cases, dict)
     assert len(cases) == 4
     for case in cases.values():
-        errors = {name: one["h_nrmse"] for name, one in case["estimators"].items()}
+        errors = {name: estimator["h_nrmse"] for name, estimator in case["estimators"].items()}
         # What seeps is a sixth of what leaves: without feedback the level is wrong by as much.
         alone = errors.pop("open_loop")
         assert alone > 0.1

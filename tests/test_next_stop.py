@@ -110,8 +110,8 @@ def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
     """Reference: d' (I + P P')^-1 d, the covariance of noise and of a tolerance of one sigma."""
     rng = np.random.default_rng(2)
     d, P = rng.standard_normal(9), rng.standard_normal((9, 2))
-    one = RecordingSystem(d, np.zeros((9, 0)), P, np.zeros(2), np.full(2, np.inf), 1)
-    left, _ = refitted(one.eliminated(), np.zeros((0, 0)))
+    system = RecordingSystem(d, np.zeros((9, 0)), P, np.zeros(2), np.full(2, np.inf), 1)
+    left, _ = refitted(system.eliminated(), np.zeros((0, 0)))
     # The elimination adds 1e-9 to what is known of each, so that unknown ones can be solved for.
     assert_allclose(left, d @ np.linalg.solve(np.eye(9) + P @ P.T, d), rtol=1e-7)
 
@@ -120,8 +120,8 @@ def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
     """Reference: eliminating what is at its best already changes nothing."""
     rng = np.random.default_rng(4)
     r, P = rng.standard_normal(9), rng.standard_normal((9, 2))
-    one = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, np.full(2, np.inf), 1)
-    joint = Joint((), (), (), (one,), Quadratic(np.zeros((0, 0)), np.zeros(0), 5.0, 0))
+    system = RecordingSystem(r, np.zeros((9, 0)), P, -P.T @ r, np.full(2, np.inf), 1)
+    joint = Joint((), (), (), (system,), Quadratic(np.zeros((0, 0)), np.zeros(0), 5.0, 0))
     assert_allclose(joint.chi_squared, joint.total().c, rtol=1e-9)
 
 
@@ -189,7 +189,9 @@ def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> No
     varied = VariedInput("u", 2.0, 5.0, (RELEASE,), 3.0, 4.0, ())
     asked = replace(a_grid([1]), varied=(varied,))
     (first,) = every_setting(asked)
-    (half,), (full,) = (one.profiles for one in (first, *other_profiles(asked, first)))
+    (half,), (full,) = (
+        other_profile.profiles for other_profile in (first, *other_profiles(asked, first))
+    )
     time = np.arange(0.0, 60.0, 0.1)
     assert_allclose(full.demand(time), np.where((time >= 3.0) & (time < 7.0), 5.0, 0.0))
     assert_allclose(half.demand(time), 0.7 * full.demand(time))
@@ -210,7 +212,7 @@ def test_of_a_large_grid_a_fraction_is_tried_with_every_value(
         assert min(often) > 0
         assert np.ptp(often) <= 2
     # What is left out differs from something that is tried in one setting.
-    near = [one for each in some for one in other_settings(asked, each)]
+    near = [other_setting for each in some for other_setting in other_settings(asked, each)]
     assert len(other_settings(asked, every[0])) == sum(counts) - len(counts)
     assert all(one in near for one in every if one not in some)
 
@@ -279,9 +281,9 @@ def proposed(undecided: Outcome) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
-def made(block: System, one: RankedExperiment) -> list[Case]:
+def made(block: System, experiment: RankedExperiment) -> list[Case]:
     """A recording of an experiment, by SciPy."""
-    power = one.prediction.candidate.profiles[0].demand(one.prediction.case.time)
+    power = experiment.prediction.candidate.profiles[0].demand(experiment.prediction.case.time)
     return cases(block, [heated(9, power, WARM)])
 
 
@@ -349,8 +351,8 @@ def test_a_rival_cannot_use_what_its_recordings_so_far_hold(
             replace(
                 model,
                 recordings=tuple(
-                    replace(one, furthest=np.full(one.P.shape[1], furthest))
-                    for one in model.recordings
+                    replace(recording, furthest=np.full(recording.P.shape[1], furthest))
+                    for recording in model.recordings
                 ),
             )
             for model in rivals.models
@@ -402,8 +404,8 @@ def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided: Outco
     assert undecided.rivals is not None
     for model in undecided.rivals.models:
         still = np.zeros(len(model.sizes) + len(model.levels))
-        for one in model.recordings:
-            assert_allclose(one.moved(still).deviations, one.deviations, atol=1e-6)
+        for recording in model.recordings:
+            assert_allclose(recording.moved(still).deviations, recording.deviations, atol=1e-6)
 
 
 def test_rivals_are_read_as_they_were_written(undecided: Outcome) -> None:
@@ -491,4 +493,4 @@ def test_a_mistake_in_what_may_be_varied_is_refused(
 
 def named_anew(recordings: Sequence[Case]) -> list[Case]:
     """Under other names than those before."""
-    return [replace(one, name=f"new {one.name}") for one in recordings]
+    return [replace(recording, name=f"new {recording.name}") for recording in recordings]

@@ -29,7 +29,7 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system: System, tmp_path:
     light = read_cases([RADIUS / "01_dry_80_1.5"], system)
     _, rivals = rivals_of_set(system, effects, all_effects, light)
     assert rivals is not None
-    assert {one.effects for one in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
+    assert {model.effects for model in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
     asked = next_stop(system, rivals, 1, lambda _: None)
     assert "initial speed 160 km/h" in asked.tried[0].text
     both = [*light, *read_cases([RADIUS / "06_dry_160_3.6_rev"], system)]

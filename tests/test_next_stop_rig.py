@@ -45,7 +45,7 @@ def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
     """Two stops from 80 km/h at 2.7 bar."""
     for seed, name in enumerate(("24_alike_80_2.7", "25_alike_80_2.7")):
         record(SCENARIOS[name], seed, effects, folder / name)
-    return [read_case(one, system) for one in sorted(folder.iterdir())]
+    return [read_case(path, system) for path in sorted(folder.iterdir())]
 
 
 @pytest.fixture(scope="module")
@@ -67,9 +67,9 @@ def proposed(undecided: Outcome) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
-def made(one: RankedExperiment, system: System, folder: Path) -> Case:
+def made(experiment: RankedExperiment, system: System, folder: Path) -> Case:
     """The stop as the rig makes it."""
-    (folder / "next.json").write_text(json.dumps({"tried": [one.to_dict()]}))
+    (folder / "next.json").write_text(json.dumps({"tried": [experiment.to_dict()]}))
     stop = proposed_stop(folder, system)
     record(stop, 30, PLANTED, folder / stop.name)
     return read_case(folder / stop.name, system)
@@ -168,7 +168,7 @@ def of_two(
     cases = two_stops(system, effects, folder / "stops")
     found = wb.diagnose(system, cases, effects=names, out=folder, workers=1, report=lambda _: None)
     assert found.rivals is not None
-    assert [one.effects for one in found.rivals.models] in (
+    assert [model.effects for model in found.rivals.models] in (
         [(a,), (b,)] for a, b in permutations(names)
     )
     return cases, found.rivals, effects

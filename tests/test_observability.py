@@ -304,7 +304,7 @@ def test_local_gramian_is_the_empirical_gramian_of_the_nonlinear_model(minimal):
     path = simulate(x0, np.zeros(2))
     measured = [minimal.states.index(name) for name in ("omegaW", "omegaR")]
     noise = np.column_stack(
-        [one.deviation(path[:, at]) for one, at in zip(SYSTEM.outputs, measured, strict=True)]
+        [output.deviation(path[:, at]) for output, at in zip(SYSTEM.outputs, measured, strict=True)]
     )
     steps = np.array([1e-3, 1e-3, 1e-3, 1e-3])
     sensitivity = []

@@ -317,7 +317,7 @@ def test_forward_and_reverse_are_mirror_images(
         estimator = ParameterEstimator(fmu, WHEELSET, reasoned)
     forward, reverse = replay(case, estimator), replay(mirrored, estimator)
     turning = ("omegaW", "omegaR", "Fx", "slip", "speed")
-    signs = np.array([-1.0 if one in turning else 1.0 for one in forward.columns])
+    signs = np.array([-1.0 if column in turning else 1.0 for column in forward.columns])
     # Rounding only, amplified by the stiff slip.
     assert_allclose(reverse.estimate, signs * forward.estimate, rtol=1e-6, atol=1e-3)
 
@@ -411,9 +411,9 @@ def test_stationary_gains_stabilise_the_linearised_model(fmu: FMU, gains: Gains)
     error = extended - L[:, :2] @ np.eye(2, 4)
     assert np.linalg.eigvals(error).real.max() < -0.1
     # The Kalman gain satisfies its own Riccati equation: P from the Lyapunov equation of the error.
-    noise = [one.noise_at_scale for one in WHEELSET.outputs]
+    noise = [output.noise_at_scale for output in WHEELSET.outputs]
     R = np.diag(noise) ** 2 * WHEELSET.sample_time
-    Q = np.diag([*walks(fmu, WHEELSET), *(one.walk for one in WHEELSET.estimated)]) ** 2
+    Q = np.diag([*walks(fmu, WHEELSET), *(quantity.walk for quantity in WHEELSET.estimated)]) ** 2
     K = L[:, :2]
     P = solve_continuous_lyapunov(error, -(Q + K @ R @ K.T))
     # Two solvers of condition number 1e6 agree to ten digits less.

@@ -76,7 +76,9 @@ def test_a_size_that_is_an_array_makes_an_effect_in_each_place(tmp_path: Path) -
 
 def test_all_places_or_one_are_chosen_by_name(tmp_path: Path) -> None:
     effects = read_effects(orchard(tmp_path), "Base")
-    assert [one.name for one in choose(["Clogging"], effects)] == [one.name for one in effects[:3]]
+    assert [one.name for one in choose(["Clogging"], effects)] == [
+        effect.name for effect in effects[:3]
+    ]
     assert choose(["Clogging[2]", "Drought"], effects) == (effects[1], effects[3])
     with pytest.raises(InputError, match=r"no effect of this name \(closest: 'Clogging"):
         choose(["Clogging[4]"], effects)

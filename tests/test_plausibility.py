@@ -212,17 +212,17 @@ def test_no_effect_of_the_virtual_rig_makes_a_recording_doubtful(tmp_path, syste
     usual = SCENARIOS["03_dry_120_3.6"]
     slower = dataclasses.replace(usual.conditions, initial_speed=60 / 3.6)
     rig = PlantedStops((dataclasses.replace(usual, conditions=slower),), REFERENCE)
-    least = {one.name: one.metadata["least"] for one in dataclasses.fields(Effects)}
+    least = {field.name: field.metadata["least"] for field in dataclasses.fields(Effects)}
     tried = 0
-    for one in PLANTABLE:
-        for size in (16.0, -16.0) if one.signed else (16.0,):
-            gains = {one.name: size * known.size(one)}
-            if gains[one.name] < least[one.name]:
+    for plantable in PLANTABLE:
+        for size in (16.0, -16.0) if plantable.signed else (16.0,):
+            gains = {plantable.name: size * known.size(plantable)}
+            if gains[plantable.name] < least[plantable.name]:
                 continue
-            folder = tmp_path / f"{one.name} {size:g}"
+            folder = tmp_path / f"{plantable.name} {size:g}"
             rig.write(rig.simulate(1, gains), gains, folder)
             (case,) = read_cases([folder], system)
-            assert case.doubts == (), one.name
+            assert case.doubts == (), plantable.name
             tried += 1
     assert tried > len(PLANTABLE)
 

@@ -99,7 +99,7 @@ def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside() -> None:
-    assert sorted(one.effect for one in PLANTABLE if one.effect) == sorted(
+    assert sorted(plantable.effect for plantable in PLANTABLE if plantable.effect) == sorted(
         effect.name for effect in REPERTOIRE.effects
     )
     faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
@@ -117,7 +117,9 @@ def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:
         return np.array(list(stop.truth.values()))[:, :5000]
 
     none = truth([])
-    assert np.array_equal(truth([one.name for one in PLANTABLE if one.sensed]), none)
+    assert np.array_equal(
+        truth([plantable.name for plantable in PLANTABLE if plantable.sensed]), none
+    )
     assert not np.array_equal(truth(["wheel_radius"]), none)
 
 
@@ -128,14 +130,14 @@ def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Pa
     block = SYSTEM.comparison.block
     bounds |= {name: (-block, block) for name in late_signals(SYSTEM)}
     for effect in REPERTOIRE.effects:
-        one = next(one for one in PLANTABLE if one.effect == effect.name)
+        plantable = next(plantable for plantable in PLANTABLE if plantable.effect == effect.name)
         low, high = bounds[variables(effect, effect.size)[0]]
         assert low is not None
         assert high is not None
         if not effect.hidden:
-            assert 4.0 * REPERTOIRE.size(one) <= high, effect.name
-            assert not one.signed or -4.0 * REPERTOIRE.size(one) >= low, effect.name
-        assert set(one.shapes) == {name for name, _ in effect.shapes}
+            assert 4.0 * REPERTOIRE.size(plantable) <= high, effect.name
+            assert not plantable.signed or -4.0 * REPERTOIRE.size(plantable) >= low, effect.name
+        assert set(plantable.shapes) == {name for name, _ in effect.shapes}
 
 
 def test_longer_plan_holds_the_shorter_one() -> None:
@@ -312,8 +314,8 @@ def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path: Pat
     path = tmp_path / "sets.jsonl"
     results = [said({"fx_gain": 0.1 * k}) for k in range(1, 4)]
     journal = Journal(path, IDENTITY, resume=False)
-    for one in results:
-        journal.append(one)
+    for result in results:
+        journal.append(result)
     whole = path.read_text()
     path.write_text(whole.replace("0.2", "0.3", 1))
     damaged = path.read_text()
@@ -378,7 +380,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert not interrupted
     assert len(lines) == 2
     assert lines[0].startswith("[   1/2] fx_gain=0.016")
-    assert [one.verdict for one in results] == ["nothing", "found", "nothing"]
+    assert [result.verdict for result in results] == ["nothing", "found", "nothing"]
     assert named_right(results[1])
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
 
@@ -388,7 +390,7 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     rig, effects = PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM)
     sizes = (0.25, 8.0)
     rows = foresee(SYSTEM, rig, effects, PLANTABLE, sizes, 1)
-    by_name = {one.effect: one for one in rows}
+    by_name = {row.effect: row for row in rows}
     (faint, small), (plain, large) = by_name["FxGain"].chances
     assert (faint, plain) == pytest.approx((0.0005, 0.016))
     assert small < 0.01
@@ -399,7 +401,7 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     check("plan", json.loads((tmp_path / "plan.json").read_text()))
     assert (tmp_path / "plan.svg").exists()
     assert "these recordings cannot show it" in format_plan(rows, sizes)
-    (row,) = (one for one in format_plan(rows, sizes).splitlines() if one.startswith("FxGain "))
+    (row,) = (line for line in format_plan(rows, sizes).splitlines() if line.startswith("FxGain "))
     assert row.count("%") == 2 + len(
         sizes
     )  # of the size that matters, of chances, and that is sure
@@ -418,11 +420,11 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns: int) -> None:
 
 
 def test_one_effect_at_one_size_is_one_set() -> None:
-    one = Repertoire(REPERTOIRE.plantables[:1], REPERTOIRE.effects)
-    (group,) = plan(one, 0, [4.0], 1, 5, 1)
+    repertoire = Repertoire(REPERTOIRE.plantables[:1], REPERTOIRE.effects)
+    (group,) = plan(repertoire, 0, [4.0], 1, 5, 1)
     (planted,) = group
     assert planted.multiple == 4.0
-    assert list(planted.gains) == [one.plantables[0].name]
+    assert list(planted.gains) == [repertoire.plantables[0].name]
     # What a set is does not depend on how many others there are.
     assert group in plan(REPERTOIRE, 3, [4.0, 8.0], 2, 5, 1)
 

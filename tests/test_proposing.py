@@ -87,7 +87,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def recorded(folder: Path, leaves: Callable[[float, float], float]) -> Path:
     """The new system, recorded with a flow [m3/s] that leaves by time [s] and level [m]."""
     write_system(folder)
-    for number, one in enumerate(sorted((folder / "recordings").iterdir())):
+    for number, path in enumerate(sorted((folder / "recordings").iterdir())):
         rng = np.random.default_rng(100 + number)
         inflow = np.repeat(rng.uniform(2e-3, 8e-3, 5), 240)
         measured = inflow + 5e-5 * rng.standard_normal(1200)
@@ -98,7 +98,7 @@ def recorded(folder: Path, leaves: Callable[[float, float], float]) -> Path:
             for k, (u, y) in enumerate(zip(measured, h, strict=True))
         ]
         head = "time [s],inflow [l/s],h [mm]"
-        (one / "measured.csv").write_text("\n".join([head, *rows]) + "\n")
+        (path / "measured.csv").write_text("\n".join([head, *rows]) + "\n")
     return folder
 
 
@@ -189,13 +189,13 @@ def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path: Path) -> 
     options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
     before = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert [one["effect"] for one in before["causes"]] == ["Seepage"]
+    assert [cause["effect"] for cause in before["causes"]] == ["Seepage"]
     told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
     (law,) = told["laws"]
     assert (law["slot"], "time since the beginning" in law["text"]) == ("outlet", True)
     assert "beside Seepage" in told["sentence"]
     after = json.loads((tmp_path / "out" / "proposed" / "summary.json").read_text())
-    (known,) = [one for one in after["causes"] if one["effect"] == "Seepage"]
+    (known,) = [cause for cause in after["causes"] if cause["effect"] == "Seepage"]
     assert known["parameters"]["k"]["low"] < seepage < known["parameters"]["k"]["high"]
     assert after["gain"]["after"] < 0.5 * before["gain"]["after"]
 
@@ -253,7 +253,7 @@ def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance() -> N
         errors, clocks = swinging(rng, 0.0)
         found = strongest_period(errors, clocks, 20)
         assert found is not None
-        fast = [one - uniform_filter1d(one, 20, axis=0, mode="nearest") for one in errors]
+        fast = [error - uniform_filter1d(error, 20, axis=0, mode="nearest") for error in errors]
         power = 0.0
         for own, clock in zip(fast, clocks, strict=True):
             wave = np.exp(2j * np.pi * clock / found.length)
@@ -382,12 +382,12 @@ def test_the_overflow_of_a_real_tank_is_proposed_as_a_threshold_of_its_level(
     folder = published_cases("cascaded_tanks", "cascaded_tanks")
     system = load_system("cascaded_tanks")
     library = read_library(system.library)
-    effects = [one.name for one in read_effects(library, system.models[OBSERVER].name)]
+    effects = [effect.name for effect in read_effects(library, system.models[OBSERVER].name)]
     options = ["--system", "cascaded_tanks", "--held-out", "test", "--out", str(tmp_path)]
     left = [name for name in effects if name != "UpperOverflow"]
     command = ["diagnose", str(folder), *options, "--effects", *left, "--propose", "--workers", "1"]
     assert main(command) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["verdict"] == "unexplained"
     told = json.loads((tmp_path / "proposed" / "proposal.json").read_text())
-    thresholds = [one for one in told["laws"] if "threshold" in one["parameters"]]
-    assert "upperRim" in {one["slot"] for one in thresholds}
+    thresholds = [law for law in told["laws"] if "threshold" in law["parameters"]]
+    assert "upperRim" in {threshold["slot"] for threshold in thresholds}

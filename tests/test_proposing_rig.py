@@ -20,7 +20,7 @@ def stops(system: System, seed: int, folder: Path) -> list[Case]:
     planted = plant(CONSTANT_PADS, ["bedding_in=0.08"])
     for name in ("02_dry_100_2.7", "03_dry_120_3.6", "05_dry_120_2.7_rev"):
         record(SCENARIOS[name], seed, planted, folder / name)
-    return [read_case(one, system) for one in sorted(folder.iterdir())]
+    return [read_case(path, system) for path in sorted(folder.iterdir())]
 
 
 @pytest.mark.long
@@ -42,7 +42,7 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(
     form = found.forms[law.effect.name]
     assert form.law.influence is not None
     assert (form.law.influence.kind, form.form.name) == ("since", "Saturation")
-    slots = {one.law.place.slot.name for one in found.forms.values()}
+    slots = {form.law.place.slot.name for form in found.forms.values()}
     assert "padFriction" in slots
     assert slots <= {
         "padFriction",

@@ -23,7 +23,9 @@ def folder(published_cases: Callable[[str, str], Path]) -> Path:
 
 
 def read(folder: Path) -> dict[str, Case]:
-    return {one.name: one for one in read_cases([folder], load_system("air_supply"))}
+    return {
+        read_case.name: read_case for read_case in read_cases([folder], load_system("air_supply"))
+    }
 
 
 def test_both_layouts_hold_the_same_recordings(
@@ -41,7 +43,7 @@ def test_both_layouts_hold_the_same_recordings(
 
 def test_each_cycle_begins_with_the_compressor_off_and_has_one_start(folder: Path) -> None:
     cases = read(folder)
-    assert sum(one.time.size for one in cases.values()) == 1000
+    assert sum(case.time.size for case in cases.values()) == 1000
     for case in cases.values():
         assert case["COMP"][0] == 1.0
         assert np.sum(np.diff(case["COMP"]) < 0.0) == 1

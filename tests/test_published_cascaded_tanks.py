@@ -23,7 +23,10 @@ def folder(published_cases: Callable[[str, str], Path]) -> Path:
 
 
 def read(folder: Path) -> dict[str, Case]:
-    return {one.name: one for one in read_cases([folder], load_system("cascaded_tanks"))}
+    return {
+        read_case.name: read_case
+        for read_case in read_cases([folder], load_system("cascaded_tanks"))
+    }
 
 
 def test_both_layouts_hold_the_same_recordings(

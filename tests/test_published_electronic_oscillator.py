@@ -47,7 +47,7 @@ def test_the_stiffening_spring_alone_is_named(
     system = load_system("electronic_oscillator")
     fitted = read_cases([cases / f"multisine_{number}" for number in (1, 2, 3)], system)
     outcome = diagnose(system, fitted, out=tmp_path, workers=1, report=lambda line: None)
-    assert [one.effect.name for one in outcome.diagnosis.causes] == ["CubicSpring"]
-    before, after = np.sqrt(np.mean([np.square(one.rms) for one in outcome.errors], axis=0))
+    assert [cause.effect.name for cause in outcome.diagnosis.causes] == ["CubicSpring"]
+    before, after = np.sqrt(np.mean([np.square(error.rms) for error in outcome.errors], axis=0))
     assert before > 7e-3
     assert after < 3.5e-4

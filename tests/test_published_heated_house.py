@@ -58,7 +58,9 @@ def rms(errors: Vector) -> float:
 @pytest.fixture(scope="module")
 def cases(published_cases: Callable[[str, str], Path]) -> dict[str, Case]:
     folder = published_cases("heated_house", "heated_house")
-    return {one.name: one for one in read_cases([folder], load_system("heated_house"))}
+    return {
+        read_case.name: read_case for read_case in read_cases([folder], load_system("heated_house"))
+    }
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +112,7 @@ def test_held_out_hours_are_foreseen_as_by_the_published_structure(
         max_nfev=25,
     )
     assert_allclose(rms(fit.fun), 0.317, atol=0.002)  # as the protocol has it
-    nominal, extended = next(one.rms for one in outcome.errors if one.held_out)
+    nominal, extended = next(error.rms for error in outcome.errors if error.held_out)
     assert extended < 0.6 * nominal
     assert extended < 1.1 * rms(free_run(np.exp(fit.x), rest)[FITTED:])
     assert extended < 1.15 * rms(free_run(np.array(PARAMETERS), rest)[FITTED:])
@@ -126,9 +128,9 @@ def test_with_all_hours_fitted_it_errs_less_than_the_published_model(
     found = diagnose(system, cases.values(), out=tmp_path, workers=1, report=lambda line: None)
     (cause,) = found.diagnosis.causes
     assert cause.effect.name == "ShellStore"
-    errors = {one.recording: one for one in found.errors}
-    squares = sum(one.samples * one.rms[1] ** 2 for one in errors.values())
-    samples = sum(one.samples for one in errors.values())
+    errors = {error.recording: error for error in found.errors}
+    squares = sum(error.samples * error.rms[1] ** 2 for error in errors.values())
+    samples = sum(error.samples for error in errors.values())
     published = free_run(np.array(PARAMETERS), cases["rest"])
     assert (squares / samples) ** 0.5 < 0.65 * rms(published[SETTLED:])
     assert errors["rest"].rms[1] < 0.6 * rms(published[FITTED:])

@@ -75,8 +75,8 @@ def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path: Path) -> Non
     assert above.columns["time [s]"][0] == 0.0
 
 
-def pressure(one: PublishedRecording) -> np.ndarray:
-    return one.columns["p [bar]"]
+def pressure(recording: PublishedRecording) -> np.ndarray:
+    return recording.columns["p [bar]"]
 
 
 # --- on the recordings, where they are at hand ---

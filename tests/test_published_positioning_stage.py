@@ -38,6 +38,6 @@ def test_friction_and_its_slant_are_named(
     system = load_system("positioning_stage")
     fitted = read_cases([cases / "motion"], system)
     outcome = diagnose(system, fitted, out=tmp_path, workers=1, report=lambda line: None)
-    causes = {one.effect.name: one for one in outcome.diagnosis.causes}
+    causes = {cause.effect.name: cause for cause in outcome.diagnosis.causes}
     assert set(causes) == {"DryFriction", "ViscousFriction", "SlantedDamping"}
     assert outcome.diagnosis.causes[0].effect.name == "DryFriction"

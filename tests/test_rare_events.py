@@ -54,7 +54,7 @@ def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(
 ) -> None:
     """Of 95 % intervals nine in ten hold: what runs miss together, they do not show."""
     tails = [tail(evaluate, dimension, 100 * k) for k in range(10)]
-    found = [[one.quantile(decade) for decade in DECADES] for one in tails]
+    found = [[tail.quantile(decade) for decade in DECADES] for tail in tails]
     held = [
         row.low <= value <= row.high for one in found for row, value in zip(one, exact, strict=True)
     ]

@@ -49,7 +49,9 @@ def test_what_is_said_of_the_discs_reaches_the_model(tmp_path: Path) -> None:
 def test_fade_of_the_model_begins_there_too(tmp_path: Path) -> None:
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     library = read_library(SYSTEM.library)
-    (fade,) = (one for one in read_effects(library, "MinimalObserver") if one.name == "BrakeFade")
+    (fade,) = (
+        effect for effect in read_effects(library, "MinimalObserver") if effect.name == "BrakeFade"
+    )
     text = source(library, "MinimalObserver", "Fading", [fade], {}, {}, "Pads that fade")
     build(library, "Fading", text, tmp_path / "Fading.fmu", every_platform=False)
     forces = []
@@ -76,7 +78,7 @@ def coasting() -> Experiment:
         if all(one.settings[name].value == value for name, value in fixed.items())
     )
     profiles = other_profiles(SYSTEM.experiments, one)
-    return next(one for one in profiles if one.profiles[0].kind == RELEASE)
+    return next(profile for profile in profiles if profile.profiles[0].kind == RELEASE)
 
 
 def losses(omega: np.ndarray, c0: float, c1: float, c2: float) -> np.ndarray:

@@ -201,7 +201,7 @@ def test_the_answer_says_how_sure_it_is(page: Any, summary: dict[str, Any]) -> N
 def test_intervals_hold_the_usual_error_as_often_as_they_say() -> None:
     """Of 2000 sets of three recordings, 95 % but for two standard deviations of that count."""
     errors = np.random.default_rng(1).lognormal(np.log(0.2), 0.5, (2000, 3))
-    ends = np.array([usual_error(one.tolist()) for one in errors])
+    ends = np.array([usual_error(error.tolist()) for error in errors])
     held = np.mean((ends[:, 1] <= 0.2) & (ends[:, 2] >= 0.2))
     assert abs(held - 0.95) < 2 * np.sqrt(0.95 * 0.05 / 2000)
 
@@ -448,7 +448,7 @@ def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(
     assert narrow["drawn"] == narrow["room"] == narrow["scrolls"]  # one unit is one pixel
     assert narrow["right"] <= narrow["room"]
     assert 200 < narrow["panel"] < narrow["room"]
-    cut = [one for one in narrow["captions"] if one not in narrow["titles"]]
+    cut = [caption for caption in narrow["captions"] if caption not in narrow["titles"]]
     assert cut
     assert narrow["note"] == "; ".join(cut)
     assert browser["wide"] == [988, narrow["captions"]]

@@ -124,7 +124,7 @@ def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain: CaseResult) ->
         level = panel.high - (y - drawn["top"]) / drawn["height"] * (panel.high - panel.low)
         assert float(text) == pytest.approx(3.6 * level)
     others = drawing(figure)["panels"]
-    assert not any(one["further"] for one in others if one["unit"] != "m/s")
+    assert not any(other["further"] for other in others if other["unit"] != "m/s")
 
 
 def test_samples_are_those_of_the_curves(uncertain: CaseResult) -> None:

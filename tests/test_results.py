@@ -41,7 +41,7 @@ def other(results: Path, to: Path, **headline: dict[str, Any]) -> Path:
 
 def verdicts(before: Path, after: Path) -> dict[str, str]:
     (first,), (last,) = read_runs(before), read_runs(after)
-    return {one.name: one.verdict for one in compare_runs(first, last)}
+    return {compare_run.name: compare_run.verdict for compare_run in compare_runs(first, last)}
 
 
 def test_a_folder_says_command_date_version_system_answer_and_files(
@@ -103,7 +103,7 @@ def test_shares_whose_intervals_overlap_are_neither_better_nor_worse(
 def test_a_number_in_another_unit_is_not_compared(results: Path, tmp_path: Path) -> None:
     after = other(results, tmp_path / "after", error={"value": 0.1, "unit": "N"})
     changes = compare_runs(*read_runs(results), *read_runs(after))
-    assert [one.verdict for one in changes if one.name == NAME] == ["gone", "new"]
+    assert [change.verdict for change in changes if change.name == NAME] == ["gone", "new"]
 
 
 def test_what_else_differs_is_said(

@@ -229,7 +229,7 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
 def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for() -> None:
     assert SYSTEM.experiments is not None
     asked = PROPOSED | {"conditions": {**PROPOSED["conditions"], "wheel_load": 60e3}}
-    (surface,) = (one for one in SYSTEM.experiments.sensors if one.name == "surface")
+    (surface,) = (sensor for sensor in SYSTEM.experiments.sensors if sensor.name == "surface")
     usual, light = stop_of(PROPOSED, SYSTEM), stop_of(asked, with_sensor(SYSTEM, surface))
     assert (usual.conditions.wheel_load, usual.sensors) == (80e3, ())
     assert (light.conditions.wheel_load, light.sensors) == (60e3, ("surface",))

@@ -112,10 +112,12 @@ def test_a_slide_is_predicted_from_one_restart_to_the_next() -> None:
 
 def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
     """Noise alone, which a restart passes on to its block, and the wheel to the next ones."""
-    exclusions = tuple(replace(one, uncertain={}) for one in SYSTEM.comparison.exclusions)
+    exclusions = tuple(
+        replace(exclusion, uncertain={}) for exclusion in SYSTEM.comparison.exclusions
+    )
     system = replace(SYSTEM, comparison=replace(SYSTEM.comparison, exclusions=exclusions))
     # No structure stands before these load cells.
-    judged = tuple(replace(one, mode=None) for one in system.judged)
+    judged = tuple(replace(signal, mode=None) for signal in system.judged)
     system = replace(system, judged=judged)
     samples = ready(sliding(1.0), system)
     with simulating(Simulated(MINIMAL, system, (samples,))) as simulator:
@@ -148,7 +150,7 @@ def diagnosed(
         record(scenario, seed, effects, folder / scenario.name)
     with Simulations(everything, SYSTEM, {}, read_cases([folder], SYSTEM), 1) as simulations:
         found = conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
-        return found, [one.set_aside for one in simulations.recordings]
+        return found, [recording.set_aside for recording in simulations.recordings]
 
 
 @pytest.mark.long
@@ -162,7 +164,7 @@ def diagnosed(
 def test_what_slip_makes_of_friction_is_named_from_three_slides(
     planted: str, name: str, size: float, everything: Path, tmp_path: Path
 ) -> None:
-    scenarios = [SCENARIOS[one] for one in SLIDES]
+    scenarios = [SCENARIOS[slide] for slide in SLIDES]
     found, aside = diagnosed(everything, tmp_path, scenarios, 801, Effects(**{planted: size}))
     assert [cause.effect.name for cause in found.causes] == [name]
     gain = found.causes[0].parameters["gain"]
@@ -173,7 +175,7 @@ def test_what_slip_makes_of_friction_is_named_from_three_slides(
 def test_nothing_is_found_in_slides_where_nothing_is_missing(
     everything: Path, tmp_path: Path
 ) -> None:
-    scenarios = [SCENARIOS[one] for one in SLIDES]
+    scenarios = [SCENARIOS[slide] for slide in SLIDES]
     found, aside = diagnosed(everything, tmp_path, scenarios, 802, Effects())
     assert found.verdict == "nothing"
     assert not any(one["slide"] for one in aside)

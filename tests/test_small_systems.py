@@ -249,7 +249,9 @@ def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, f
     build_here(balance / "package.mo", "Balance.Observer", file, fmi)
     findings = check(file, instantiations=10)
     assert is_fit(findings)
-    (integrated,) = [one for one in findings if "not tried: the FMU has no" in one.reason]
+    (integrated,) = [
+        finding for finding in findings if "not tried: the FMU has no" in finding.reason
+    ]
     assert integrated.name == "Co-Simulation against Model Exchange"
     for kind in (FMU, CoSimulation):
         with kind(file) as fmu:
@@ -406,7 +408,7 @@ def test_what_is_before_only_leads_to_what_counts(bottle: Path, tmp_path: Path) 
         workers=1,
         report=lambda line: None,
     )
-    (error,) = [one for one in outcome.errors if one.held_out]
+    (error,) = [error for error in outcome.errors if error.held_out]
     assert error.samples == 50
     # From the start on: a tight bottle would then stand at 5.6 bar, this one is below 1.3.
     assert error.rms[0] > 4e5

@@ -389,7 +389,7 @@ def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> 
     assert said["plain"]["samples"] == 2100
     assert plain["low"] < level["high"]
     assert level["low"] < plain["high"]
-    assert {one.name for one in result.iterdir()} == {
+    assert {path.name for path in result.iterdir()} == {
         *("distance.json", "distance.png", "distance.svg", "index.html"),
         *("stops.csv", "quantiles.csv", "safety.csv", "plain.csv"),
     }

@@ -121,8 +121,8 @@ def test_sets_are_of_all_kinds_alike() -> None:
 
 
 def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
-    one = Varied(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
-    assert "nothing changes by: significant" in format_thresholds([one], {"significant": 4.0})
+    varied = Varied(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
+    assert "nothing changes by: significant" in format_thresholds([varied], {"significant": 4.0})
 
 
 # --- a data sheet that is wrong ---
@@ -130,7 +130,7 @@ def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
 
 def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name() -> None:
     names = {effect.name for effect in EFFECTS}
-    assert {one.effect for one in SHEET_ERRORS} - {""} <= names
+    assert {sheet_error.effect for sheet_error in SHEET_ERRORS} - {""} <= names
     (rig,) = {type(open_virtual_rig(SYSTEM, [], REFERENCE))}
     assert rig is PlantedStops
     groups = plan_sheet_errors(SHEET_ERRORS, 3, 1)

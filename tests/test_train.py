@@ -119,7 +119,8 @@ def test_an_axle_that_turns_unlike_the_others_is_refused(tmp_path: Path, train: 
 
 def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
     names = [
-        one.name for one in read_effects(read_library(train.library), train.model(OBSERVER).name)
+        effect.name
+        for effect in read_effects(read_library(train.library), train.model(OBSERVER).name)
     ]
     for kind in ("WeakPads", "IsolatedUnit", "DraggingBrake", "WheelRadius", "LateSpeed"):
         assert [name for name in names if name.startswith(kind)] == [
@@ -184,7 +185,7 @@ def test_a_wrong_radius_is_named_with_its_axle(train: System, tmp_path: Path) ->
 def test_friction_and_radius_of_each_axle_are_estimated(train: System, tmp_path: Path) -> None:
     """Pads of axle 3 have lost 15 %; profiles and loads of a sound train blur axles by 2 %."""
     cases, truth = cases_of("labelled/pads_axle", train, tmp_path / "cases")
-    case = next(one for one in cases if one.name == "01_120_service_dry")
+    case = next(case for case in cases if case.name == "01_120_service_dry")
     told, run = truth["cases"][case.name], wb.observe(train, case, "ekf").to_frame()
     at = int(np.searchsorted(case.time, told["standstill"] - 15.0))  # at about 15 m/s
     friction = np.array([run[f"muDC[{i}] [1]"].iloc[at] for i in range(1, 9)])
@@ -240,7 +241,7 @@ def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(
 ) -> None:
     """Weighed to 1.5 % of the train, 1.3 % of the stop; what a slide would say is none of it."""
     cases, truth = cases_of("healthy", train, tmp_path / "cases")
-    rolled = [one for one in cases if not any(truth["cases"][one.name]["slide_seconds"])]
+    rolled = [case for case in cases if not any(truth["cases"][case.name]["slide_seconds"])]
     assert len(rolled) >= 5
     for case in rolled:
         told, run = truth["cases"][case.name], wb.observe(train, case, "ekf")

@@ -231,7 +231,7 @@ def test_only_workers_with_the_same_code_get_work(
             finally:
                 remote.close()
     assert len(warnings) == 2
-    assert all("it gets no work" in one for one in warnings)
+    assert all("it gets no work" in warning for warning in warnings)
     assert_array_equal(found.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
 
 

@@ -48,12 +48,12 @@ def run(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable
 
 def causes(found: wb.Outcome) -> list[set[str]]:
     """Each cause with those that it cannot be told from, strongest first."""
-    return [{one.effect.name, *one.confusable_with} for one in found.diagnosis.causes]
+    return [{cause.effect.name, *cause.confusable_with} for cause in found.diagnosis.causes]
 
 
 def held_out(found: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
     """Error of all samples that were not fitted, before and after."""
-    told = [one for one in found.errors if one.held_out]
+    told = [error for error in found.errors if error.held_out]
     power = 2.0 if measure == "rms" else 1.0
     each = np.array([getattr(one, measure) for one in told]) ** power
     before, after = np.average(each, axis=0, weights=[one.samples for one in told]) ** (1.0 / power)
@@ -62,7 +62,7 @@ def held_out(found: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
 
 def fitted(found: wb.Outcome) -> tuple[float, float]:
     """Root of the mean square of all samples that were fitted, before and after."""
-    told = [one for one in found.errors if not one.held_out]
+    told = [error for error in found.errors if not error.held_out]
     squares = np.array([one.rms for one in told]) ** 2
     before, after = np.sqrt(np.average(squares, axis=0, weights=[one.samples for one in told]))
     return float(before), float(after)
@@ -70,7 +70,7 @@ def fitted(found: wb.Outcome) -> tuple[float, float]:
 
 def own(found: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
     """Error of the extended model along one recording, as the diagnosis tells it."""
-    (told,) = (one for one in found.errors if one.recording == case.name)
+    (told,) = (error for error in found.errors if error.recording == case.name)
     pair: tuple[float, float] = getattr(told, measure)
     return pair[1]
 
@@ -90,7 +90,7 @@ def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run: Callable[..., Nam
     for effect in ("UpperOverflow", "LowerOverflow", "SensorCurvature", "PumpDeadZone"):
         assert any(effect in group for group in groups)
     upper = next(
-        one.parameters for one in found.diagnosis.causes if one.effect.name == "UpperOverflow"
+        cause.parameters for cause in found.diagnosis.causes if cause.effect.name == "UpperOverflow"
     )
     # All that the upper tank cannot hold runs over, part of it into the lower one.
     assert upper["spilled"].high == 1.0
@@ -107,7 +107,7 @@ def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run: Callable[..., Nam
 def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names]) -> None:
     names = run("servo_pendulum")
     found = names["found"]
-    named = [one.effect.name for one in found.diagnosis.causes]
+    named = [cause.effect.name for cause in found.diagnosis.causes]
     assert named[0] == "ViscousFriction"  # alone it explains most
     assert {"LoadStribeck", "SupplyResistance"} <= set(named)
     assert "Stribeck" not in named
@@ -115,7 +115,7 @@ def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names
     assert first in ("DryFriction", "ViscousFriction")
     # Published, fitted to the same records: 128 mrad without friction, 59 with dry and viscous
     # friction and 59 with a Stribeck curve beside, 47 where it grows with the load.
-    fitted = [one.mean_absolute for one in found.errors if not one.held_out]
+    fitted = [error.mean_absolute for error in found.errors if not error.held_out]
     assert len(fitted) == 12
     before, after = np.mean(fitted, axis=0)
     assert 0.11 < before < 0.15
@@ -123,9 +123,9 @@ def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names
     measure = "mean_absolute"
     assert held_out(found, measure) == pytest.approx((0.125, 0.029), abs=1e-3)
     ratios = {
-        one.recording: one.mean_absolute[1] / one.mean_absolute[0]
-        for one in found.errors
-        if one.held_out
+        error.recording: error.mean_absolute[1] / error.mean_absolute[0]
+        for error in found.errors
+        if error.held_out
     }
     assert max(ratios, key=ratios.__getitem__) == "kp200_up_and_down"
     assert names["error"] == pytest.approx(own(found, names["case"], measure), rel=0.05)
@@ -141,7 +141,7 @@ def test_friction_of_both_seals_grows_with_pressure(run: Callable[..., Names]) -
         ("O-ring", 6.6, 5.95, 1.0),
         ("NAPN", 9.0, 7.9, 1.2),
     ):
-        named = {one.effect.name for one in found[seal].diagnosis.causes}
+        named = {cause.effect.name for cause in found[seal].diagnosis.causes}
         assert {"PressureFriction", "PreslidingFriction"} <= named
         assert fitted(found[seal])[0] == pytest.approx(own_before, rel=0.02)
         assert fitted(found[seal])[1] < own_after
@@ -162,9 +162,9 @@ def test_train_loses_air_in_one_of_five_ways(run: Callable[..., Names]) -> None:
     assert len(group) == 5
     assert "CompressibleLeak" in group
     assert "compressor off" in found.diagnosis.causes[0].effect.separation
-    for one in found.errors:
-        if not one.held_out:
-            before, after = one.rms
+    for error in found.errors:
+        if not error.held_out:
+            before, after = error.rms
             assert after < 0.1 * before
     assert held_out(found) == pytest.approx((0.76e5, 0.048e5), rel=0.02)
     # FMPy holds the flag over a twentieth of a sample.

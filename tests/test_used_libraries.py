@@ -128,7 +128,7 @@ def test_friction_adds_up_and_signals_form_a_chain(tmp_path: Path) -> None:
 
 def test_common_laws_are_no_effects_of_the_library_and_what_extends_them_is(tmp_path: Path) -> None:
     effects = read_effects(read_library(stage(tmp_path)), "Base")
-    assert [(one.name, one.slots) for one in effects] == [
+    assert [(effect.name, effect.slots) for effect in effects] == [
         ("BearingFriction", ("friction",)),
         ("Grease", ("friction",)),
         ("TachoOffset", ("tacho",)),
@@ -181,7 +181,7 @@ def test_laws_of_turning_motion_have_its_units(law: str, units: dict[str, str]) 
     library = read_library(file)
     inherited = library.components(name).values()
     read = {one.name: library.unit(one) for one in inherited if "parameter" in one.prefixes}
-    compiled = {one.name: one.unit for one in flatten(file, name).parameters}
+    compiled = {parameter.name: parameter.unit for parameter in flatten(file, name).parameters}
     assert read == compiled == units
 
 

@@ -36,7 +36,7 @@ def stop(folder: Path, gains: dict[str, float], rig: PlantedTrain = RIG) -> Case
 def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) -> None:
     case = stop(tmp_path, TRUE_TO_SHEET)
     with open_model(SYSTEM) as model:
-        start = {one.name: case[one.name][0] for one in SYSTEM.outputs}
+        start = {output.name: case[output.name][0] for output in SYSTEM.outputs}
         model.start({**start, "vTrain": 0.46 * start["omega1"]}, {})
         inputs = model.variables([one.name for one in SYSTEM.inputs])
         found = []
@@ -48,10 +48,12 @@ def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) ->
     assert_allclose(np.array(found)[moving], case["omega1"][1:][moving], atol=0.35)
 
 
-@pytest.mark.parametrize("name", [one.name for one in PLANTABLE if one.name.endswith("[3]")])
+@pytest.mark.parametrize(
+    "name", [plantable.name for plantable in PLANTABLE if plantable.name.endswith("[3]")]
+)
 def test_a_fault_acts_in_its_place(name: str, tmp_path: Path) -> None:
     sound = stop(tmp_path / "sound", TRUE_TO_SHEET)
-    size = next(4.0 * one.unit_size for one in PLANTABLE if one.name == name)
+    size = next(4.0 * plantable.unit_size for plantable in PLANTABLE if plantable.name == name)
     faulty = stop(tmp_path / "faulty", {**TRUE_TO_SHEET, name: size})
     n = min(sound.time.size, faulty.time.size) - 60
     signals = [f"pB{j}" for j in range(1, 5)] + [f"omega{i}" for i in range(1, 9)]
@@ -71,8 +73,8 @@ def test_a_fault_acts_in_its_place(name: str, tmp_path: Path) -> None:
 
 def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds() -> None:
     repertoire = Repertoire(PLANTABLE, library_effects(SYSTEM))
-    known = {one.name for one in repertoire.effects}
-    assert {one.effect for one in PLANTABLE} <= known
+    known = {effect.name for effect in repertoire.effects}
+    assert {plantable.effect for plantable in PLANTABLE} <= known
     assert repertoire.size(repertoire.plantable("units[2]")) == 0.25  # four of it are a unit
 
 
@@ -168,8 +170,8 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Pa
     pytest.importorskip("rumoca")
     generated, estimates = growth.build(2, tmp_path, pitching=False), []
     samples = growth.stop(generated)
-    same = {one.name for one in generated.estimated}
-    estimated = tuple(one for one in SYSTEM.estimated if one.name in same)
+    same = {quantity.name for quantity in generated.estimated}
+    estimated = tuple(quantity for quantity in SYSTEM.estimated if quantity.name in same)
     for one in (replace(SYSTEM, estimated=estimated, aids=()), generated):
         # Inputs of a system file stand in an order of its own.
         order = [[x.name for x in generated.inputs].index(x.name) for x in one.inputs]
@@ -201,7 +203,9 @@ def test_force_and_adhesion_of_each_axle_are_estimated(
     for seed in range(1, 1 + 6 // len(stops)):
         simulated = rig.simulate(seed, {})
         rig.write(simulated, {}, tmp_path / str(seed))
-        cases = {one.name: one for one in read_cases([tmp_path / str(seed)], SYSTEM)}
+        cases = {
+            read_case.name: read_case for read_case in read_cases([tmp_path / str(seed)], SYSTEM)
+        }
         for made, _ in simulated:
             case, ridden = cases[made.stop.name], made.ridden
             run = observe(SYSTEM, case, "ekf").to_frame()

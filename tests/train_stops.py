@@ -38,7 +38,7 @@ def write_stop(
         f"muDC[{i}]": level * pads.get(i, PADS) / PADS * random.normal(1.0, 0.007)
         for i in range(1, 9)
     }
-    outputs = [one.name for one in system.outputs]
+    outputs = [output.name for output in system.outputs]
     rows = []
     with open_model(system) as model:
         speeds = dict.fromkeys(outputs[:-1], _SPEED / 0.46)
@@ -52,12 +52,12 @@ def write_stop(
             model.set(inputs, u)
             x = model.step(_STEP)
             rows.append([(k + 1) * _STEP, *u, *x[states]])
-    units = {one.name: one.unit for one in (*system.inputs, *system.outputs)}
+    units = {signal.name: signal.unit for signal in (*system.inputs, *system.outputs)}
     frame = pd.DataFrame(rows, columns=["time [s]", *(f"{n} [{u}]" for n, u in units.items())])
-    for one in (*system.inputs, *system.outputs):
-        column = f"{one.name} [{one.unit}]"
-        if one.name not in ("curve", "slope1", "slope2"):
-            frame[column] += one.deviation(frame[column]) * random.standard_normal(len(frame))
+    for signal in (*system.inputs, *system.outputs):
+        column = f"{signal.name} [{signal.unit}]"
+        if signal.name not in ("curve", "slope1", "slope2"):
+            frame[column] += signal.deviation(frame[column]) * random.standard_normal(len(frame))
     folder.mkdir(parents=True)
     (folder / "case.toml").write_text(CASE.format(date=date and f'date = "{date}"\n'))
     frame.to_csv(folder / "measured.csv", index=False, float_format="%.9g")

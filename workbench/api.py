@@ -81,7 +81,7 @@ def read_cases(
         dict(parse_named(one, "columns", known) for one in named),
         None if sample_rate is None else 1.0 / quantity(sample_rate, "Hz", "sample_rate"),
     )
-    cases = read_folders([Path(one) for one in paths], known, told)
+    cases = read_folders([Path(path) for path in paths], known, told)
     _warn(cases)
     return cases
 
@@ -104,7 +104,11 @@ def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list
     InputError
         If the recordings are not in `source`, or are not those that were published.
     """
-    held_out = {one.name for one in write_cases(which, Path(source), Path(out)) if one.held_out}
+    held_out = {
+        write_case.name
+        for write_case in write_cases(which, Path(source), Path(out))
+        if write_case.held_out
+    }
     cases = read_cases(out, load_system(which))
     return (
         [case for case in cases if case.name not in held_out],
@@ -132,7 +136,7 @@ def case_from_frame(
         system.
     """
     where = f"table '{name}'"
-    units = {"time": "s", **{one.name: one.unit for one in system.signals.values()}}
+    units = {"time": "s", **{signal.name: signal.unit for signal in system.signals.values()}}
     found = {}
     for column in map(str, frame.columns):
         signal, unit = header(column)
@@ -140,7 +144,7 @@ def case_from_frame(
             factor = si_factor(unit or "", units[signal], f"{where}, column '{column}'")
             values = frame[column].to_numpy(float, copy=True) * factor
             found[signal] = read_only(values)
-    asked = ["time", *(one.name for one in (*system.inputs, *system.outputs))]
+    asked = ["time", *(signal.name for signal in (*system.inputs, *system.outputs))]
     if missing := [signal for signal in asked if signal not in found]:
         raise InputError(
             where=where,
@@ -159,8 +163,8 @@ def case_from_frame(
         time=time_,
         signals=found,
         inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(one.name for one in system.outputs),
-        aids=tuple(one.name for one in system.aids),
+        outputs=tuple(output.name for output in system.outputs),
+        aids=tuple(aid.name for aid in system.aids),
         source=Path(name),
         doubts=doubts(time_, found, given, system, origin),
     )

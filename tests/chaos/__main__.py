@@ -25,9 +25,9 @@ def main() -> int:
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(prefix="chaos-") as scratch:
         wanted = [
-            undisturbed(one, Path(scratch) / one.name)
-            for one in commands(Path(scratch) / "cases")
-            if options.command is None or one.name in options.command
+            undisturbed(command, Path(scratch) / command.name)
+            for command in commands(Path(scratch) / "cases")
+            if options.command is None or command.name in options.command
         ]
         every = cycle([(usual, kind) for usual in wanted for kind in kinds])
         for number, (usual, kind) in zip(range(options.count), every, strict=False):

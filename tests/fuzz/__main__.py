@@ -25,7 +25,9 @@ def main() -> int:
     )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, one_process():
-        wanted = [one for one in targets(Path(folder)) if options.target in (None, one.name)]
+        wanted = [
+            target for target in targets(Path(folder)) if options.target in (None, target.name)
+        ]
         numbers = range(-(-options.count // max(1, len(wanted))))
         if options.number is not None:
             numbers = range(options.number, options.number + 1)

@@ -136,7 +136,7 @@ def _workbook(files: Files, random: Random) -> tuple[Files, str]:
     ((name, content),) = files.items()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         entries = {one: archive.read(one) for one in archive.namelist()}
-    texts = [one for one in entries if one.startswith("xl/")]
+    texts = [entry for entry in entries if entry.startswith("xl/")]
     changed, mutation = _archive(entries, random.choice(texts), random)
     return {name: changed}, mutation
 
@@ -197,9 +197,9 @@ def _journal(path: Path) -> Target:
 
     def impossible(found: Journal) -> str:
         # Lines that are damaged are left out, but nothing else is read, and nothing twice.
-        plantings = [one.planting for one in found.results]
-        once = all(plantings.count(one) == 1 for one in plantings)
-        known = all(one in written for one in found.results)
+        plantings = [result.planting for result in found.results]
+        once = all(plantings.count(planting) == 1 for planting in plantings)
+        known = all(result in written for result in found.results)
         return "" if once and known else "other verdicts than were written"
 
     return Target(

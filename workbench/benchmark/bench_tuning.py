@@ -27,7 +27,7 @@ def bench_tuning(
 
     evaluations = time_evaluations(case, system)
     workers = time_workers(cases, system)
-    memory = observe_memory([one.source.parent for one in cases], system)
+    memory = observe_memory([case.source.parent for case in cases], system)
     output.result(f"\n{format_tuning(evaluations, workers, memory)}")
     return {
         "case": case.name,

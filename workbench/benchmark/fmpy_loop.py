@@ -31,9 +31,9 @@ def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Ma
         return [known[fmu.names.get(name, name)] for name in names]
 
     inputs = references(*(one.name for one in system.inputs))
-    read = references(*(one.name for one in system.outputs), *system.reported)
+    read = references(*(output.name for output in system.outputs), *system.reported)
     given = references(*system.given)
-    places = [j for j, one in enumerate(system.outputs) if one.name in fmu.states]
+    places = [j for j, output in enumerate(system.outputs) if output.name in fmu.states]
     seen = references(*(system.outputs[j].name for j in places))
     x, dx = np.zeros(n), np.zeros(n)
     at_x, at_dx = (buffer.ctypes.data_as(POINTER(c_double)) for buffer in (x, dx))

@@ -118,7 +118,7 @@ def _step(space: StateSpace, fmu: FMU, system: System) -> ca.Function:
     _, shown = model(0.0, after, u, p)
     outputs = {_ours(fmu, v.name): shown[i] for i, v in enumerate(space.outputs)}
     outputs |= {_ours(fmu, v.name): after[i] for i, v in enumerate(space.states)}
-    seen = ca.vertcat(*(outputs[one.name] for one in system.outputs))
+    seen = ca.vertcat(*(outputs[output.name] for output in system.outputs))
     return ca.Function("step", [z, given, h], [end, seen])
 
 

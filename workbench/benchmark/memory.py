@@ -58,4 +58,4 @@ def _descendants(process: int) -> list[int]:
         for thread in Path(f"/proc/{process}/task").iterdir():
             with suppress(OSError):  # the thread has ended
                 found += map(int, (thread / "children").read_text().split())
-    return found + [one for child in found for one in _descendants(child)]
+    return found + [descendant for child in found for descendant in _descendants(child)]

@@ -115,7 +115,9 @@ def plain_filters(system: System) -> System:
 
     They begin at nominal quantities, learn no noise levels, and say what they know as they know it.
     """
-    estimated = [replace(one, start=math.nan, relative_error=0.0) for one in system.estimated]
+    estimated = [
+        replace(quantity, start=math.nan, relative_error=0.0) for quantity in system.estimated
+    ]
     return replace(system, estimated=tuple(estimated), learns=math.inf, bands={})
 
 
@@ -133,15 +135,15 @@ def time_observers(case: Case, system: System) -> list[ObserverTimes]:
     kinds = choose(system, names)
     times = []
     with opened(plain_filters(system), [OpenLoop.name, *names]) as estimators:
-        for one in estimators:
-            with by_fmpy(one.name, one.fmu, system, one.gains) as loop:
-                plain = by_c(one.name, one.fmu, system, one.gains)
-                times.append(_time(case, one, loop, plain))
+        for estimator in estimators:
+            with by_fmpy(estimator.name, estimator.fmu, system, estimator.gains) as loop:
+                plain = by_c(estimator.name, estimator.fmu, system, estimator.gains)
+                times.append(_time(case, estimator, loop, plain))
     larger = [name for name, kind in kinds.items() if kind.role == OBSERVER]
     if FULL in system.models and larger:
         with opened(system, larger, FULL) as estimators:
-            for one in estimators:
-                times.append(_time(case, one, None, None))
+            for estimator in estimators:
+                times.append(_time(case, estimator, None, None))
     return times
 
 

@@ -76,7 +76,7 @@ def _answers(files: Sequence[RecordedFile], found: ProposedRecordings) -> list[s
         answer = "n"
     if answer.casefold() in ("n", "no"):
         raise InputError(
-            where=", ".join(str(one.path) for one in files),
+            where=", ".join(str(file.path) for file in files),
             found="channels that nobody confirmed",
             expected="an answer, or --yes",
             remedy="answer, or name channels with --column, and take the rest with --yes",
@@ -96,7 +96,7 @@ def _complete(
     """
     if problems := [*found.problems, *doubts]:
         raise InputError(
-            where=", ".join(str(one.path) for one in files),
+            where=", ".join(str(file.path) for file in files),
             found="; ".join(problems),
             expected="a channel for each signal that the system needs",
             remedy="name it, --column 'SIGNAL=CHANNEL [unit]'"
@@ -107,13 +107,13 @@ def _complete(
 
 def _shown(files: Sequence[RecordedFile], found: ProposedRecordings, system: System) -> str:
     """What files are and what their channels are taken for, a line each."""
-    lines = [f"{one.path}: {one.kind}" for one in files]
+    lines = [f"{file.path}: {file.kind}" for file in files]
     if len(found.held) > 1:
         names = listed([f"'{one.name}'" for one in found.held])
         lines.append(f"  {len(found.held)} recordings, with the same channels: {names}")
     lines += [*_clocks(found.held), *_channels(found.held, system)]
     lines += [f"  ? {one}" for one in (*found.problems, *found.unmatched)]
-    lines += [f"  left out   {one}" for one in found.beside]
+    lines += [f"  left out   {entry}" for entry in found.beside]
     if found.left:
         lines.append(f"  left out   {listed(found.left)}")
     return "\n".join(lines)

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     effects = choose(options.effects, catalogue(system, library))
     if options.list:
         output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
-        return Done({"effects": [{"name": one.name, "text": one.text} for one in effects]})
+        return Done({"effects": [{"name": effect.name, "text": effect.text} for effect in effects]})
     require_compiler()
     cases, held_out = _parted(given_cases(options, system), options.held_out)
     with claimed(options.out):

@@ -53,13 +53,13 @@ class Inspection:
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Look at everything."""
     findings = []
-    for one in _findings():
-        findings.append(one)
-        output.result(f"{one.state:<8} {one.name:<20} {one.found}")
-        if one.remedy:
-            output.result(f"{'':<8} {'':<20} to do: {one.remedy}")
-    wrong = any(one.state == "wrong" for one in findings)
-    return Done({"findings": [asdict(one) for one in findings]}, status=1 if wrong else 0)
+    for finding in _findings():
+        findings.append(finding)
+        output.result(f"{finding.state:<8} {finding.name:<20} {finding.found}")
+        if finding.remedy:
+            output.result(f"{'':<8} {'':<20} to do: {finding.remedy}")
+    wrong = any(finding.state == "wrong" for finding in findings)
+    return Done({"findings": [asdict(finding) for finding in findings]}, status=1 if wrong else 0)
 
 
 def _findings() -> Iterator[Inspection]:

@@ -70,7 +70,7 @@ def _files(
     files = [read_foreign(path) for path in paths]
     stored = stored_columns(options.out, system)
     found, conditions = confirmed(files, system, stored, known, output, options.yes)
-    hashes = [one.sha256 for one in files]
+    hashes = [file.sha256 for file in files]
     names = {one.name or None for one in found.held}
     by_now = [
         one
@@ -99,7 +99,7 @@ def _files(
 
 def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> str:
     """Name of a case that no other recording has taken, on no file system."""
-    taken = {case.casefold() for one in others for case in one["cases"]}
+    taken = {case.casefold() for other in others for case in other["cases"]}
     taken |= {case[3:] for case in taken}  # without the number of a part
     name = case_name(path, part)
     second = f"{name}_{path.suffix[1:] or 'file'}"

@@ -49,13 +49,16 @@ def read_condition(text: str, system: System) -> tuple[str, Any]:
         If it is none of the system's.
     """
     name, equals, value = (part.strip() for part in text.partition("="))
-    kind = next((one for one in system.conditions if one.name == name), None)
+    kind = next((condition for condition in system.conditions if condition.name == name), None)
     if not equals or kind is None:
         raise InputError(
             where=f"condition {text}",
-            found=f"'{name}'{closest(name, [one.name for one in system.conditions])}",
+            found=f"'{name}'{closest(name, [condition.name for condition in system.conditions])}",
             expected="NAME=VALUE of a condition: "
-            + (", ".join(one.name for one in system.conditions) or "this system has none"),
+            + (
+                ", ".join(condition.name for condition in system.conditions)
+                or "this system has none"
+            ),
             remedy="correct the name",
         )
     words = {str(choice): choice for choice in kind.choices}

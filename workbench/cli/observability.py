@@ -75,9 +75,11 @@ def _run(
 
 def _units(system: System) -> dict[str, str]:
     """Of windows and signals; quantities and corrections have that of the quantity."""
-    signals = {one.name: one.unit for one in (*system.inputs, *system.outputs)}
+    signals = {signal.name: signal.unit for signal in (*system.inputs, *system.outputs)}
     quantities = {
-        key: one.unit for one in system.estimated for key in (one.correction, f"median_{one.name}")
+        key: quantity.unit
+        for quantity in system.estimated
+        for key in (quantity.correction, f"median_{quantity.name}")
     }
     return {"window_s": "s", "stride_s": "s", **signals, **quantities}
 

@@ -44,8 +44,8 @@ def parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
     found = [parser]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for one in action.choices.values():
-                found += parsers(one)
+            for choice in action.choices.values():
+                found += parsers(choice)
     return found
 
 

@@ -22,7 +22,7 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
         If the system has no virtual rig, or that cannot do what is asked.
     """
     rig = open_virtual_rig(system, options.case, options.reference)
-    known = {one.name: one for one in rig.plantables}
+    known = {plantable.name: plantable for plantable in rig.plantables}
     if options.list:
         recordings = "\n".join(f"  {name}" for name in rig.recordings)
         effects = "\n".join(f"  {f'{n} [{one.unit}]':<28} {one.effect}" for n, one in known.items())

@@ -82,7 +82,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
 
 def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
     """Effects to plant, by the names of the library, or of the rig where the library has none."""
-    known = {one.effect or one.name: one for one in rig.plantables}
+    known = {plantable.effect or plantable.name: plantable for plantable in rig.plantables}
     for name in names:
         if name not in known:
             raise InputError(

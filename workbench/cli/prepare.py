@@ -17,13 +17,13 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         return Done({"published": told})
     recordings = write_cases(options.system, options.source, options.out)
     output.result(f"{len(recordings)} recordings in {nearby(options.out)}, see {PREPARED} there")
-    machines = list(dict.fromkeys(one.machine for one in recordings))
+    machines = list(dict.fromkeys(recording.machine for recording in recordings))
     for machine in machines:
-        own = [one for one in recordings if one.machine == machine]
+        own = [recording for recording in recordings if recording.machine == machine]
         folders = [str(nearby(options.out / one.name)) for one in own]
         if len(machines) == 1:
             folders = [str(nearby(options.out))]
         held_out = [one.name for one in own if one.held_out]
         words = ["workbench diagnose --system", options.system, *folders]
         output.result(" ".join(["next:", *words, *["--held-out"] * bool(held_out), *held_out]))
-    return Done({"out": options.out, "recordings": [asdict(one) for one in recordings]})
+    return Done({"out": options.out, "recordings": [asdict(recording) for recording in recordings]})

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
                 "before": before.to_dict(),
                 "after": after.to_dict(),
                 "not_the_same": differences(before, after),
-                "changes": [one.to_dict() for one in changes],
+                "changes": [change.to_dict() for change in changes],
             }
         )
     return Done({"comparisons": told})

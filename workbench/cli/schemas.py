@@ -71,27 +71,29 @@ def closed(entries: Mapping[str, Schema], *, optional: str = "") -> Schema:
     }
 
 
-def by_name(one: Schema) -> Schema:
+def by_name(schema: Schema) -> Schema:
     """An object whose keys are names of things."""
-    return {"type": "object", "additionalProperties": one}
+    return {"type": "object", "additionalProperties": schema}
 
 
-def listed(one: Schema) -> Schema:
+def listed(schema: Schema) -> Schema:
     """An array of one kind of things."""
-    return {"type": "array", "items": one}
+    return {"type": "array", "items": schema}
 
 
-def or_null(one: Schema) -> Schema:
+def or_null(schema: Schema) -> Schema:
     """What JSON has null for, where there is none."""
-    return {"anyOf": [one, {"type": "null"}]}
+    return {"anyOf": [schema, {"type": "null"}]}
 
 
 def declared(kind: type, *, nullable: bool = False) -> Schema:
     """A dataclass as JSON has it; with `nullable`, its numbers are null where there are none."""
     hints = typing.get_type_hints(kind)
-    entries = {one.name: _typed(hints[one.name]) for one in dataclasses.fields(kind)}
+    entries = {field.name: _typed(hints[field.name]) for field in dataclasses.fields(kind)}
     if nullable:
-        entries = {name: or_null(one) if one == NUMBER else one for name, one in entries.items()}
+        entries = {
+            name: or_null(entry) if entry == NUMBER else entry for name, entry in entries.items()
+        }
     return closed(entries)
 
 
@@ -180,8 +182,8 @@ def gains_schema(system: System) -> Schema:
 
 def case_schema(system: System) -> Schema:
     """Of the `case.toml` of a system."""
-    conditions = {one.name: _condition(one) for one in system.conditions}
-    unsaid = " ".join(one.name for one in system.conditions if one.sets)
+    conditions = {condition.name: _condition(condition) for condition in system.conditions}
+    unsaid = " ".join(condition.name for condition in system.conditions if condition.sets)
     columns = closed(dict.fromkeys(("time", *system.signals), _COLUMN), optional="*")
     measurement = {
         "file": {**NAMED, "description": "recording in this folder"},
@@ -208,20 +210,29 @@ _COLUMN = {
 }
 
 
-def _condition(one: Condition) -> Schema:
+def _condition(condition: Condition) -> Schema:
     """Of what was set before a recording; nobody need know it, but for a sign."""
-    known = _known_condition(one)
-    return known if one.sign else {"anyOf": [known, {"const": UNKNOWN}]}
+    known = _known_condition(condition)
+    return known if condition.sign else {"anyOf": [known, {"const": UNKNOWN}]}
 
 
-def _known_condition(one: Condition) -> Schema:
-    about = {"description": one.label}
-    if not one.choices:
-        return about | {"type": "string", "pattern": r"^\s*[-+0-9.eE]+ \S+", "$comment": one.unit}
-    choice: Schema = {"enum": list(one.choices)}
-    if not one.count:
+def _known_condition(condition: Condition) -> Schema:
+    about = {"description": condition.label}
+    if not condition.choices:
+        return about | {
+            "type": "string",
+            "pattern": r"^\s*[-+0-9.eE]+ \S+",
+            "$comment": condition.unit,
+        }
+    choice: Schema = {"enum": list(condition.choices)}
+    if not condition.count:
         return about | choice
-    return about | {"type": "array", "items": choice, "minItems": one.count, "maxItems": one.count}
+    return about | {
+        "type": "array",
+        "items": choice,
+        "minItems": condition.count,
+        "maxItems": condition.count,
+    }
 
 
 def system_schema() -> Schema:
@@ -588,7 +599,7 @@ def _tune() -> Schema:
     provenance = closed(
         {
             "run": RUN,
-            **{name: one for name, one in VERSIONS.items() if name != "commit"},
+            **{name: version for name, version in VERSIONS.items() if name != "commit"},
             "system": TEXT,
             "fmu": FMU,
             "cases": listed(TEXT),

@@ -45,8 +45,8 @@ def _run(
     settings = _settings(simulation, cases[0])
     provenance = {"run": run, **_models(simulation), **settings}
     provenance["meanings"] = {
-        name: {gain: {"text": text, "unit": unit} for gain, (text, unit) in one.items()}
-        for name, one in simulation.meanings().items()
+        name: {gain: {"text": text, "unit": unit} for gain, (text, unit) in meaning.items()}
+        for name, meaning in simulation.meanings().items()
         if name in settings
     }
     if window is None:
@@ -104,7 +104,7 @@ def _idle(results: Sequence[CaseResult]) -> list[str]:
     return [
         name
         for name in results[0].runs
-        if all(one.runs[name].ending is not Ending.OK for one in results)
+        if all(result.runs[name].ending is not Ending.OK for result in results)
     ]
 
 
@@ -135,7 +135,7 @@ def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
         for name, estimator in running.items():
             estimator.run(case.time[:2], case.u[:2], case.y[:2])
             settings[name] = estimator.settings()
-    return {name: one for name, one in settings.items() if one}
+    return {name: setting for name, setting in settings.items() if setting}
 
 
 def _write(out: Path, result: CaseResult) -> None:

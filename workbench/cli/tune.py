@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     errors = None
     if options.scale_error is not None:
         share = options.scale_error / 100.0
-        errors = {one.name: share for one in system.outputs if one.scale_error and share}
+        errors = {output.name: share for output in system.outputs if output.scale_error and share}
     problem = pose(system, options.estimator, cases, errors, options.judge_by)
     with claimed(out):
         return _run(options, output, problem, len(cases), out)

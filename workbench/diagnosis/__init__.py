@@ -156,7 +156,7 @@ def _outcome(
             name: dict(zip(unknowns.local, map(float, row), strict=True))
             for name, row in zip(unknowns.names, point.deviations, strict=True)
         },
-        set_aside={one.name: one.set_aside for one in simulations.recordings},
+        set_aside={recording.name: recording.set_aside for recording in simulations.recordings},
         observers=observers,
         extension=extension,
         errors=tuple(errors),
@@ -276,7 +276,7 @@ def _values(
         # An order-locked effect has another phase in each recording; the model turns from zero.
         known = values.setdefault(name, {})
         part = "cosine" if parameter == "amplitude" else parameter
-        is_size = part in next(one for one in effects if one.name == name).sizes
+        is_size = part in next(effect for effect in effects if effect.name == name).sizes
         known[part] = (known.get(part, 0.0) if is_size else 0.0) + value
     return values
 
@@ -319,7 +319,7 @@ def _observers(
     sizes = diagnosis.best.point.sizes
     after = (
         with_model(system, OBSERVER, extension.fmu),
-        [case_in_time(one, system, sizes) for one in cases],
+        [case_in_time(case, system, sizes) for case in cases],
     )
     for one, recorded in ((system, cases), after):
         with open_model(one) as fmu:

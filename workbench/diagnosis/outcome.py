@@ -98,7 +98,9 @@ class Outcome:
     def missing(self) -> tuple[Signal, ...]:
         """What could be compared, if recordings had it."""
         judged = self.system.judged
-        return tuple(one for one in judged if not any(one.name in case for case in self.cases))
+        return tuple(
+            signal for signal in judged if not any(signal.name in case for case in self.cases)
+        )
 
     @property
     def turns(self) -> bool:
@@ -135,7 +137,7 @@ class Outcome:
         if late is not None:
             return f"Something is missing that clocks explain: {_late(late)}."
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
-        strongest = max(self.dependences, key=lambda one: one.after)
+        strongest = max(self.dependences, key=lambda dependence: dependence.after)
         goes = f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
         return f"Something is missing that no effect of the catalogue explains{part}{goes}."
 
@@ -181,15 +183,15 @@ class Outcome:
             {
                 "effect": cause.effect.name,
                 "parameter": name,
-                "value": one.value,
-                "low": one.low,
-                "high": one.high,
-                "unit": one.unit,
+                "value": parameter.value,
+                "low": parameter.low,
+                "high": parameter.high,
+                "unit": parameter.unit,
                 "explained": cause.explained,
                 "confusable_with": ", ".join(cause.confusable_with),
             }
             for cause in self.diagnosis.causes
-            for name, one in cause.parameters.items()
+            for name, parameter in cause.parameters.items()
         ]
         columns = ["effect", "parameter", "value", "low", "high", "unit", "explained"]
         return pd.DataFrame(rows, columns=[*columns, "confusable_with"])
@@ -208,7 +210,7 @@ class Outcome:
             "partial": list(found.partial),
             "late": None if found.late is None else asdict(found.late),
             "lasting_errors": self._lasting_errors(),
-            "dependences": [asdict(one) for one in self.dependences],
+            "dependences": [asdict(dependence) for dependence in self.dependences],
             "confusability": {"effects": list(found.names), "cosines": found.cosines.tolist()},
             "candidates": [_candidate(score) for score in found.scores],
             "steps": [_step(step) for step in found.steps],
@@ -219,8 +221,8 @@ class Outcome:
             },
             "deviations": {name: dict(row) for name, row in self.deviations.items()},
             "set_aside": {name: dict(counts) for name, counts in self.set_aside.items()},
-            "channels": {one.name: one.unit for one in self.channels},
-            "errors": [asdict(one) for one in self.errors],
+            "channels": {channel.name: channel.unit for channel in self.channels},
+            "errors": [asdict(error) for error in self.errors],
             "start_values": {name: dict(values) for name, values in self.starts.items()},
             "observers": {
                 name: {
@@ -334,8 +336,9 @@ def _told(cause: Cause) -> list[str]:
     """Lines on a cause."""
     lines = [f"{cause.effect.name}: {cause.effect.text}"]
     lines += [
-        f"  {name} = {with_interval(one.value, one.low, one.high, one.unit)}"
-        for name, one in cause.parameters.items()
+        f"  {name} = "
+        f"{with_interval(parameter.value, parameter.low, parameter.high, parameter.unit)}"
+        for name, parameter in cause.parameters.items()
     ]
     lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
     if cause.confusable_with:
@@ -356,8 +359,13 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "effect": cause.effect.name,
         "text": cause.effect.text,
         "parameters": {
-            name: {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
-            for name, one in cause.parameters.items()
+            name: {
+                "value": parameter.value,
+                "low": parameter.low,
+                "high": parameter.high,
+                "unit": parameter.unit,
+            }
+            for name, parameter in cause.parameters.items()
         },
         "phases": None if cause.phases is None else [float(phase) for phase in cause.phases],
         "confusable_with": list(cause.confusable_with),
@@ -436,24 +444,30 @@ def lasting_blocks(system: System) -> int:
     return max(1, round(0.5 * system.comparison.lasting / system.comparison.block))
 
 
-def lasting(one: Residuals, span: int) -> Lasting:
+def lasting(residuals: Residuals, span: int) -> Lasting:
     """Running means over a number of blocks, none across what was set aside."""
-    before, after, sigma = (np.empty_like(one.sigma) for _ in range(3))
-    for run in _runs(one.block_time):
-        before[run] = _sums(one.before[run], span) / _sums(np.ones_like(one.sigma[run]), span)
-        after[run] = _sums(one.after[run], span) / _sums(np.ones_like(one.sigma[run]), span)
-        sigma[run] = np.sqrt(_sums(one.sigma[run] ** 2, span)) / _sums(
-            np.ones_like(one.sigma[run]), span
+    before, after, sigma = (np.empty_like(residuals.sigma) for _ in range(3))
+    for run in _runs(residuals.block_time):
+        before[run] = _sums(residuals.before[run], span) / _sums(
+            np.ones_like(residuals.sigma[run]), span
+        )
+        after[run] = _sums(residuals.after[run], span) / _sums(
+            np.ones_like(residuals.sigma[run]), span
+        )
+        sigma[run] = np.sqrt(_sums(residuals.sigma[run] ** 2, span)) / _sums(
+            np.ones_like(residuals.sigma[run]), span
         )
     return Lasting(before, after, sigma)
 
 
-def at_blocks(one: Residuals) -> dict[str, Vector]:
+def at_blocks(residuals: Residuals) -> dict[str, Vector]:
     """Balances at the middle of each block, (b,), SI; they are smooth over more than a block."""
     found = {}
-    for balance in one.balances:
+    for balance in residuals.balances:
         known = np.isfinite(balance.values)
-        found[balance.name] = np.interp(one.block_time, one.time[known], balance.values[known])
+        found[balance.name] = np.interp(
+            residuals.block_time, residuals.time[known], balance.values[known]
+        )
     return found
 
 
@@ -489,14 +503,14 @@ def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
     return known[recording]
 
 
-def _clearness(one: Residuals, span: int, found: bool) -> float:
+def _clearness(residuals: Residuals, span: int, found: bool) -> float:
     """How clearly a recording shows what was found, or else how wrong the nominal model is."""
-    before, after = lasting(one, span).noises()
+    before, after = lasting(residuals, span).noises()
     return float(np.max(before**2 - after**2 if found else before**2))
 
 
 def recording_figure(
-    one: Residuals, case: Case, system: System, extension: str, span: int
+    residuals: Residuals, case: Case, system: System, extension: str, span: int
 ) -> CaseFigure:
     """Describe the figure of a recording: where and when the simulation is wrong, beyond noise.
 
@@ -505,32 +519,32 @@ def recording_figure(
     extension : what the last model is called; empty if nothing was added to the nominal one.
     span : blocks over which errors are averaged, `lasting_blocks` or FAST.
     """
-    errors = lasting(one, span)
-    gaps = [run.stop for run in _runs(one.block_time)[:-1]]
+    errors = lasting(residuals, span)
+    gaps = [run.stop for run in _runs(residuals.block_time)[:-1]]
 
     def parted(values: Vector) -> Vector:
         return np.insert(values, gaps, np.nan)
 
-    middles = [0.5 * (one.block_time[gap - 1] + one.block_time[gap]) for gap in gaps]
-    panels = [_measured(system, name, one, case, parted) for name in _context(system)]
-    for c, channel in enumerate(one.channels):
+    middles = [0.5 * (residuals.block_time[gap - 1] + residuals.block_time[gap]) for gap in gaps]
+    panels = [_measured(system, name, residuals, case, parted) for name in _context(system)]
+    for c, channel in enumerate(residuals.channels):
         panels.append(_errors(channel, errors, c, bool(extension), parted))
-    for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
+    for balance, values in zip(residuals.balances, at_blocks(residuals).values(), strict=True):
         factor = si_factor(balance.shown, balance.unit, balance.title)
         curve = Curve("measured", parted(values / factor))
         panels.append(_symmetric(balance.title, balance.shown, 0.8, [curve], curve.values))
     legend = [
         (NOMINAL, "error of the nominal model, levels calibrated"),
         (NOISE, f"±{_BAND:g} standard deviations of the noise"),
-        ("measured", "measured" + "; residual of the nominal model" * bool(one.balances)),
+        ("measured", "measured" + "; residual of the nominal model" * bool(residuals.balances)),
     ]
     if extension:
         legend.insert(1, (EXTENDED, f"error of the model {extension}"))
     return CaseFigure(
         name=case.name,
         title=case.title,
-        finding=_finding(one.channels, errors, extension, span * system.comparison.block),
-        time=np.insert(one.block_time, gaps, middles),
+        finding=_finding(residuals.channels, errors, extension, span * system.comparison.block),
+        time=np.insert(residuals.block_time, gaps, middles),
         window=None,
         legend=tuple(legend),
         panels=tuple(panels),
@@ -545,16 +559,19 @@ def estimate_figure(result: CaseResult) -> CaseFigure:
 
 def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[Path]) -> None:
     """Draw what errors go with, before and after, to each path (PNG or SVG by suffix)."""
-    channels = list(dict.fromkeys(one["channel"] for one in dependences))
-    influences = list(dict.fromkeys(one["influence"] for one in dependences))
+    channels = list(dict.fromkeys(dependence["channel"] for dependence in dependences))
+    influences = list(dict.fromkeys(dependence["influence"] for dependence in dependences))
     with mpl.rc_context(STYLE | {"axes.grid": False}):
         sheet = Figure(figsize=(7.5, 4.0), layout="constrained")
         plots = sheet.subplots(1, 2, sharey=True)
         for axes, key in zip(plots, ("before", "after"), strict=True):
             share = np.zeros((len(influences), len(channels)))
-            for one in dependences:
-                at = influences.index(one["influence"]), channels.index(one["channel"])
-                share[at] = 100.0 * one[key]
+            for dependence in dependences:
+                at = (
+                    influences.index(dependence["influence"]),
+                    channels.index(dependence["channel"]),
+                )
+                share[at] = 100.0 * dependence[key]
             draw_heat(axes, share, 100.0)
             axes.set_xticks(range(len(channels)), channels)
             axes.set_yticks(range(len(influences)), influences)
@@ -582,8 +599,8 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
     """Draw the error of each recording, held out of the fit, before and after."""
     recordings: Mapping[str, Mapping[str, float]] = gain["recordings"]
     rows = [*recordings, "all recordings"]
-    before = [*(one["before"] for one in recordings.values()), gain["before"]]
-    after = [*(one["after"] for one in recordings.values()), gain["after"]]
+    before = [*(recording["before"] for recording in recordings.values()), gain["before"]]
+    after = [*(recording["after"] for recording in recordings.values()), gain["after"]]
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(7.5, 1.5 + 0.3 * len(rows)), layout="constrained")
         axes = sheet.subplots()
@@ -629,7 +646,7 @@ def _context(system: System) -> tuple[str, ...]:
 def _measured(
     system: System,
     signal: str,
-    one: Residuals,
+    residuals: Residuals,
     case: Case,
     parted: Callable[[Vector], Vector],
 ) -> Panel:
@@ -637,7 +654,7 @@ def _measured(
     unit = shown_unit(system, signal)
     factor = per_shown(system, signal, unit)
     values = system.under(case.conditions).signal(signal, case.signals)
-    curve = Curve("measured", parted(np.interp(one.block_time, case.time, values / factor)))
+    curve = Curve("measured", parted(np.interp(residuals.block_time, case.time, values / factor)))
     low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
     room = 0.08 * (high - low) or 1.0
     title = f"{capital(named(system, signal))}, as measured [{unit}]"

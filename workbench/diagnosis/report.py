@@ -117,14 +117,14 @@ def write_diagnosis_page(
 
 def _errors(system: System, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Rows on the errors of samples, in the units of figures; of both models if there are two."""
-    shown = {one.name: one.shown for one in system.comparison.channels}
+    shown = {channel.name: channel.shown for channel in system.comparison.channels}
     models = (0, 1) if summary["causes"] or summary["partial"] else (0,)
     rows = []
-    for one in summary["errors"]:
-        unit = shown[one["channel"]]
-        factor = si_factor(unit, one["unit"], one["channel"])
-        sizes = [one[size][i] / factor for i in models for size in ("rms", "mean_absolute")]
-        rows.append({**one, "unit": unit, "sizes": sizes})
+    for error in summary["errors"]:
+        unit = shown[error["channel"]]
+        factor = si_factor(unit, error["unit"], error["channel"])
+        sizes = [error[size][i] / factor for i in models for size in ("rms", "mean_absolute")]
+        rows.append({**error, "unit": unit, "sizes": sizes})
     return rows
 
 
@@ -132,7 +132,7 @@ def _smoothed(system: System, found: Mapping[str, Any] | None) -> list[dict[str,
     """Rows on the best estimates, by quantity, in the units of figures; a cell for each model."""
     models = [] if found is None else list(found["models"].values())
     rows = []
-    for name in dict.fromkeys(name for one in models for name in one):
+    for name in dict.fromkeys(name for model in models for name in model):
         unit = shown_unit(system, name)
         factor, cells = per_shown(system, name, unit), []
         for one in (model.get(name) for model in models):
@@ -153,12 +153,12 @@ def _words(
 ) -> dict[str, Any]:
     """What the page calls signals, times and what is judged."""
     compare, objective = system.comparison, system.objective
-    judged = [one for one in system.judged if one.name not in summary["channels"]]
+    judged = [signal for signal in system.judged if signal.name not in summary["channels"]]
     leading = compare.leading
     return {
         "inputs": " and ".join(one.label for one in system.inputs),
         "led": "" if leading is None else " and ".join(called(system, n) for n in leading.together),
-        "missing": capital(" and ".join(named(system, one.name) for one in judged)),
+        "missing": capital(" and ".join(named(system, signal.name) for signal in judged)),
         "block": duration(compare.block),
         "shown": duration(lasting_blocks(system) * compare.block),
         "error": f"error of the {called(system, objective.judged)}, rms over mean "
@@ -192,9 +192,12 @@ def _candidates(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         **{cause["effect"]: "cause" for cause in summary["causes"]},
     }
     best: dict[str, dict[str, Any]] = {}
-    for one in summary["candidates"]:
-        if one["effect"] not in best:
-            best[one["effect"]] = {**one, "standing": standing.get(one["effect"], "")}
+    for candidate in summary["candidates"]:
+        if candidate["effect"] not in best:
+            best[candidate["effect"]] = {
+                **candidate,
+                "standing": standing.get(candidate["effect"], ""),
+            }
     return list(best.values())
 
 
@@ -318,8 +321,8 @@ def write_diagnosis(
         ]
         if summary["gain"] is not None:
             drawn.append(draw(draw_gain, summary["gain"], name="gain"))
-        for one in outcome.residuals:
-            _write_recording(one, lasting_blocks(outcome.system), out / f"{one.name}.csv")
+        for residual in outcome.residuals:
+            _write_recording(residual, lasting_blocks(outcome.system), out / f"{residual.name}.csv")
         _write_tables(summary, out)
         if best is not None:
             write_estimates(best, out / "smoothed.csv")
@@ -344,19 +347,19 @@ def _drawn(
     drawing(*shown, pictures)
 
 
-def _write_recording(one: Residuals, span: int, path: Path) -> None:
+def _write_recording(residuals: Residuals, span: int, path: Path) -> None:
     """Prediction errors and balances of a recording, at the middle of each block."""
-    columns = {"time [s]": one.block_time}
-    means = lasting(one, span)
-    for c, channel in enumerate(one.channels):
+    columns = {"time [s]": residuals.block_time}
+    means = lasting(residuals, span)
+    for c, channel in enumerate(residuals.channels):
         name = f"{channel.name} [{channel.unit}]"
-        columns[f"before.{name}"] = one.before[:, c]
-        columns[f"after.{name}"] = one.after[:, c]
-        columns[f"sigma.{name}"] = one.sigma[:, c]
+        columns[f"before.{name}"] = residuals.before[:, c]
+        columns[f"after.{name}"] = residuals.after[:, c]
+        columns[f"sigma.{name}"] = residuals.sigma[:, c]
         columns[f"lasting_before.{name}"] = means.before[:, c]
         columns[f"lasting_after.{name}"] = means.after[:, c]
         columns[f"lasting_sigma.{name}"] = means.sigma[:, c]
-    for balance, values in zip(one.balances, at_blocks(one).values(), strict=True):
+    for balance, values in zip(residuals.balances, at_blocks(residuals).values(), strict=True):
         columns[f"residual.{balance.name} [{balance.unit}]"] = values
     write_numbers(pd.DataFrame(columns), path, 6)
 
@@ -364,26 +367,29 @@ def _write_recording(one: Residuals, span: int, path: Path) -> None:
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
     """Data of the figures that show all recordings."""
     nested = ("shape", "shape_units")
-    rows = [{**one, **{k: json.dumps(one[k]) for k in nested}} for one in summary["candidates"]]
+    rows = [
+        {**candidate, **{k: json.dumps(candidate[k]) for k in nested}}
+        for candidate in summary["candidates"]
+    ]
     write_whole(out / "candidates.csv", _csv(pd.DataFrame(rows)))
     write_whole(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
     errors = [
         {
-            **{key: one[key] for key in ("recording", "channel", "unit", "held_out", "samples")},
+            **{key: error[key] for key in ("recording", "channel", "unit", "held_out", "samples")},
             **{
-                f"{size}_{when}": one[size][i]
+                f"{size}_{when}": error[size][i]
                 for size in ("rms", "mean_absolute")
                 for i, when in enumerate(("before", "after"))
             },
         }
-        for one in summary["errors"]
+        for error in summary["errors"]
     ]
     write_whole(out / "errors.csv", _csv(pd.DataFrame(errors)))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
     write_whole(out / "confusability.csv", _csv(pd.DataFrame(cells)))
     if (gain := summary["gain"]) is not None:
-        rows = [{"recording": name, **one} for name, one in gain["recordings"].items()]
+        rows = [{"recording": name, **recording} for name, recording in gain["recordings"].items()]
         total = {key: gain[key] for key in ("before", "after", "low", "high")}
         write_whole(
             out / "gain.csv", _csv(pd.DataFrame([*rows, {"recording": "all recordings", **total}]))
@@ -405,13 +411,13 @@ def diagnosed(summary: Mapping[str, Any]) -> Answer:
             gain["after"], "1", "lower", low, high
         )
     for cause in summary["causes"]:
-        for name, one in cause["parameters"].items():
+        for name, parameter in cause["parameters"].items():
             headline[f"{cause['effect']}, {name}"] = Measure(
-                one["value"], one["unit"], "", one["low"], one["high"]
+                parameter["value"], parameter["unit"], "", parameter["low"], parameter["high"]
             )
         headline[f"{cause['effect']}, explained"] = percentage(cause["explained"], "higher")
-    for one in summary["errors"]:
-        name = f"{one['recording']}: error of {one['channel']}"
-        details[f"{name}, nominal"] = Measure(one["rms"][0], one["unit"], "lower")
-        details[f"{name}, extended"] = Measure(one["rms"][1], one["unit"], "lower")
+    for error in summary["errors"]:
+        name = f"{error['recording']}: error of {error['channel']}"
+        details[f"{name}, nominal"] = Measure(error["rms"][0], error["unit"], "lower")
+        details[f"{name}, extended"] = Measure(error["rms"][1], error["unit"], "lower")
     return Answer(summary["sentence"], headline, details)

@@ -347,8 +347,8 @@ class FMU:
 
     def close(self) -> None:
         """Free the instance and the unpacked files, those of variants too."""
-        for one in self._variants:
-            one.close()
+        for variant in self._variants:
+            variant.close()
         self._loaded.close()
 
     def variant(self, parameters: Mapping[str, float]) -> "FMU":

@@ -181,7 +181,11 @@ def _folder() -> Path:
     """
     files = sorted(_PACKAGE.rglob("*.py"))
     sources = (file.read_bytes() for file in files)
-    laws = [one for one in sources if b"workbench.models.native import" in one or b"numba" in one]
+    laws = [
+        source
+        for source in sources
+        if b"workbench.models.native import" in source or b"numba" in source
+    ]
     state = hashlib.sha256(b"".join(laws)).hexdigest()[:16]
     return cache_folder() / state
 

@@ -80,10 +80,10 @@ def _estimators(package: str) -> tuple[type[Estimator], ...]:
 
 def _defined(module: ModuleType) -> list[type[Estimator]]:
     return [
-        one
-        for one in vars(module).values()
-        if isinstance(one, type)
-        and issubclass(one, Estimator)
-        and one.__module__ == module.__name__
-        and hasattr(one, "name")
+        var
+        for var in vars(module).values()
+        if isinstance(var, type)
+        and issubclass(var, Estimator)
+        and var.__module__ == module.__name__
+        and hasattr(var, "name")
     ]

@@ -115,7 +115,7 @@ class Estimator(ABC):
         check_model(system, fmu.description)
         self.gains = gains
         inputs = [one.name for one in system.inputs]
-        unseen = [one.name for one in system.outputs if one.name not in fmu.states]
+        unseen = [output.name for output in system.outputs if output.name not in fmu.states]
         outputs = [*system.reported, *unseen]
         self._model: Any = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
@@ -231,7 +231,7 @@ class Estimator(ABC):
         rolling = self.system.rolling
         if rolling is not None and rolling.follower not in begin and rolling.leader in begin:
             begin[rolling.follower] = rolling_ratio(self.fmu, self.system) * begin[rolling.leader]
-        estimated = {one.name for one in self.system.estimated}
+        estimated = {quantity.name for quantity in self.system.estimated}
         held = {name: value for name, value in self._known.items() if name not in estimated}
         self.fmu.start(begin, held)
         self._model.u[:] = 0.0

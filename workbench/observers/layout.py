@@ -51,18 +51,18 @@ def layout(fmu: FMU, system: System) -> Layout:
     """Find the signals of a system in its model; the FMU is started anew."""
     states, unseen = fmu.states, 0
     seen = []
-    for one in system.outputs:
-        if one.name in states:
-            seen.append(states.index(one.name))
+    for output in system.outputs:
+        if output.name in states:
+            seen.append(states.index(output.name))
         else:
             seen.append(-1 - len(system.reported) - unseen)
             unseen += 1
     shown = {
-        one.name: len(states) - 1 - at
-        for one, at in zip(system.outputs, seen, strict=True)
+        output.name: len(states) - 1 - at
+        for output, at in zip(system.outputs, seen, strict=True)
         if at < 0
     }
-    nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
+    nominal = np.array([fmu.defaults[quantity.name] for quantity in system.estimated])
     fading, rolling = system.fading, system.rolling
     pace = np.array(system.slopes(fading.signal)) if fading else np.zeros(len(seen))
     follower = leader = -1
@@ -71,10 +71,12 @@ def layout(fmu: FMU, system: System) -> Layout:
     return Layout(
         seen=np.array(seen, np.intp),
         nominal=nominal,
-        low=np.array([one.low for one in system.estimated]) - nominal,
-        high=np.array([one.high for one in system.estimated]) - nominal,
-        doubt=np.array([one.relative_error for one in system.estimated]),
-        acts_on=np.array([_column(fmu, one.acts_on, shown) for one in system.estimated], np.intp),
+        low=np.array([quantity.low for quantity in system.estimated]) - nominal,
+        high=np.array([quantity.high for quantity in system.estimated]) - nominal,
+        doubt=np.array([quantity.relative_error for quantity in system.estimated]),
+        acts_on=np.array(
+            [_column(fmu, quantity.acts_on, shown) for quantity in system.estimated], np.intp
+        ),
         pace=pace,
         half=fading.half if fading else 0.0,
         follower=follower,

@@ -31,7 +31,7 @@ class LiveWindow:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._signals = [system.objective.judged, *(one.name for one in system.estimated)]
+        self._signals = [system.objective.judged, *(quantity.name for quantity in system.estimated)]
         units = [shown_unit(system, name) for name in self._signals]
         self._titles = [
             f"{named(system, name)} [{unit}]"
@@ -77,8 +77,8 @@ class LiveWindow:
             axes.grid(alpha=0.25)
         self._axes[-1].set_xlabel("time [s]")
         judged.set_xlim(case.time[0], case.time[-1])
-        for axes, one in zip(quantities, self._system.estimated, strict=True):
-            axes.set_ylim(one.low, one.high)
+        for axes, quantity in zip(quantities, self._system.estimated, strict=True):
+            axes.set_ylim(quantity.low, quantity.high)
         if self._signals[0] in case:
             measured = case[self._signals[0]] / self._units[0]
             judged.plot(case.time, measured, color=LIGHT["raw"], lw=0.5, label="measured")

@@ -140,7 +140,7 @@ def prior(system: System) -> Vector:
 
     Any value of its range is as likely.
     """
-    ranges = np.array([one.prior for one in system.estimated])
+    ranges = np.array([quantity.prior for quantity in system.estimated])
     deviation: Vector = np.diff(ranges)[:, 0] / np.sqrt(12.0)
     return deviation
 
@@ -327,7 +327,7 @@ def window_test(fmu: FMU, system: System, case: Case, run: Run, scale: Vector) -
         time=case.time[starts + length - 1],
         remaining=remaining(scaled)[:, :count],
         bound=bounds(model, starts, length, before)[:, count:],
-        serving=np.array([one.useful for one in system.estimated]),
+        serving=np.array([quantity.useful for quantity in system.estimated]),
     )
 
 
@@ -341,11 +341,13 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     x : (n, k) states.
     u : (n, m + q) measured inputs, corrections.
     """
-    held = [one.name for one in system.outputs if one.name in fmu.states]
+    held = [output.name for output in system.outputs if output.name in fmu.states]
     places = [fmu.states.index(name) for name in held]
     values = np.column_stack([run.signal(name) for name in held]) if held else case.y[:, :0]
     fmu.start(dict(zip(held, values[0], strict=True)))
-    corrections = [run.signal(one.name) - fmu.defaults[one.name] for one in system.estimated]
+    corrections = [
+        run.signal(quantity.name) - fmu.defaults[quantity.name] for quantity in system.estimated
+    ]
     u = np.column_stack([case.u, *corrections])
     inputs = fmu.variables(_inputs(system))
     x = np.tile(fmu.get_states(), (case.time.size, 1))
@@ -370,7 +372,7 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
     """
     fmu.start({})
     inputs = fmu.variables(_inputs(system))
-    names = [one.name for one in system.outputs]
+    names = [output.name for output in system.outputs]
     unseen = fmu.variables([name for name in names if name not in fmu.states])
     n, count = x.shape
     m, q = len(system.inputs), len(system.estimated)
@@ -400,7 +402,7 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
     driven = slice(count, count + m)
     noise = np.array([one.noise_at_scale for one in system.inputs])
     sensors = np.column_stack(
-        [one.deviation(values) for one, values in zip(system.outputs, y.T, strict=True)]
+        [output.deviation(values) for output, values in zip(system.outputs, y.T, strict=True)]
     )
     return SampledModel(
         names=(*fmu.states, *system.corrections),

@@ -32,12 +32,12 @@ _COLOURS = ("#0072B2", "#D55E00")
 _LINES = ("-", "--")
 
 
-def draw_observability(one: CaseObservability, path: Path) -> None:
+def draw_observability(observability: CaseObservability, path: Path) -> None:
     """Draw one recording to `path` (PNG): an input and an output, then the bounds of quantities.
 
     Bounds are drawn at the end of their window and shaded where the first model's are useful.
     """
-    system, case = one.system, one.case
+    system, case = observability.system, observability.case
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
         top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
@@ -48,14 +48,14 @@ def draw_observability(one: CaseObservability, path: Path) -> None:
             top.set_ylabel(f"{first.name} [{first.shown}]")
         beside = _beside(system)
         other = top.twinx()
-        other.plot(case.time, one.run.signal(beside), color="#0072B2", label=beside)
+        other.plot(case.time, observability.run.signal(beside), color="#0072B2", label=beside)
         other.set_ylabel(f"{called(system, beside)} [{system.unit(beside)}]")
         other.grid(visible=False)
         other.spines["right"].set_visible(True)
         handles = [*top.get_lines(), *other.get_lines()]
         top.legend(handles, [str(h.get_label()) for h in handles], loc="upper right", ncols=2)
         for j, axes in enumerate(rows):
-            _draw_bounds(one, j, axes)
+            _draw_bounds(observability, j, axes)
         rows[-1].set_xlabel("time [s]")
         figure.align_ylabels()
         save_figure(figure, [path])
@@ -63,15 +63,15 @@ def draw_observability(one: CaseObservability, path: Path) -> None:
 
 def _beside(system: System) -> str:
     """What shows the state of the machine beside its first input: what the model reports last."""
-    return [*(one.name for one in system.outputs), *system.reported][-1]
+    return [*(output.name for output in system.outputs), *system.reported][-1]
 
 
-def _draw_bounds(one: CaseObservability, j: int, axes: Any) -> None:
+def _draw_bounds(observability: CaseObservability, j: int, axes: Any) -> None:
     """Bounds of quantity j by all models."""
-    quantity, known = one.system.estimated[j], float(prior(one.system)[j])
-    for test, colour, line in zip(one.tests, _COLOURS, _LINES, strict=False):
+    quantity, known = observability.system.estimated[j], float(prior(observability.system)[j])
+    for test, colour, line in zip(observability.tests, _COLOURS, _LINES, strict=False):
         axes.semilogy(test.time, test.bound[:, j], line, color=colour, label=test.model)
-    first = one.tests[0]
+    first = observability.tests[0]
     axes.fill_between(
         first.time,
         0.0,
@@ -92,18 +92,18 @@ def _draw_bounds(one: CaseObservability, j: int, axes: Any) -> None:
     axes.legend(loc="upper center", ncols=4, fontsize=7)
 
 
-def write_windows(one: CaseObservability, path: Path) -> None:
+def write_windows(observability: CaseObservability, path: Path) -> None:
     """Write one CSV of a recording: end of the window, bounds and remaining shares by model."""
-    system, first = one.system, one.tests[0]
-    at = np.searchsorted(one.case.time, first.time)
+    system, first = observability.system, observability.tests[0]
+    at = np.searchsorted(observability.case.time, first.time)
     columns: dict[str, Any] = {"time [s]": first.time}
     for signal in system.inputs:
         factor = per_shown(system, signal.name, signal.shown)
-        columns[f"{signal.name} [{signal.shown}]"] = one.case[signal.name][at] / factor
+        columns[f"{signal.name} [{signal.shown}]"] = observability.case[signal.name][at] / factor
     for name in (*system.reported, *(quantity.name for quantity in system.estimated)):
-        columns[f"{name} [{system.unit(name)}]"] = one.run.signal(name)[at]
-    columns["judged [1]"] = one.judged.astype(int)
-    for test in one.tests:
+        columns[f"{name} [{system.unit(name)}]"] = observability.run.signal(name)[at]
+    columns["judged [1]"] = observability.judged.astype(int)
+    for test in observability.tests:
         for j, quantity in enumerate(system.estimated):
             columns[f"{test.model}.bound_{quantity.correction} [{quantity.unit}]"] = test.bound[
                 :, j
@@ -130,13 +130,13 @@ def write_observability(
             "quantities": dict(point.quantities),
         },
         "noise": {
-            one.name: {"absolute": one.noise, "relative": one.relative_noise}
-            for one in (*system.inputs, *system.outputs)
+            signal.name: {"absolute": signal.noise, "relative": signal.relative_noise}
+            for signal in (*system.inputs, *system.outputs)
         },
         "window_s": WINDOW,
         "stride_s": STRIDE,
         "prior": dict(zip(system.corrections, prior(system).tolist(), strict=True)),
-        "useful": {one.correction: one.useful for one in system.estimated},
+        "useful": {quantity.correction: quantity.useful for quantity in system.estimated},
         "linear": {test.model: _linear(test) for test in linear},
         "cases": {
             one.case.name: {
@@ -167,21 +167,23 @@ def _linear(test: LinearTest) -> dict[str, Any]:
     }
 
 
-def _medians(one: CaseObservability) -> dict[str, float | None]:
+def _medians(observability: CaseObservability) -> dict[str, float | None]:
     """Quantities of the trajectory, on which their bounds depend; None if nothing is judged."""
-    at = np.searchsorted(one.case.time, one.tests[0].time[one.judged])
-    names = [quantity.name for quantity in one.system.estimated]
-    return {n: float(np.median(one.run.signal(n)[at])) if at.size else None for n in names}
+    at = np.searchsorted(observability.case.time, observability.tests[0].time[observability.judged])
+    names = [quantity.name for quantity in observability.system.estimated]
+    return {
+        n: float(np.median(observability.run.signal(n)[at])) if at.size else None for n in names
+    }
 
 
-def _shares(test: WindowTest, one: CaseObservability) -> dict[str, Any]:
+def _shares(test: WindowTest, observability: CaseObservability) -> dict[str, Any]:
     """Shares of the judged windows; None for a recording without."""
-    if not one.judged.any():
+    if not observability.judged.any():
         return {"useful": None, "median_bound": None, "states_observable": None}
-    useful = test.useful()[one.judged].mean(axis=0)
-    median = np.median(test.bound[one.judged], axis=0)
-    observable = test.states_observable()[one.judged].mean(axis=0)
-    names = one.system.corrections
+    useful = test.useful()[observability.judged].mean(axis=0)
+    median = np.median(test.bound[observability.judged], axis=0)
+    observable = test.states_observable()[observability.judged].mean(axis=0)
+    names = observability.system.corrections
     return {
         "useful": dict(zip(names, useful.tolist(), strict=True)),
         "median_bound": dict(zip(names, median.tolist(), strict=True)),
@@ -237,8 +239,8 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
     first, last = done[0].tests[0], done[0].tests[-1]
     width = max([len("case"), *(len(one.case.name) for one in done)])
     header = f"{'case':<{width}}" + "".join(
-        f"{one.name:>9}{f'{one.correction} < {one.useful:g}':>16}{'median':>10}"
-        for one in system.estimated
+        f"{quantity.name:>9}{f'{quantity.correction} < {quantity.useful:g}':>16}{'median':>10}"
+        for quantity in system.estimated
     )
     hidden = [name for name in last.states if name not in first.states]
     header += "".join(f"{name:>11}" for name in hidden)
@@ -284,7 +286,7 @@ def write_observability_page(
     system = done[0].system
     figures = [_figure(one) for one in sorted(done, key=_share)]
     drawn = placed(figures, summary, out)
-    names = ", ".join(capital(one.label) for one in system.estimated) or "States"
+    names = ", ".join(capital(quantity.label) for quantity in system.estimated) or "States"
     parts = [
         Part("shown", "Where the samples tell least", (_EXPLAINED,), recordings=tuple(drawn[:1])),
         Part("cases", "Recordings", tables=(_cases(system, summary),), printed=True),
@@ -321,20 +323,24 @@ _LINEAR = (
 )
 
 
-def _share(one: CaseObservability) -> float:
+def _share(observability: CaseObservability) -> float:
     """Share of the judged windows in which all quantities can be told."""
-    useful = one.tests[0].useful()
-    return float(useful[one.judged].mean()) if one.judged.any() and useful.size else 1.0
+    useful = observability.tests[0].useful()
+    return (
+        float(useful[observability.judged].mean())
+        if observability.judged.any() and useful.size
+        else 1.0
+    )
 
 
-def _figure(one: CaseObservability) -> CaseFigure:
+def _figure(observability: CaseObservability) -> CaseFigure:
     """An input, and the bounds of each quantity by model, at the ends of the windows."""
-    system, time = one.system, one.tests[0].time
-    at = np.searchsorted(one.case.time, time)
+    system, time = observability.system, observability.tests[0].time
+    at = np.searchsorted(observability.case.time, time)
     panels = []
     for signal in system.inputs[:1]:
         unit = shown_unit(system, signal.name)
-        values = one.case[signal.name][at] / per_shown(system, signal.name, unit)
+        values = observability.case[signal.name][at] / per_shown(system, signal.name, unit)
         low, high = float(values.min()), float(values.max())
         room = 0.08 * (high - low) or 1.0
         title = f"{capital(named(system, signal.name))} [{unit}]"
@@ -345,18 +351,20 @@ def _figure(one: CaseObservability) -> CaseFigure:
         line = Curve("raw", np.full(time.size, quantity.useful))
         curves = [
             Curve(style, np.interp(time, test.time, test.bound[:, j]))
-            for test, style in zip(one.tests, _STYLES, strict=False)
+            for test, style in zip(observability.tests, _STYLES, strict=False)
         ]
         title = f"Bound of {called(system, quantity.name)} {quantity.name} [{quantity.unit}]"
         reach = _REACH * quantity.useful
         panels.append(Panel(title, quantity.unit, 0.0, reach, 1.0, (line, *curves)))
     legend = [("raw", "an estimate serves below")]
-    legend += [(style, t.model) for t, style in zip(one.tests, _STYLES, strict=False)]
-    share = f"All quantities can be told in {100.0 * _share(one):.0f} % of the judged time."
+    legend += [(style, t.model) for t, style in zip(observability.tests, _STYLES, strict=False)]
+    share = (
+        f"All quantities can be told in {100.0 * _share(observability):.0f} % of the judged time."
+    )
     return CaseFigure(
-        name=one.case.name,
-        title=one.case.title,
-        finding=share if one.judged.any() else "Nothing is judged here.",
+        name=observability.case.name,
+        title=observability.case.title,
+        finding=share if observability.judged.any() else "Nothing is judged here.",
         time=time,
         window=None,
         legend=(("measured", "measured"), *legend),
@@ -366,24 +374,29 @@ def _figure(one: CaseObservability) -> CaseFigure:
 
 def _cases(system: System, summary: Mapping[str, Any]) -> Rows:
     columns = [Heading("recording", number=False), Heading("conditions", number=False)]
-    for one in system.estimated:
-        unit = "" if one.unit == "1" else f" [{one.unit}]"
+    for quantity in system.estimated:
+        unit = "" if quantity.unit == "1" else f" [{quantity.unit}]"
         columns += [
-            Heading(f"{one.name}, median{unit}"),
+            Heading(f"{quantity.name}, median{unit}"),
             Heading(
-                f"{one.name} can be told [%]", meaning=f"time with a bound below {one.useful:g}"
+                f"{quantity.name} can be told [%]",
+                meaning=f"time with a bound below {quantity.useful:g}",
             ),
-            Heading(f"bound of {one.name}, median{unit}"),
+            Heading(f"bound of {quantity.name}, median{unit}"),
         ]
     rows = []
     for name, case in summary["cases"].items():
         first = next(iter(case["models"].values()))
         cells = [Cell(case["title"])]
-        for one in system.estimated:
-            share = None if first["useful"] is None else first["useful"][one.correction]
-            bound = None if first["median_bound"] is None else first["median_bound"][one.correction]
+        for quantity in system.estimated:
+            share = None if first["useful"] is None else first["useful"][quantity.correction]
+            bound = (
+                None
+                if first["median_bound"] is None
+                else first["median_bound"][quantity.correction]
+            )
             cells += [
-                number(case[f"median_{one.name}"], "{:.3g}".format),
+                number(case[f"median_{quantity.name}"], "{:.3g}".format),
                 number(None if share is None else 100.0 * share, "{:.0f}".format, share),
                 number(bound, "{:.2g}".format),
             ]
@@ -402,12 +415,12 @@ def _states(summary: Mapping[str, Any]) -> list[Rows]:
             (
                 name,
                 (
-                    number(100.0 * one["remaining"], "{:.2f}".format, one["remaining"]),
-                    number(one["scale"], "{:.3g}".format),
+                    number(100.0 * state["remaining"], "{:.2f}".format, state["remaining"]),
+                    number(state["scale"], "{:.3g}".format),
                     Cell(_verdict(name, test)),
                 ),
             )
-            for name, one in test["states"].items()
+            for name, state in test["states"].items()
         )
         columns = (
             Heading("state", number=False),
@@ -445,24 +458,31 @@ def observed(system: System, summary: Mapping[str, Any]) -> Answer:
     headline, details = {}, {}
     cases = summary["cases"]
     words = []
-    for one in system.estimated:
+    for quantity in system.estimated:
         shares, bounds = {}, {}
         for case, values in cases.items():
             first = next(iter(values["models"].values()))
             if first["useful"] is not None:
-                shares[case] = first["useful"][one.correction]
-                bounds[case] = first["median_bound"][one.correction]
+                shares[case] = first["useful"][quantity.correction]
+                bounds[case] = first["median_bound"][quantity.correction]
         for case, share in shares.items():
-            details[f"{case}: time in which {one.name} can be told"] = percentage(share, "higher")
-            details[f"{case}: bound of {one.name}"] = Measure(bounds[case], one.unit, "lower")
+            details[f"{case}: time in which {quantity.name} can be told"] = percentage(
+                share, "higher"
+            )
+            details[f"{case}: bound of {quantity.name}"] = Measure(
+                bounds[case], quantity.unit, "lower"
+            )
         if shares:
             middle = float(np.median(list(shares.values())))
-            headline[f"time in which {one.name} can be told, median"] = percentage(middle, "higher")
+            headline[f"time in which {quantity.name} can be told, median"] = percentage(
+                middle, "higher"
+            )
             low, high = min(shares.values()), max(shares.values())
             between = f" ({whole_percent(low)} to {whole_percent(high)})" if len(shares) > 1 else ""
             words.append(
-                f"{one.label} {one.name} to {one.useful:g}{unit_suffix(one.unit)} in "
-                f"{whole_percent(middle)} of the judged time{between}"
+                f"{quantity.label} {quantity.name} to {quantity.useful:g}"
+                f"{unit_suffix(quantity.unit)} in {whole_percent(middle)} of the judged "
+                f"time{between}"
             )
     first, test = next(iter(summary["linear"].items()))
     seen = "can" if test["observable"] else "cannot"

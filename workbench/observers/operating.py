@@ -61,8 +61,9 @@ def settle(
     if rolling is not None and rolling.leader in held and rolling.follower not in held:
         fmu.start({**held, rolling.follower: places.ratio * held[rolling.leader]})
     offsets = [
-        point.quantities.get(one.name, fmu.defaults[one.name]) - fmu.defaults[one.name]
-        for one in system.estimated
+        point.quantities.get(quantity.name, fmu.defaults[quantity.name])
+        - fmu.defaults[quantity.name]
+        for quantity in system.estimated
     ]
     u = np.array([*(point.inputs.get(name, 0.0) for name in names), *offsets])
     fmu.set(fmu.variables([*names, *system.corrections]), u)
@@ -84,7 +85,7 @@ def settle(
 def linearised(fmu: FMU, system: System) -> LinearModel:
     """A model linearised at the design point; the FMU is left there."""
     settle(fmu, system, system.design, extensions=False)
-    names = [one.name for one in system.outputs]
+    names = [output.name for output in system.outputs]
     # A state is an output by itself; not every FMU differentiates it.
     unseen = [name for name in names if name not in fmu.states]
     found = fmu.linearise(fmu.variables(system.corrections), fmu.variables(unseen))

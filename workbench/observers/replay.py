@@ -105,7 +105,11 @@ def _rules(estimator: Estimator) -> Mapping[str, object]:
 def _doubted(estimator: Estimator) -> list[str]:
     """Estimated quantities that are not always shown."""
     rules = _rules(estimator)
-    return [one.name for one in estimator.system.estimated if one.claimed or one.name in rules]
+    return [
+        quantity.name
+        for quantity in estimator.system.estimated
+        if quantity.claimed or quantity.name in rules
+    ]
 
 
 def _claims(
@@ -120,16 +124,16 @@ def _claims(
     rules, system = _rules(estimator), estimator.system
     claimed = {}
     for name in _doubted(estimator):
-        one = next(one for one in system.estimated if one.name == name)
+        quantity = next(quantity for quantity in system.estimated if quantity.name == name)
         met = all(
             key in estimator.finds or case.conditions[key] == value
-            for key, value in one.claimed.items()
+            for key, value in quantity.claimed.items()
         )
         if met and name in rules:
             shares = [rules[name](fmu, system, values) for fmu in estimator.models]  # type: ignore[operator]
             weights = probability if estimator.modes else np.ones((case.time.size, 1))
             sure = (np.column_stack(shares) * weights).sum(axis=1) > SURE
-            span = (one.useful / one.walk) ** 2 if one.walk > 0.0 else 0.0
+            span = (quantity.useful / quantity.walk) ** 2 if quantity.walk > 0.0 else 0.0
             claimed[name] = lasting(sure, case.time, span)
         else:
             claimed[name] = np.full(case.time.size, met)

@@ -157,13 +157,13 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     ranking = standings(summary, judged)
     best = ranking[0]
     headline = {}
-    for one in ranking:
-        headline[f"worst error of {judged}, {one.name}"] = percentage(one.worst)
-        usual = [None if end is None else 100.0 * end for end in one.usual]
-        headline[f"usual error of {judged}, {one.name}"] = Measure(
+    for standing in ranking:
+        headline[f"worst error of {judged}, {standing.name}"] = percentage(standing.worst)
+        usual = [None if end is None else 100.0 * end for end in standing.usual]
+        headline[f"usual error of {judged}, {standing.name}"] = Measure(
             usual[0], "%", "lower", *usual[1:]
         )
-        headline[f"objective z, {one.name}"] = Measure(one.z, "1", "lower")
+        headline[f"objective z, {standing.name}"] = Measure(standing.z, "1", "lower")
     details = {
         f"{case}: error of {judged}, {name}": percentage(score[f"{judged}_nrmse"])
         for case, values in summary["cases"].items()
@@ -227,7 +227,7 @@ def write_page(
         when=system.objective.when or window(system),
         window=window(system),
         below=below(system),
-        fed=judged in (one.name for one in system.outputs),
+        fed=judged in (output.name for output in system.outputs),
         rounded=rounded,
         weights=[
             (weight, inverse(system.unit(name)), name)

@@ -82,7 +82,7 @@ class CaseResult:
         nis = run.nis[window]
         if not (nis.size and np.isfinite(nis).all()):
             return 0.0
-        fed = [one in run.columns for one in (*self.case.outputs, *self.case.aids)]
+        fed = [signal in run.columns for signal in (*self.case.outputs, *self.case.aids)]
         return float(nis.mean() / np.isfinite(self.case.y[window][:, fed]).sum(axis=1).mean())
 
     def to_frame(self) -> pd.DataFrame:
@@ -95,9 +95,9 @@ class CaseResult:
         system, case = self.system, self.case
         judged, bandwidth = system.objective.judged, system.objective.bandwidth
         columns: dict[str, Any] = {"time [s]": case.time}
-        for name, one in system.signals.items():
+        for name, signal in system.signals.items():
             if name in case:
-                columns[f"measured.{name} [{one.unit}]"] = case[name]
+                columns[f"measured.{name} [{signal.unit}]"] = case[name]
         unit, measured = system.unit(judged), self.measured()
         if measured is not None and np.isfinite(bandwidth):
             columns[f"measured.{judged}_{bandwidth:g}Hz [{unit}]"] = measured
@@ -106,7 +106,9 @@ class CaseResult:
             if (error := self.error(name)) is not None:
                 columns[f"{name}.{judged}_error [{unit}]"] = error
         if (best := self.reference) is not None:
-            columns |= {f"{best.estimator}.{key}": one for key, one in best.to_columns().items()}
+            columns |= {
+                f"{best.estimator}.{key}": to_column for key, to_column in best.to_columns().items()
+            }
         return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,14 +121,14 @@ class CaseResult:
             "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
                 name: {
-                    f"{judged}_rms_{unit}": one.rms,
-                    f"{judged}_nrmse": one.nrmse,
-                    "z": one.z,
+                    f"{judged}_rms_{unit}": score.rms,
+                    f"{judged}_nrmse": score.nrmse,
+                    "z": score.z,
                     "outcome": self.runs[name].ending.name,
-                    "reason": one.reason,
+                    "reason": score.reason,
                     "seconds": round(self.runs[name].seconds, 4),
                 }
-                for name, one in self.scores.items()
+                for name, score in self.scores.items()
             },
         }
 
@@ -182,21 +184,21 @@ class Simulation:
     def run(self, case: Case) -> CaseResult:
         """All estimators on one case, in this process."""
         with self.estimators() as estimators:
-            runs = {name: replay(case, one) for name, one in estimators.items()}
+            runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         return CaseResult(self.system, case, runs, scores, self._reference(case, runs))
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
         """The smoother's estimate, where a recording has nothing that is only there to judge by."""
         kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
-        if any(one.name in case for one in self.system.judged) or kept > _MOST:
+        if any(signal.name in case for signal in self.system.judged) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoothed(case, self.system)
 
 
 def hidden(system: System) -> tuple[str, ...]:
     """What an estimate says that no sensor feeds it: quantities, and outputs that are reported."""
-    fed = {*system.corrections, *(one.name for one in system.outputs)}
+    fed = {*system.corrections, *(output.name for output in system.outputs)}
     return tuple(name for name in system.columns if name not in fed)
 
 
@@ -340,7 +342,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     """
     system, case = result.system, result.case
     unit = shown_unit(system, view.signals[0])
-    fed = {one.name for one in (*system.inputs, *system.outputs)}
+    fed = {signal.name for signal in (*system.inputs, *system.outputs)}
     known = [(styles[name], run) for name, run in result.runs.items()]
     best = [] if result.reference is None else [(_REFERENCE, result.reference)]
     curves: list[Curve] = []
@@ -372,8 +374,10 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
 
 def _is_fed(system: System, name: str) -> bool:
     """Whether a signal is derived from what is fed; a sensor that only judges has its own panel."""
-    judged = {one.name for one in system.judged}
-    return any(one.name == name and not one.formula.names & judged for one in system.derived)
+    judged = {signal.name for signal in system.judged}
+    return any(
+        signal.name == name and not signal.formula.names & judged for signal in system.derived
+    )
 
 
 def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:

@@ -60,8 +60,8 @@ class Answer:
         """As it stands in a file of results."""
         return {
             "sentence": self.sentence,
-            "headline": {name: asdict(one) for name, one in self.headline.items()},
-            "details": {name: asdict(one) for name, one in self.details.items()},
+            "headline": {name: asdict(measure) for name, measure in self.headline.items()},
+            "details": {name: asdict(detail) for name, detail in self.details.items()},
         }
 
 

@@ -104,13 +104,13 @@ class Dots:
                 "y": _TOP + _ROW * (number + 0.5),
                 "dots": [
                     {
-                        "x": at(one.value),
-                        "style": one.style,
+                        "x": at(dot.value),
+                        "style": dot.style,
                         "interval": None
-                        if one.low is None or one.high is None
-                        else (at(one.low), at(one.high)),
+                        if dot.low is None or dot.high is None
+                        else (at(dot.low), at(dot.high)),
                     }
-                    for one in dots
+                    for dot in dots
                 ],
             }
             for number, (name, dots) in enumerate(self.rows)

@@ -51,7 +51,7 @@ class Ran:
             "summary": self.summary,
             "run": dict(self.run),
             "sentence": self.sentence,
-            "headline": {name: vars(one) for name, one in self.headline.items()},
+            "headline": {name: vars(measure) for name, measure in self.headline.items()},
             "files": dict(self.files),
         }
 
@@ -80,7 +80,7 @@ class Change:
     def to_dict(self) -> dict[str, Any]:
         """As plain numbers and texts."""
         ends = {"before": self.before, "after": self.after}
-        told = {key: None if one is None else vars(one) for key, one in ends.items()}
+        told = {key: None if end is None else vars(end) for key, end in ends.items()}
         return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **told}
 
 
@@ -160,11 +160,11 @@ def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
     """Refuse what no command writes."""
     texts = [run[key] for key in ("command", "date", "workbench", "system")]
     commit, data = run["commit"] or "", dict(run["data"])
-    numbers = [end for one in measures for end in (one.value, one.low, one.high)]
+    numbers = [end for measure in measures for end in (measure.value, measure.low, measure.high)]
     if (
         not all(isinstance(text, str) for text in (*texts, commit, *data))
         or not all(end is None or isinstance(end, int | float) for end in numbers)
-        or not all(isinstance(one.unit, str) for one in measures)
+        or not all(isinstance(measure.unit, str) for measure in measures)
     ):
         raise TypeError
 
@@ -221,10 +221,10 @@ def _verdict(before: Measure | None, after: Measure | None) -> Verdict:
     return "better" if (last < first) == (after.better == "lower") else "worse"
 
 
-def _overlap(one: Measure, other: Measure) -> bool:
-    if one.low is None or one.high is None or other.low is None or other.high is None:
+def _overlap(measure: Measure, other: Measure) -> bool:
+    if measure.low is None or measure.high is None or other.low is None or other.high is None:
         return False
-    return one.low <= other.high and other.low <= one.high
+    return measure.low <= other.high and other.low <= measure.high
 
 
 def differences(before: Ran, after: Ran) -> list[str]:
@@ -260,9 +260,9 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if not isinstance(content, Mapping):
         yield path, content
         return
-    for key, one in content.items():
+    for key, entry in content.items():
         if path or key not in ("run", "workbench", "commit", "meanings"):
-            yield from _leaves(one, f"{path}.{key}" if path else key)
+            yield from _leaves(entry, f"{path}.{key}" if path else key)
 
 
 def format_runs(found: list[Ran]) -> str:
@@ -270,26 +270,26 @@ def format_runs(found: list[Ran]) -> str:
     return "\n\n".join("\n".join(_told(one)) for one in found)
 
 
-def _told(one: Ran) -> Iterator[str]:
-    date = str(one.run["date"]).replace("T", " ").replace("+00:00", " UTC")
-    version = f"workbench {one.run['workbench']}" + f" ({one.commit})" * bool(one.commit)
-    count = len(one.run["data"])
+def _told(ran: Ran) -> Iterator[str]:
+    date = str(ran.run["date"]).replace("T", " ").replace("+00:00", " UTC")
+    version = f"workbench {ran.run['workbench']}" + f" ({ran.commit})" * bool(ran.commit)
+    count = len(ran.run["data"])
     data = f", {count} recording{'s' * (count != 1)}" if count else ""
-    yield f"{one.folder}: {one.run['command']}, {date}, {version}, {one.run['system']}{data}"
-    yield f"  {one.sentence}"
-    width = max(map(len, one.headline), default=0)
-    for name, measure in one.headline.items():
+    yield f"{ran.folder}: {ran.run['command']}, {date}, {version}, {ran.run['system']}{data}"
+    yield f"  {ran.sentence}"
+    width = max(map(len, ran.headline), default=0)
+    for name, measure in ran.headline.items():
         yield f"  {name:<{width}}  {_value(measure)}"
-    kinds = ", ".join(f"{count} {kind}" for kind, count in one.files.items())
+    kinds = ", ".join(f"{count} {kind}" for kind, count in ran.files.items())
     yield f"  files: {kinds}"
 
 
 def format_changes(before: Ran, after: Ran, changes: list[Change]) -> str:
     """Two runs side by side, for people: what got worse first, numbers of one unit together."""
     lines = [f"{before.run['command']}: {before.folder} -> {after.folder}"]
-    lines += [f"not the same, {one}" for one in differences(before, after)]
+    lines += [f"not the same, {difference}" for difference in differences(before, after)]
     order: tuple[Verdict, ...] = ("worse", "better", "changed", "unclear", "gone", "new")
-    shown = [one for one in changes if one.verdict != "unchanged"]
+    shown = [change for change in changes if change.verdict != "unchanged"]
     shown.sort(key=lambda one: (order.index(one.verdict), one.unit))
     width = max((len(one.name) for one in shown), default=0)
     for one in shown:
@@ -297,9 +297,9 @@ def format_changes(before: Ran, after: Ran, changes: list[Change]) -> str:
             "none" if end is None else _value(end) for end in (one.before, one.after)
         )
         lines.append(f"{one.verdict:<8} {one.name:<{width}}  {ends}{_relative(one)}")
-    counts = {verdict: sum(one.verdict == verdict for one in changes) for verdict in order}
+    counts = {verdict: sum(change.verdict == verdict for change in changes) for verdict in order}
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    same = sum(one.verdict == "unchanged" for one in changes)
+    same = sum(change.verdict == "unchanged" for change in changes)
     lines.append(
         f"of {len(changes)} numbers: " + ", ".join(filter(None, (told, f"{same} unchanged")))
     )
@@ -308,17 +308,22 @@ def format_changes(before: Ran, after: Ran, changes: list[Change]) -> str:
     return "\n".join(lines)
 
 
-def _relative(one: Change) -> str:
-    if one.before is None or one.after is None or not one.before.value or one.after.value is None:
+def _relative(change: Change) -> str:
+    if (
+        change.before is None
+        or change.after is None
+        or not change.before.value
+        or change.after.value is None
+    ):
         return ""
-    return f" ({100.0 * (one.after.value / one.before.value - 1.0):+.1f} %)"
+    return f" ({100.0 * (change.after.value / change.before.value - 1.0):+.1f} %)"
 
 
-def _value(one: Measure) -> str:
-    if one.value is None:
+def _value(measure: Measure) -> str:
+    if measure.value is None:
         return "none"
-    unit = "" if one.unit == "1" else f" {one.unit}"
+    unit = "" if measure.unit == "1" else f" {measure.unit}"
     interval = ""
-    if one.low is not None and one.high is not None:
-        interval = f" ({one.low:.4g} to {one.high:.4g})"
-    return f"{one.value:.4g}{interval}{unit}"
+    if measure.low is not None and measure.high is not None:
+        interval = f" ({measure.low:.4g} to {measure.high:.4g})"
+    return f"{measure.value:.4g}{interval}{unit}"

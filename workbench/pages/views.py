@@ -14,14 +14,14 @@ def views(system: System) -> tuple[View, ...]:
         return system.panels
     judged = system.objective.judged
     outputs: dict[str, list[str]] = {}
-    for one in system.outputs:
-        if one.name != judged:
-            outputs.setdefault(one.shown, []).append(one.name)
+    for output in system.outputs:
+        if output.name != judged:
+            outputs.setdefault(output.shown, []).append(output.name)
     return (
         *(_view(system, names) for names in outputs.values()),
         *(_view(system, [one.name], 0.55) for one in system.inputs),
         _view(system, [judged], _JUDGED_HEIGHT),
-        *(_view(system, [one.name], 0.8) for one in system.estimated),
+        *(_view(system, [quantity.name], 0.8) for quantity in system.estimated),
     )
 
 
@@ -52,9 +52,9 @@ def capital(text: str) -> str:
 
 def called(system: System, signal: str) -> str:
     """What a signal is, for people."""
-    labels = {name: one.label for name, one in system.signals.items()}
-    labels |= {one.name: one.label for one in system.derived}
-    labels |= {one.name: one.label for one in system.estimated}
+    labels = {name: signal.label for name, signal in system.signals.items()}
+    labels |= {signal.name: signal.label for signal in system.derived}
+    labels |= {quantity.name: quantity.label for quantity in system.estimated}
     return labels.get(signal, signal)
 
 

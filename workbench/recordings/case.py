@@ -42,56 +42,64 @@ def read_conditions(table: Table, system: System) -> dict[str, Value]:
         If one is missing, none of the system, or none of its choices; or the sign of the signals
         is unknown.
     """
-    table.refuse_unknown(one.name for one in system.conditions)
-    signs = [f"'{one.name}' holds the sign" for one in system.conditions if one.sign]
+    table.refuse_unknown(condition.name for condition in system.conditions)
+    signs = [
+        f"'{condition.name}' holds the sign" for condition in system.conditions if condition.sign
+    ]
     remedy = "; ".join(["give the magnitude", *signs])
-    said = [one for one in system.conditions if one.name in table or not one.sets]
+    said = [
+        condition
+        for condition in system.conditions
+        if condition.name in table or not condition.sets
+    ]
     return {one.name: _condition(table, one, remedy) for one in said}
 
 
-def _condition(table: Table, one: Condition, remedy: str) -> Value:
+def _condition(table: Table, condition: Condition, remedy: str) -> Value:
     """One condition; `remedy` for a quantity that is too small."""
-    if table.content.get(one.name) == UNKNOWN and not one.sign:
+    if table.content.get(condition.name) == UNKNOWN and not condition.sign:
         return UNKNOWN
-    if one.count:
-        items = table.take(one.name, list)
-        if len(items) != one.count:
+    if condition.count:
+        items = table.take(condition.name, list)
+        if len(items) != condition.count:
             raise InputError(
-                where=f"{table.where} {one.name}",
+                where=f"{table.where} {condition.name}",
                 found=f"{len(items)} entries",
-                expected=str(one.count),
-                remedy=f"write one of {_either(one)} for each",
+                expected=str(condition.count),
+                remedy=f"write one of {_either(condition)} for each",
             )
         return tuple(
-            _choice(one, item, f"{table.where} {one.name}[{i}]") for i, item in enumerate(items)
+            _choice(condition, item, f"{table.where} {condition.name}[{i}]")
+            for i, item in enumerate(items)
         )
-    if one.choices:
-        value: object = table.take(one.name, type(one.choices[0]))
-        return _choice(one, value, f"{table.where} {one.name}")
-    where = f"{table.where} {one.name}"
-    text = table.take(one.name, str)
-    number = quantity(text, one.unit, where)
-    if number < one.least or (one.exclusive and number == one.least):
+    if condition.choices:
+        value: object = table.take(condition.name, type(condition.choices[0]))
+        return _choice(condition, value, f"{table.where} {condition.name}")
+    where = f"{table.where} {condition.name}"
+    text = table.take(condition.name, str)
+    number = quantity(text, condition.unit, where)
+    if number < condition.least or (condition.exclusive and number == condition.least):
         raise InputError(
             where=where,
             found=repr(text),
-            expected=f"{'above' if one.exclusive else 'no less than'} {one.least:g} {one.unit}",
+            expected=f"{'above' if condition.exclusive else 'no less than'} {condition.least:g} "
+            f"{condition.unit}",
             remedy=remedy,
         )
     return number
 
 
-def _choice(one: Condition, value: object, where: str) -> str | int:
-    for choice in one.choices:
+def _choice(condition: Condition, value: object, where: str) -> str | int:
+    for choice in condition.choices:
         if type(value) is type(choice) and value == choice:
             return choice
     raise InputError(
-        where=where, found=shown(value), expected=_either(one), remedy="write one of them"
+        where=where, found=shown(value), expected=_either(condition), remedy="write one of them"
     )
 
 
-def _either(one: Condition) -> str:
-    return " or ".join(map(repr, one.choices))
+def _either(condition: Condition) -> str:
+    return " or ".join(map(repr, condition.choices))
 
 
 def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str, Any]:
@@ -105,15 +113,15 @@ def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str,
     signals : (n,) each, SI.
     """
     found: dict[str, Any] = {}
-    for one in system.conditions:
-        value = shown_by(one, signals, system)
+    for condition in system.conditions:
+        value = shown_by(condition, signals, system)
         if value is None or not np.isfinite(value):
             continue
-        if not one.choices:
-            if value > one.least or (value == one.least and not one.exclusive):
-                found[one.name] = f"{value:.6g} {one.unit}"
-        elif value in one.choices:
-            found[one.name] = next(choice for choice in one.choices if choice == value)
+        if not condition.choices:
+            if value > condition.least or (value == condition.least and not condition.exclusive):
+                found[condition.name] = f"{value:.6g} {condition.unit}"
+        elif value in condition.choices:
+            found[condition.name] = next(choice for choice in condition.choices if choice == value)
     return found
 
 
@@ -279,8 +287,8 @@ def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
         time=read_only(measured.time),
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(one.name for one in system.outputs),
-        aids=tuple(one.name for one in system.aids),
+        outputs=tuple(output.name for output in system.outputs),
+        aids=tuple(aid.name for aid in system.aids),
         source=path,
         doubts=doubts(measured.time, signals, conditions, system, origin),
     )
@@ -322,8 +330,8 @@ def read_case(folder: Path, system: System) -> Case:
         time=time,
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(one.name for one in system.outputs),
-        aids=tuple(one.name for one in system.aids),
+        outputs=tuple(output.name for output in system.outputs),
+        aids=tuple(aid.name for aid in system.aids),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         date=document.date("date"),
@@ -441,7 +449,7 @@ def _found_folders(path: Path) -> list[Path]:
         )
     if (path / "case.toml").exists():
         return [path]
-    below = sorted((one for one in path.iterdir() if one.is_dir()), key=lambda one: one.name)
+    below = sorted((one for one in path.iterdir() if one.is_dir()), key=lambda path: path.name)
     folders = [one for one in below if re.match(r"\d+_", one.name) or (one / "case.toml").exists()]
     if not folders:
         raise InputError(
@@ -479,11 +487,11 @@ def _read_signals(
     source: Path, columns: dict[str, str], system: System
 ) -> tuple[Vector, dict[str, Vector]]:
     """Time and signals in SI units; what only judges or aids may be missing under its own name."""
-    spare = [one.name for one in (*system.judged, *system.aids)]
+    spare = [signal.name for signal in (*system.judged, *system.aids)]
     optional = [name for name in spare if columns[name] == name]
     required = [column for signal, column in columns.items() if signal not in optional]
-    recorded = read_columns(source, required, optional, [columns[one.name] for one in system.aids])
-    units = {"time": "s", **{name: one.unit for name, one in system.signals.items()}}
+    recorded = read_columns(source, required, optional, [columns[aid.name] for aid in system.aids])
+    units = {"time": "s", **{name: signal.unit for name, signal in system.signals.items()}}
     signals = {}
     for signal, column in columns.items():
         if column in recorded:

@@ -175,8 +175,10 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
     with claimed(out):
         before = _written(out)
         written: dict[str, str] = {}
-        for one in recordings:
-            written |= {f"{one.name}/{file}": text for file, text in _texts(one).items()}
+        for recording in recordings:
+            written |= {
+                f"{recording.name}/{file}": text for file, text in _texts(recording).items()
+            }
         _remove(out, {path: sha256 for path, sha256 in before.items() if path not in written})
         for path, text in written.items():
             write_whole(out / path, text)
@@ -190,9 +192,9 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
                 "workbench": commit(),
                 "layout": layout.name,
                 "read": layout.found(source),
-                "held_out": [one.name for one in recordings if one.held_out],
+                "held_out": [recording.name for recording in recordings if recording.held_out],
                 "written": {path: _sha256(text.encode()) for path, text in written.items()},
-                "cases": {one.name: _described(one) for one in recordings},
+                "cases": {recording.name: _described(recording) for recording in recordings},
             },
         )
     return recordings
@@ -226,17 +228,17 @@ def read_recorded(folder: Path, system: System) -> Case:
     return replace(case, source=folder.parent / one.file)
 
 
-def _described(one: PublishedRecording) -> dict[str, Any]:
-    time = next(iter(one.columns.values()))
+def _described(recording: PublishedRecording) -> dict[str, Any]:
+    time = next(iter(recording.columns.values()))
     return {
-        "file": one.file,
-        "rows": list(one.rows),
+        "file": recording.file,
+        "rows": list(recording.rows),
         "samples": time.size,
         "seconds": float(time[-1] - time[0]),
-        "columns": list(one.columns),
-        "conditions": dict(one.conditions),
-        "machine": one.machine,
-        "changed": list(one.changed),
+        "columns": list(recording.columns),
+        "conditions": dict(recording.conditions),
+        "machine": recording.machine,
+        "changed": list(recording.changed),
     }
 
 
@@ -307,16 +309,16 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
                 path.parent.rmdir()
 
 
-def _texts(one: PublishedRecording) -> dict[str, str]:
+def _texts(recording: PublishedRecording) -> dict[str, str]:
     """Files of a case folder, by name."""
     measurement = {"file": "measured.csv"}
-    if one.counts_from is not None:
-        measurement["counts_from"] = f"{one.counts_from!r} s"
-    dated = {"date": one.date} if one.date else {}
-    case = {"title": one.title, **dated, "measurement": measurement}
-    conditions = {"conditions": dict(one.conditions)} if one.conditions else {}
-    rows = zip(*(column.tolist() for column in one.columns.values()), strict=True)
-    lines = [",".join(one.columns), *(",".join(map(cell, row)) for row in rows)]
+    if recording.counts_from is not None:
+        measurement["counts_from"] = f"{recording.counts_from!r} s"
+    dated = {"date": recording.date} if recording.date else {}
+    case = {"title": recording.title, **dated, "measurement": measurement}
+    conditions = {"conditions": dict(recording.conditions)} if recording.conditions else {}
+    rows = zip(*(column.tolist() for column in recording.columns.values()), strict=True)
+    lines = [",".join(recording.columns), *(",".join(map(cell, row)) for row in rows)]
     return {
         _CASE: tomli_w.dumps(case | conditions),
         "measured.csv": "\n".join(lines) + "\n",

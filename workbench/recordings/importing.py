@@ -60,9 +60,9 @@ def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut
     bounds = [0, *gaps.tolist(), time.size]
     pieces = list(pairwise(bounds))
     parts = _parts(time, signals, system.cutting, pieces, system) if system.cutting else []
-    if sum(not one.reason for one in parts) < 2:
+    if sum(not part.reason for part in parts) < 2:
         parts = [Cut(first, end) for first, end in pieces]
-    judged = [_long_enough(one, time, system) for one in parts]
+    judged = [_long_enough(part, time, system) for part in parts]
     return list(_with_rest(judged, time.size))
 
 
@@ -116,21 +116,21 @@ def _runs(
         k = end
 
 
-def _long_enough(one: Cut, time: Vector, system: System) -> Cut:
-    lasts = time[one.end - 1] - time[one.first]
-    if one.reason or (one.end - one.first >= system.fewest and lasts >= system.shortest):
-        return one
-    return Cut(one.first, one.end, "it is shorter than a recording must be")
+def _long_enough(cut: Cut, time: Vector, system: System) -> Cut:
+    lasts = time[cut.end - 1] - time[cut.first]
+    if cut.reason or (cut.end - cut.first >= system.fewest and lasts >= system.shortest):
+        return cut
+    return Cut(cut.first, cut.end, "it is shorter than a recording must be")
 
 
 def _with_rest(parts: list[Cut], size: int) -> Iterator[Cut]:
     """The parts and what is between them."""
     last = 0
-    for one in parts:
-        if one.first > last:
-            yield Cut(last, one.first, "between recordings")
-        yield one
-        last = one.end
+    for part in parts:
+        if part.first > last:
+            yield Cut(last, part.first, "between recordings")
+        yield part
+        last = part.end
     if last < size:
         yield Cut(last, size, "between recordings")
 
@@ -221,11 +221,11 @@ def import_recording(
     measured = merge(recording.files, recording.proposal, system)
     check_recording(measured.time, system, f"{where}, time", None)
     parts = [Cut(0, measured.time.size)] if whole else cut(measured.time, measured.signals, system)
-    kept = [one for one in parts if not one.reason]
+    kept = [part for part in parts if not part.reason]
     if not kept:
         raise InputError(
             where=where,
-            found=f"no recording: {'; '.join(dict.fromkeys(one.reason for one in parts))}",
+            found=f"no recording: {'; '.join(dict.fromkeys(part.reason for part in parts))}",
             expected=f"at least {system.fewest} samples over {system.shortest:g} s",
             remedy="import it as one recording, --whole",
         )
@@ -257,14 +257,14 @@ def case_name(path: Path, part: str = "") -> str:
 
 def _piece(
     name: str,
-    one: Cut,
+    cut: Cut,
     measured: Measured,
     system: System,
     given: Mapping[str, Any],
     where: str,
 ) -> Piece:
-    part = slice(one.first, one.end)
-    time = measured.time[part] - measured.time[one.first]
+    part = slice(cut.first, cut.end)
+    time = measured.time[part] - measured.time[cut.first]
     signals = {signal: values[part] for signal, values in measured.signals.items()}
     shown = conditions_shown(signals, system)
     unknown = {
@@ -282,7 +282,7 @@ def _piece(
     origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
     found = doubts(time, signals, read, system, origin)
     ordered = {key: conditions[key] for key in read}
-    return Piece(name, (one.first, one.end), time, signals, ordered, sources, found)
+    return Piece(name, (cut.first, cut.end), time, signals, ordered, sources, found)
 
 
 def store(out: Path, named: Mapping[str, NamedChannel]) -> None:

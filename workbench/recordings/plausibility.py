@@ -134,7 +134,7 @@ def _shown(signal: Signal, value: float) -> str:
 
 def _still(signals: Mapping[str, Vector], system: System, origin: Origin) -> Iterator[_Finding]:
     """Signals that never change although their noise alone would move them."""
-    outputs = [one.name for one in system.outputs]
+    outputs = [output.name for output in system.outputs]
     for name, values in signals.items():
         signal = system.signals[name]
         values = values[np.isfinite(values)]  # an aid is missing elsewhere
@@ -179,14 +179,14 @@ def _redundancies(
 ) -> Iterator[_Finding]:
     """Signals that contradict each other while they ought to agree."""
     told: set[str] = set()  # of several that tell the same of one, the first
-    for one in system.redundancies:
-        names = _named(one)
-        if one.formula.text in told or not _has(names, signals, system):
+    for redundancy in system.redundancies:
+        names = _named(redundancy)
+        if redundancy.formula.text in told or not _has(names, signals, system):
             continue
-        left, right = _sides(one, time, signals, system)
+        left, right = _sides(redundancy, time, signals, system)
         large = np.maximum(np.abs(left), np.abs(right))
-        compared = large > one.tolerance.slack
-        for limit, side in ((one.while_below, -1.0), (one.while_above, 1.0)):
+        compared = large > redundancy.tolerance.slack
+        for limit, side in ((redundancy.while_below, -1.0), (redundancy.while_above, 1.0)):
             if limit is not None:
                 size = np.abs(system.signal(limit.signal, signals))
                 compared &= side * size > side * limit.level
@@ -195,48 +195,58 @@ def _redundancies(
             continue
         shares = np.abs(left - right)[chosen] / large[chosen]
         share = float(np.median(shares))  # whatever single samples read
-        if not share > one.tolerance.likely:
+        if not share > redundancy.tolerance.likely:
             continue
-        told.add(one.formula.text)
-        first = int(chosen[shares > one.tolerance.likely][0])
-        columns = [name for name in signals if name in _compared(one)]
-        told_by = [name for name in columns if one.store is None or name in one.formula.names]
+        told.add(redundancy.formula.text)
+        first = int(chosen[shares > redundancy.tolerance.likely][0])
+        columns = [name for name in signals if name in _compared(redundancy)]
+        told_by = [
+            name for name in columns if redundancy.store is None or name in redundancy.formula.names
+        ]
         where = f"at {time[first]:.9g} s"
-        other = one.other.text
-        if one.store is not None:
-            other = f"{other}, with what {one.store.formula.text} gains,"
-            where = f"in the mean of {one.store.over:g} s from {time[first]:.9g} s on"
+        other = redundancy.other.text
+        if redundancy.store is not None:
+            other = f"{other}, with what {redundancy.store.formula.text} gains,"
+            where = f"in the mean of {redundancy.store.over:g} s from {time[first]:.9g} s on"
         yield _Finding(
-            share > one.tolerance.possible,
+            share > redundancy.tolerance.possible,
             origin.at(first, told_by[-1] if told_by else "time"),
-            f"{one.formula.text} = {left[first]:.6g} {one.unit} beside {other} = "
-            f"{right[first]:.6g} {one.unit} {where}, and by {share:.0%} apart in "
+            f"{redundancy.formula.text} = {left[first]:.6g} {redundancy.unit} beside {other} = "
+            f"{right[first]:.6g} {redundancy.unit} {where}, and by {share:.0%} apart in "
             f"half of {chosen.size} samples",
-            f"the same within {one.tolerance.likely:.0%}: {one.reason}",
+            f"the same within {redundancy.tolerance.likely:.0%}: {redundancy.reason}",
             f"check units, signs and columns of {', '.join(columns)}",
         )
 
 
-def _compared(one: Redundancy) -> Set[str]:
+def _compared(redundancy: Redundancy) -> Set[str]:
     """Names in the formulas that are compared."""
-    stored: Set[str] = one.store.formula.names if one.store is not None else frozenset()
-    return one.formula.names | one.other.names | stored
+    stored: Set[str] = (
+        redundancy.store.formula.names if redundancy.store is not None else frozenset()
+    )
+    return redundancy.formula.names | redundancy.other.names | stored
 
 
-def _named(one: Redundancy) -> Set[str]:
+def _named(redundancy: Redundancy) -> Set[str]:
     """All names that a redundancy needs."""
-    limits = [limit.signal for limit in (one.while_below, one.while_above) if limit is not None]
-    return _compared(one) | set(limits)
+    limits = [
+        limit.signal
+        for limit in (redundancy.while_below, redundancy.while_above)
+        if limit is not None
+    ]
+    return _compared(redundancy) | set(limits)
 
 
 def _sides(
-    one: Redundancy, time: Vector, signals: Mapping[str, Vector], system: System
+    redundancy: Redundancy, time: Vector, signals: Mapping[str, Vector], system: System
 ) -> tuple[Vector, Vector]:
     """Both sides of a redundancy from each sample on, (n,) each; NaN beyond the end."""
-    left, right = (system.evaluate(formula, signals) for formula in (one.formula, one.other))
-    if one.store is None:
+    left, right = (
+        system.evaluate(formula, signals) for formula in (redundancy.formula, redundancy.other)
+    )
+    if redundancy.store is None:
         return left, right
-    over = one.store.over
+    over = redundancy.store.over
     end = time + over
 
     def gained(values: Vector) -> Vector:
@@ -247,13 +257,13 @@ def _sides(
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
         return gained(np.append(0.0, np.cumsum(steps)))
 
-    return mean(left), mean(right) + gained(system.evaluate(one.store.formula, signals))
+    return mean(left), mean(right) + gained(system.evaluate(redundancy.store.formula, signals))
 
 
 def _has(names: Set[str], signals: Mapping[str, Vector], system: System) -> bool:
     """Whether a recording has all of some signals; what only judges may be missing."""
-    for one in reversed(system.derived):  # each is made of those before it
-        names |= one.formula.names if one.name in names else set()
+    for signal in reversed(system.derived):  # each is made of those before it
+        names |= signal.formula.names if signal.name in names else set()
     return not names & (system.signals.keys() - signals.keys())
 
 
@@ -261,41 +271,49 @@ def _conditions(
     signals: Mapping[str, Vector], conditions: Mapping[str, Any], system: System, origin: Origin
 ) -> Iterator[_Finding]:
     """Conditions that the record contradicts."""
-    for one in system.conditions:
-        shown = shown_by(one, signals, system)
-        if one.agrees is None or shown is None or isinstance(conditions.get(one.name, ""), str):
+    for condition in system.conditions:
+        shown = shown_by(condition, signals, system)
+        if (
+            condition.agrees is None
+            or shown is None
+            or isinstance(conditions.get(condition.name, ""), str)
+        ):
             continue  # nobody says it, or knows it any more
-        at_start = one.agrees.place == FIRST
-        values = system.evaluate(one.agrees.formula, signals)
+        at_start = condition.agrees.place == FIRST
+        values = system.evaluate(condition.agrees.formula, signals)
         sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
-        said = float(conditions[one.name])
-        share = _apart(shown, said, one.agrees.tolerance)
-        if not share > one.agrees.tolerance.likely:
+        said = float(conditions[condition.name])
+        share = _apart(shown, said, condition.agrees.tolerance)
+        if not share > condition.agrees.tolerance.likely:
             continue
-        names = [name for name in signals if name in one.agrees.formula.names]
+        names = [name for name in signals if name in condition.agrees.formula.names]
         where = origin.at(sample, names[0]) if names else origin.name
         yield _Finding(
-            share > one.agrees.tolerance.possible,
-            f"{origin.conditions} {one.name}",
-            f"{_worded(one, said)} where the record has {one.agrees.formula.text} = "
-            f"{_worded(one, shown)} ({where}{', at the start' if at_start else ', its largest'})",
-            f"the same within {one.agrees.tolerance.likely:.0%}",
+            share > condition.agrees.tolerance.possible,
+            f"{origin.conditions} {condition.name}",
+            f"{_worded(condition, said)} where the record has "
+            f"{condition.agrees.formula.text} = "
+            f"{_worded(condition, shown)} "
+            f"({where}{', at the start' if at_start else ', its largest'})",
+            f"the same within {condition.agrees.tolerance.likely:.0%}",
             "correct the condition, or the unit or the sign of the column",
         )
 
 
-def shown_by(one: Condition, signals: Mapping[str, Vector], system: System) -> float | None:
+def shown_by(condition: Condition, signals: Mapping[str, Vector], system: System) -> float | None:
     """What a recording shows of a condition [its unit]; None if it shows nothing.
 
     At the start this is the median of some samples; the largest value is one that is reached more
     than once.
     """
-    if one.agrees is None or not _has(one.agrees.formula.names, signals, system):
+    if condition.agrees is None or not _has(condition.agrees.formula.names, signals, system):
         return None
     with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
-        values = system.evaluate(one.agrees.formula, signals)
+        values = system.evaluate(condition.agrees.formula, signals)
     few = min(_FEW, values.size)
-    return float(np.median(values[:few]) if one.agrees.place == FIRST else np.sort(values)[-few])
+    return float(
+        np.median(values[:few]) if condition.agrees.place == FIRST else np.sort(values)[-few]
+    )
 
 
 def _apart(one: float, other: float, tolerance: Tolerance) -> float:
@@ -304,5 +322,5 @@ def _apart(one: float, other: float, tolerance: Tolerance) -> float:
     return difference / max(abs(one), abs(other)) if difference > tolerance.slack else 0.0
 
 
-def _worded(one: Condition, value: float) -> str:
-    return f"{value:.6g} {one.unit}".rstrip()
+def _worded(condition: Condition, value: float) -> str:
+    return f"{value:.6g} {condition.unit}".rstrip()

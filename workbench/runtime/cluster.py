@@ -267,7 +267,7 @@ class DaskPool(Generic[State]):
         # Not of `scheduler_info`: what it asks for, the client's own look without workers replaces.
         asked = partial(self._client.scheduler.identity, n_workers=-1)
         workers = self._client.sync(asked, callback_timeout=_ANSWER)["workers"]
-        return {address: str(one["id"]) for address, one in workers.items()}
+        return {address: str(worker["id"]) for address, worker in workers.items()}
 
     def _admit(self, present: Mapping[str, str]) -> None:
         """Have workers that are new prove themselves, and forget those that are gone."""

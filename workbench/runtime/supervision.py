@@ -271,7 +271,7 @@ def _confine_files(libc: ctypes.CDLL, folders: Sequence[Path]) -> bool:
     if ruleset < 0:
         return False
     of_files = rights & (1 << 1 | _TRUNCATE)
-    for path, allowed in [*((one, rights) for one in folders), (Path(os.devnull), of_files)]:
+    for path, allowed in [*((folder, rights) for folder in folders), (Path(os.devnull), of_files)]:
         beneath = os.open(path, os.O_PATH)
         rule = struct.pack("=Qi", allowed, beneath)
         failed = libc.syscall(_ADD_RULE, ruleset, _BENEATH, rule, 0)

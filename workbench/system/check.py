@@ -83,20 +83,24 @@ _Reference = tuple[str, str, Collection[str], str]
 def _formulas(system: System) -> Iterator[_Reference]:
     measured = {*system.signals, *system.values}
     expected = "a measured or derived signal, or a parameter of the model"
-    for one in system.derived:  # made of those before it
-        for name in sorted(one.formula.names):
-            yield one.formula.where, name, frozenset(measured), expected
-        measured.add(one.name)
+    for signal in system.derived:  # made of those before it
+        for name in sorted(signal.formula.names):
+            yield signal.formula.where, name, frozenset(measured), expected
+        measured.add(signal.name)
     compared = system.comparison
     for formula in (
-        *(side for one in system.redundancies for side in (one.formula, one.other)),
-        *(one.store.formula for one in system.redundancies if one.store),
-        *(one.agrees.formula for one in system.conditions if one.agrees),
-        *(one.recorded_as.formula for one in system.signals.values() if one.recorded_as),
+        *(
+            side
+            for redundancy in system.redundancies
+            for side in (redundancy.formula, redundancy.other)
+        ),
+        *(redundancy.store.formula for redundancy in system.redundancies if redundancy.store),
+        *(condition.agrees.formula for condition in system.conditions if condition.agrees),
+        *(signal.recorded_as.formula for signal in system.signals.values() if signal.recorded_as),
         *(one.formula for one in system.work),
-        *(one.formula for one in compared.channels),
-        *(one.formula for one in compared.exclusions),
-        *(one.formula for one in compared.influences),
+        *(channel.formula for channel in compared.channels),
+        *(exclusion.formula for exclusion in compared.exclusions),
+        *(influence.formula for influence in compared.influences),
     ):
         for name in sorted(formula.names):
             yield formula.where, name, measured, expected
@@ -128,13 +132,20 @@ def _parameters(system: System) -> Iterator[_Reference]:
         ("diagnosis.tolerances", system.comparison.tolerances),
         ("diagnosis.wander", system.comparison.wander),
         ("diagnosis.levels", system.comparison.levels),
-        *(("diagnosis.excluded", one.uncertain) for one in system.comparison.exclusions),
         *(
-            (f"conditions.{one.name}.parameters", parameters)
-            for one in system.conditions
-            for parameters in one.parameters.values()
+            ("diagnosis.excluded", exclusion.uncertain)
+            for exclusion in system.comparison.exclusions
         ),
-        *((f"conditions.{one.name}.sets", [one.sets]) for one in system.conditions if one.sets),
+        *(
+            (f"conditions.{condition.name}.parameters", parameters)
+            for condition in system.conditions
+            for parameters in condition.parameters.values()
+        ),
+        *(
+            (f"conditions.{condition.name}.sets", [condition.sets])
+            for condition in system.conditions
+            if condition.sets
+        ),
     ]
     for table, entries in tables:
         for name in entries:
@@ -146,13 +157,13 @@ def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference
     """States and outputs of the model."""
     state, output = "a continuous state of the model", "a variable of the model"
     states, compared = system.states or (), system.comparison
-    shown = (*states, *(one.name for one in system.outputs))
+    shown = (*states, *(output.name for output in system.outputs))
     for name in (*system.walks, *system.spreads):
         yield f"{system.source}, [states.{name}]", name, states, state
-    for one in system.estimated:
-        if one.acts_on:
-            where = f"{system.source}, [estimated] {one.name} acts_on"
-            yield where, one.acts_on, shown, f"{state}, or a measured output"
+    for quantity in system.estimated:
+        if quantity.acts_on:
+            where = f"{system.source}, [estimated] {quantity.name} acts_on"
+            yield where, quantity.acts_on, shown, f"{state}, or a measured output"
     for signal in system.signals.values():
         if signal.reading != signal.name:
             yield f"{system.source}, {signal.name} reading", signal.reading, variables, output
@@ -177,18 +188,18 @@ def _of_model(system: System, variables: Collection[str]) -> Iterator[_Reference
         yield f"{system.source}, [diagnosis] rest output", rest.output, variables, output
     for name in compared.leading.together if compared.leading else ():
         yield f"{system.source}, [diagnosis] leads together", name, states, state
-    measured = [one.name for one in system.outputs if one.name in states]
-    for name in (name for one in compared.exclusions for name in one.restarted):
+    measured = [output.name for output in system.outputs if output.name in states]
+    for name in (name for exclusion in compared.exclusions for name in exclusion.restarted):
         where = f"{system.source}, [[diagnosis.excluded]] restarted"
         yield where, name, measured, "a measured output that is a continuous state of the model"
 
 
 def _of_system(system: System) -> Iterator[_Reference]:
     """Conditions, quantities and outputs of the system itself."""
-    conditions = [one.name for one in system.conditions]
-    for one in system.estimated:
-        for name in one.claimed:
-            where = f"{system.source}, [estimated] {one.name} claimed"
+    conditions = [condition.name for condition in system.conditions]
+    for quantity in system.estimated:
+        for name in quantity.claimed:
+            where = f"{system.source}, [estimated] {quantity.name} claimed"
             yield where, name, conditions, "a condition of this system"
     for parameter, level in system.comparison.levels.items():
         if level.by:
@@ -196,13 +207,16 @@ def _of_system(system: System) -> Iterator[_Reference]:
             yield where, level.by, conditions, "a condition of this system"
     if fading := system.fading:
         where = f"{system.source}, [feedback] fades signal"
-        known = [*(one.name for one in system.outputs), *(one.name for one in system.derived)]
+        known = [
+            *(output.name for output in system.outputs),
+            *(signal.name for signal in system.derived),
+        ]
         yield where, fading.signal, known, "a measured output, or a derived signal"
     if following := system.following:
         where = f"{system.source}, [tuning] follows quantity"
-        known = [one.name for one in system.estimated]
+        known = [quantity.name for quantity in system.estimated]
         yield where, following.quantity, known, "an estimated quantity of this system"
     if leading := system.comparison.leading:
         where = f"{system.source}, [diagnosis] leads output"
-        known = [one.name for one in system.outputs]
+        known = [output.name for output in system.outputs]
         yield where, leading.output, known, "a measured output of this system"

@@ -342,9 +342,9 @@ def read_point(points: Table, name: str, system: System) -> OperatingPoint:
     table.refuse_unknown("inputs held quantities")
     inputs, held, quantities = (table.table(key) for key in ("inputs", "held", "quantities"))
     inputs.refuse_unknown(one.name for one in system.inputs)
-    quantities.refuse_unknown(one.name for one in system.estimated)
+    quantities.refuse_unknown(quantity.name for quantity in system.estimated)
     units = {one.name: one.unit for one in system.inputs}
-    units |= {one.name: one.unit for one in system.estimated}
+    units |= {quantity.name: quantity.unit for quantity in system.estimated}
     return OperatingPoint(
         {key: inputs.number(key, units[key]) for key in inputs.content},
         {key: Expression(held.take(key, str), f"{held.where} {key}") for key in held.content},
@@ -375,7 +375,7 @@ def read_objective(table: Table, system: System) -> Objective:
     table.refuse_unknown("judged weights bandwidth begins ends when")
     first = (*system.judged, *system.outputs)[0].name
     judged = table.text("judged", first)
-    compared = {one.name: one for one in (*system.outputs, *system.judged)}
+    compared = {signal.name: signal for signal in (*system.outputs, *system.judged)}
     weights = table.table("weights")
     weights.refuse_unknown(compared)
     if judged not in compared:
@@ -475,7 +475,7 @@ def _rate(table: Table) -> float:
 
 def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
     """Channels as declared; else what is measured, one by one."""
-    measured = {one.name: one for one in (*system.outputs, *system.judged)}
+    measured = {signal.name: signal for signal in (*system.outputs, *system.judged)}
     if not table.content:
         usual = {n: {"is": n, "unit": one.unit, "shown": one.shown} for n, one in measured.items()}
         table = Table(usual, table.where)
@@ -572,7 +572,7 @@ def read_stopping(table: Table, system: System) -> Stopping:
     table.refuse_unknown(
         "speed state rest longest timed_by asked inputs start differs outside nominal rating"
     )
-    measured = {*system.signals, *(one.name for one in system.derived), *system.values}
+    measured = {*system.signals, *(signal.name for signal in system.derived), *system.values}
     asked = _asked(table.table("asked"), measured)
     units = {one.name: one.unit for one in asked}
     names = set(units)
@@ -590,7 +590,7 @@ def read_stopping(table: Table, system: System) -> Stopping:
     _refuse(state, states, f"{table.where} state", "a continuous state of the model")
     for name in start.content:
         _refuse(name, states, f"{start.where} {name}", "a continuous state of the model")
-    outputs = {one.name for one in system.outputs}
+    outputs = {output.name for output in system.outputs}
     outside = tuple(read_exclusion(one, system) for one in table.tables("outside"))
     for one in outside:
         _known(one.formula, {*outputs, *system.values}, "a measured output, or a parameter")
@@ -682,7 +682,7 @@ def _nominal(table: Table, asked: Collection[str], measured: Collection[str]) ->
         reference=table.number("reference", "kg"),
         resistance=_formula(table, "resistance", measured, "a measured signal"),
         within=table.number("within", "1"),
-        speeds=tuple(quantity(one, "m/s", f"{table.where} speeds") for one in speeds),
+        speeds=tuple(quantity(speed, "m/s", f"{table.where} speeds") for speed in speeds),
     )
 
 
@@ -764,7 +764,7 @@ def _cost(table: Table) -> Cost:
 
 def _settings(table: Table, system: System) -> dict[str, tuple[Setting, ...]]:
     """Values of conditions that may be set."""
-    table.refuse_unknown(one.name for one in system.conditions)
+    table.refuse_unknown(condition.name for condition in system.conditions)
     found = {}
     for name in table.content:
         values: list[Any] = table.take(name, list)
@@ -779,7 +779,7 @@ def _besides(table: Table, system: System) -> tuple[dict[str, tuple[Setting, ...
     """Values of what is set and is no condition of a recording, and what it is called."""
     found: dict[str, tuple[Setting, ...]] = {}
     labels: dict[str, str] = {}
-    taken = {*system.signals, *system.values, *(one.name for one in system.conditions)}
+    taken = {*system.signals, *system.values, *(condition.name for condition in system.conditions)}
     for name in table.content:
         if name in taken:
             raise table.wrong(name, "a name that no signal, parameter or condition has")
@@ -789,7 +789,7 @@ def _besides(table: Table, system: System) -> tuple[dict[str, tuple[Setting, ...
         if not texts:
             raise own.wrong("values", "one value or more")
         check_unit(unit, f"{own.where} unit")
-        found[name] = tuple(Setting(quantity(one, unit, own.where), one) for one in texts)
+        found[name] = tuple(Setting(quantity(text, unit, own.where), text) for text in texts)
         labels[name] = own.text("label", name)
     return found, labels
 
@@ -802,7 +802,8 @@ def _setting(table: Table, condition: Condition, value: Any) -> Setting:
         return Setting(quantity(value, condition.unit, where), value)
     entries = value if condition.count and isinstance(value, list) else [value]
     if len(entries) != max(1, condition.count) or not all(
-        one in condition.choices and type(one) is type(condition.choices[0]) for one in entries
+        entry in condition.choices and type(entry) is type(condition.choices[0])
+        for entry in entries
     ):
         count = f"{condition.count} of " if condition.count else ""
         raise InputError(

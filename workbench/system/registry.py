@@ -55,7 +55,7 @@ def built_models() -> dict[Path, list[str]]:
     found = {}
     for path, content in _contents().items():
         models = content["models"].values()
-        built = [one["class"] for one in models if _is_kept(path.parent / one.get("fmu", ""))]
+        built = [model["class"] for model in models if _is_kept(path.parent / model.get("fmu", ""))]
         if built:
             found[path.with_name("package.mo")] = [f"{path.parent.name}.{one}" for one in built]
     return found

@@ -179,41 +179,46 @@ class System:
     @property
     def signals(self) -> dict[str, Signal]:
         """All measured signals by name."""
-        return {one.name: one for one in (*self.inputs, *self.outputs, *self.judged, *self.aids)}
+        return {
+            signal.name: signal
+            for signal in (*self.inputs, *self.outputs, *self.judged, *self.aids)
+        }
 
     @property
     def corrections(self) -> tuple[str, ...]:
         """Inputs of the model that correct estimated quantities."""
-        return tuple(one.correction for one in self.estimated)
+        return tuple(quantity.correction for quantity in self.estimated)
 
     @property
     def variables(self) -> dict[str, str]:
         """What is asked of a model, with units; one with other names is mapped onto these."""
-        measured = {one.name: one.unit for one in (*self.inputs, *self.outputs, *self.aids)}
-        corrected = {one.correction: one.unit for one in self.estimated}
+        measured = {
+            signal.name: signal.unit for signal in (*self.inputs, *self.outputs, *self.aids)
+        }
+        corrected = {quantity.correction: quantity.unit for quantity in self.estimated}
         return {
             **measured,
             **corrected,
             **self.reported,
-            **{one.name: one.unit for one in self.estimated},
+            **{quantity.name: quantity.unit for quantity in self.estimated},
             **{name: "" for name in sorted(self.constants)},
         }
 
     @property
     def constants(self) -> frozenset[str]:
         """Parameters of the model that formulas of derived signals use, of those that are fed."""
-        known = {*self.signals, *(one.name for one in self.derived)}
-        judged = {one.name for one in self.judged}
-        fed = [one.formula.names for one in self.derived if not one.formula.names & judged]
+        known = {*self.signals, *(signal.name for signal in self.derived)}
+        judged = {signal.name for signal in self.judged}
+        fed = [signal.formula.names for signal in self.derived if not signal.formula.names & judged]
         return frozenset(name for names in fed for name in names if name not in known)
 
     @property
     def columns(self) -> dict[str, str]:
         """Columns of an estimate, with units."""
         return {
-            **{one.name: one.unit for one in self.outputs},
-            **{one.correction: one.unit for one in self.estimated},
-            **{one.name: one.unit for one in self.estimated},
+            **{output.name: output.unit for output in self.outputs},
+            **{quantity.correction: quantity.unit for quantity in self.estimated},
+            **{quantity.name: quantity.unit for quantity in self.estimated},
             **self.reported,
         }
 
@@ -221,29 +226,29 @@ class System:
     def indirect(self) -> dict[str, tuple[Derived, str]]:
         """Derived signals of one column of an estimate, with it: who estimates one knows both."""
         found = {}
-        for one in self.derived:
-            columns = one.formula.names & self.columns.keys()
-            known = one.formula.names - columns <= self.values.keys()
-            if len(columns) == 1 and known and one.name not in self.columns:
-                found[one.name] = one, min(columns)
+        for signal in self.derived:
+            columns = signal.formula.names & self.columns.keys()
+            known = signal.formula.names - columns <= self.values.keys()
+            if len(columns) == 1 and known and signal.name not in self.columns:
+                found[signal.name] = signal, min(columns)
         return found
 
     def unit(self, name: str) -> str:
         """SI unit of a measured, derived or estimated signal."""
-        derived = {one.name: one.unit for one in self.derived}
-        measured = {name: one.unit for name, one in self.signals.items()}
+        derived = {signal.name: signal.unit for signal in self.derived}
+        measured = {name: signal.unit for name, signal in self.signals.items()}
         return {**derived, **self.columns, **measured}[name]
 
     def condition(self, name: str) -> Condition:
         """A condition by name."""
-        return next(one for one in self.conditions if one.name == name)
+        return next(condition for condition in self.conditions if condition.name == name)
 
     def set_by(self, conditions: Mapping[str, object], *, told: bool = False) -> dict[str, float]:
         """Parameters that the conditions of a recording set, SI; if `told`, those told alone."""
         found: dict[str, float] = {}
-        for one in self.conditions:
-            if one.name in conditions and (one.told or not told):
-                found |= one.means(conditions[one.name])
+        for condition in self.conditions:
+            if condition.name in conditions and (condition.told or not told):
+                found |= condition.means(conditions[condition.name])
         return found
 
     def under(self, conditions: Mapping[str, object]) -> "System":
@@ -269,7 +274,7 @@ class System:
         """
         if name in measured:
             return measured[name]
-        derived = next(one for one in self.derived if one.name == name)
+        derived = next(signal for signal in self.derived if signal.name == name)
         return self.evaluate(derived.formula, measured)
 
     def evaluate(
@@ -283,7 +288,7 @@ class System:
         known = {**self.values, **(parameters or {})}
         values: dict[str, Any] = {}
         for name in formula.names:
-            if name in measured or any(one.name == name for one in self.derived):
+            if name in measured or any(signal.name == name for signal in self.derived):
                 values[name] = self.signal(name, measured)
             else:
                 values[name] = known[name]
@@ -293,7 +298,7 @@ class System:
 
     def slopes(self, signal: str) -> tuple[float, ...]:
         """Coefficients of the outputs in a signal that is a sum of them, (l,)."""
-        names = tuple(one.name for one in self.outputs)
+        names = tuple(output.name for output in self.outputs)
         if signal in names:
             return tuple(float(name == signal) for name in names)
         derived = next(one for one in self.derived if one.name == signal)
@@ -311,7 +316,7 @@ class System:
         InputError
             If it is none.
         """
-        known = [*self.signals, *(one.name for one in self.derived), *self.columns]
+        known = [*self.signals, *(signal.name for signal in self.derived), *self.columns]
         if name not in known:
             raise InputError(
                 where=where,

@@ -36,7 +36,7 @@ def convergence(history: Sequence[Generation]) -> Figure:
 def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:
     """z_k of each case of a summary with reasoned and with tuned gains."""
     names = list(cases)
-    before, after = ([one[z] for one in cases.values()] for z in ("z_k_reasoned", "z_k"))
+    before, after = ([case[z] for case in cases.values()] for z in ("z_k_reasoned", "z_k"))
     figure = Figure(figsize=(8, 1.2 + 0.32 * len(names)), layout="constrained")
     axes = figure.subplots()
     rows = np.arange(len(names))

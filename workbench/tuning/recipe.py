@@ -176,7 +176,9 @@ def pose(
     if judge_by is not None:
         cases = with_reference(cases, system, judge_by)
     if scale_errors is None:
-        scale_errors = {one.name: one.scale_error for one in system.outputs if one.scale_error}
+        scale_errors = {
+            output.name: output.scale_error for output in system.outputs if output.scale_error
+        }
     # A recording shows nothing slower than itself, and its samples carry nothing faster.
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)

@@ -73,10 +73,10 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
             f"On cases they have not seen, tuned gains are not better than the reasoned ones in "
             f"{len(missed)} of {len(folds)} folds: {'; '.join(_why(summary, f) for f in missed)}."
         )
-    for one in summary.get("beside", {}).values():
-        if one["z"] is not None and one["z"] < summary["z"]:
+    for entry in summary.get("beside", {}).values():
+        if entry["z"] is not None and entry["z"] < summary["z"]:
             news.append(
-                f"Better without any tuning: {one['label']}, z = {one['z']:.4g}. It makes its "
+                f"Better without any tuning: {entry['label']}, z = {entry['z']:.4g}. It makes its "
                 "gains anew at every sample, where these are the same at every one."
             )
     falls = {name: fall for name, e in summary["sensitivity"].items() if (fall := _fall(e))}
@@ -172,7 +172,7 @@ def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         for how, z, z_k in (("tuned", "z", "z_k"), ("reasoned", "z_reasoned", "z_k_reasoned"))
     ]
     rows[0]["found"] = True
-    rows += [{"name": one["label"], **one} for one in summary["beside"].values()]
+    rows += [{"name": entry["label"], **entry} for entry in summary["beside"].values()]
     return sorted(rows, key=lambda row: np.inf if row["z"] is None else row["z"])
 
 
@@ -260,9 +260,9 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
     if effects := summary["sensitivity"]:
         idle = [name for name, effect in effects.items() if not effect["matters"]]
         lines.append(f"gains that do not matter (z within 1 %): {', '.join(idle) or 'none'}")
-    for name, one in summary["beside"].items():
-        z = "diverges" if one["z"] is None else f"z = {one['z']:.5f}"
-        lines.append(f"{name}, not tuned: {z}, worst {one['worst']}")
+    for name, entry in summary["beside"].items():
+        z = "diverges" if entry["z"] is None else f"z = {entry['z']:.5f}"
+        lines.append(f"{name}, not tuned: {z}, worst {entry['worst']}")
     for fold in summary["folds"]:
         tuned, reasoned, error, untuned = (
             np.inf if fold[name] is None else fold[name]
@@ -293,6 +293,7 @@ def tuned(sentence: str, summary: Mapping[str, Any]) -> Answer:
         worst = None if None in unseen else max(unseen)
         headline["z on cases not seen, worst"] = Measure(worst, "1", "lower")
     details = {
-        f"{name}: z_k": Measure(one["z_k"], "1", "lower") for name, one in summary["cases"].items()
+        f"{name}: z_k": Measure(case["z_k"], "1", "lower")
+        for name, case in summary["cases"].items()
     }
     return Answer(sentence, headline, details)

@@ -193,7 +193,7 @@ class _Objective:
         """Z of candidates, (s,), by their coordinates (n, s); infinite of those that have lost."""
         candidates = coordinates.T
         limits = np.full(len(candidates), np.inf) if self._limits is None else self._limits
-        known = [self._known.get(one.tobytes()) for one in candidates]
+        known = [self._known.get(candidate.tobytes()) for candidate in candidates]
         new = [i for i, one in enumerate(known) if one is None]
         asked = [
             Candidate(self._space.gains(candidates[i]), float(limits[i]), self._order) for i in new
@@ -211,7 +211,7 @@ class _Objective:
     def z_k(self, members: Matrix) -> Matrix:
         """Objective of members (s, n) in each case, (s, k); infinite of those that failed."""
         failed = np.inf, np.full(len(self._job.recordings), np.inf)
-        return np.array([self._known.get(one.tobytes(), failed)[1] for one in members])
+        return np.array([self._known.get(member.tobytes(), failed)[1] for member in members])
 
 
 def _evolve(
@@ -254,16 +254,16 @@ def _generation(
     z_k = population.z_k[0]
     hardest = sorted(cases, key=z_k.__getitem__, reverse=True)
     worst, second = hardest[0], hardest[min(1, len(hardest) - 1)]
-    unstable = [one.unstable for one in evaluations]
+    unstable = [evaluation.unstable for evaluation in evaluations]
     return Generation(
         z=float(population.z[0]),
         worst=names[worst],
         second=names[second],
         margin=float(1.0 - z_k[second] / z_k[worst]) if np.isfinite(z_k[worst]) else 0.0,
         candidates=len(evaluations),
-        samples=sum(one.samples for one in evaluations),
+        samples=sum(evaluation.samples for evaluation in evaluations),
         of=len(evaluations) * sum(job.recordings[k].steps.size for k in cases),
         unstable={names[k]: unstable.count(k) for k in cases if k in unstable},
-        crashed=sum(one.crashed for one in evaluations),
+        crashed=sum(evaluation.crashed for evaluation in evaluations),
         seconds=time.perf_counter() - begin,
     )

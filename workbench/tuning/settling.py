@@ -27,7 +27,7 @@ class Settling:
     def __init__(self, fmu: FMU, system: System, kind: type[Estimator]) -> None:
         self._model = linearised(fmu, system).of(kind.acts_on(fmu, system))
         self._kind, self._asked = kind, system.following
-        self._names = [one.name for one in system.estimated]
+        self._names = [quantity.name for quantity in system.estimated]
 
     def left(self, gains: Gains) -> float:
         """Share of the step that is not found after the time allowed or later, the larger [1].

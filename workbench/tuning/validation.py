@@ -134,7 +134,9 @@ def cross_validate(
     """
     everything = range(len(job.recordings))
     results: list[Fold] = []
-    for number, held_out in enumerate(split([one.case for one in job.recordings], folds)):
+    for number, held_out in enumerate(
+        split([recording.case for recording in job.recordings], folds)
+    ):
         found = tune(number, [k for k in everything if k not in held_out])
         if found is None or found.interrupted:
             break

@@ -37,7 +37,7 @@ def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
 
 def clocks(system: System) -> tuple[Effect, ...]:
     """Clocks of loggers that may be late against that of the other signals."""
-    return tuple(_clock(system, KIND, *one) for one in system.clocks.items())
+    return tuple(_clock(system, KIND, *clock) for clock in system.clocks.items())
 
 
 def reference(system: System) -> str:
@@ -49,7 +49,9 @@ def reference(system: System) -> str:
 def own_clocks(system: System) -> tuple[Effect, ...]:
     """A clock of each signal, against that of the reference, whatever the loggers."""
     first = reference(system)
-    return tuple(_clock(system, OWN, one, (one,)) for one in system.signals if one != first)
+    return tuple(
+        _clock(system, OWN, signal, (signal,)) for signal in system.signals if signal != first
+    )
 
 
 def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:

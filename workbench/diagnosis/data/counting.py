@@ -85,9 +85,10 @@ def count(
     clean = {name: bridge(time, case[name], wrong[name]) for name in names}
     applied = applied_at(clean, system, time)
     own = {
-        one.reason: excluded_by(one, clean, system, time, h, applied) for one in compare.exclusions
+        exclusion.reason: excluded_by(exclusion, clean, system, time, h, applied)
+        for exclusion in compare.exclusions
     }
-    restarted = [own[one.reason] for one in compare.exclusions if one.restarted]
+    restarted = [own[exclusion.reason] for exclusion in compare.exclusions if exclusion.restarted]
     spans = np.logical_or.reduce(restarted) if restarted else np.zeros(time.size, np.bool_)
     for one in compare.exclusions if restarting else ():
         if one.restarted:
@@ -156,25 +157,30 @@ def applied_at(clean: Mapping[str, Vector], system: System, time: Vector) -> int
 
 
 def excluded_by(
-    one: Exclusion, clean: Mapping[str, Vector], system: System, time: Vector, h: float, rest: int
+    exclusion: Exclusion,
+    clean: Mapping[str, Vector],
+    system: System,
+    time: Vector,
+    h: float,
+    rest: int,
 ) -> Mask:
     """Where samples do not count for one reason."""
-    width = max(1, round(one.smoothed / h))
-    values = np.convolve(system.evaluate(one.formula, clean), np.ones(width) / width, "same")
-    if one.from_rest:
+    width = max(1, round(exclusion.smoothed / h))
+    values = np.convolve(system.evaluate(exclusion.formula, clean), np.ones(width) / width, "same")
+    if exclusion.from_rest:
         values = values - np.median(values[:rest])
-    mask: Mask = (np.abs(values) > one.above) | (np.abs(values) < one.below)
-    if one.only_while is not None:
-        signal = np.abs(system.signal(one.only_while.signal, clean))
-        mask &= signal > one.only_while.level
+    mask: Mask = (np.abs(values) > exclusion.above) | (np.abs(values) < exclusion.below)
+    if exclusion.only_while is not None:
+        signal = np.abs(system.signal(exclusion.only_while.signal, clean))
+        mask &= signal > exclusion.only_while.level
     # A mean at an end is one of zeros too.
     mask[: width + 1] = False
-    if one.to_the_end:
+    if exclusion.to_the_end:
         mask = np.cumsum(mask) > 0
     else:
         mask[time.size - width :] = False
-    if one.within:
-        around = np.ones(max(1, round(2.0 * one.within / h)))
+    if exclusion.within:
+        around = np.ones(max(1, round(2.0 * exclusion.within / h)))
         mask = np.convolve(mask, around, "same") > 0.5
     return mask
 

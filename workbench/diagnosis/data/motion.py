@@ -91,7 +91,7 @@ def motion(fmu: FMU, system: System) -> Motion:
     at = [fmu.states.index(name) for name in states]
     inputs = fmu.variables([one.name for one in system.inputs])
     B = fmu.input_jacobian(inputs)[at]
-    outputs = [one.name for one in system.outputs]
+    outputs = [output.name for output in system.outputs]
     # A state shows no input at once; not every FMU differentiates it.
     shown = [name not in fmu.states for name in outputs]
     D = np.zeros((len(outputs), len(system.inputs)))

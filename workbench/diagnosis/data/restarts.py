@@ -46,9 +46,9 @@ def restarts_of(system: System, counted: Counted) -> Restarts | None:
         at[first:end:size] = counted.spans[first:end].any()
     for first, end in counted.blocks:
         at[first] = counted.spans[first:end].any()
-    declared = [one for one in system.comparison.exclusions if one.restarted]
+    declared = [exclusion for exclusion in system.comparison.exclusions if exclusion.restarted]
     noise = {}
-    for name in (name for one in declared for name in one.restarted):
+    for name in (name for declaration in declared for name in declaration.restarted):
         values, fixed, share = counted.clean[name], counted.deviation[name] ** 2, 0.0
         if system.signals[name].relative_noise > 0.0:
             fixed, share = parts_of_noise(values, values, counted.usable)
@@ -56,5 +56,7 @@ def restarts_of(system: System, counted: Counted) -> Restarts | None:
     return Restarts(
         at=at,
         noise=noise,
-        uncertain={name: share for one in declared for name, share in one.uncertain.items()},
+        uncertain={
+            name: share for declaration in declared for name, share in declaration.uncertain.items()
+        },
     )

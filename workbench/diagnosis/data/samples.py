@@ -180,14 +180,16 @@ class Samples:
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
     """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
-    judged = [one.name for one in system.judged if any(one.name in case for case in cases)]
-    return (*(one.name for one in system.outputs), *judged)
+    judged = [signal.name for signal in system.judged if any(signal.name in case for case in cases)]
+    return (*(output.name for output in system.outputs), *judged)
 
 
 def channels(system: System, signals: Sequence[str]) -> tuple[Channel, ...]:
     """Channels that can be formed from some signals."""
     missing = set(system.signals) - set(signals)
-    return tuple(one for one in system.comparison.channels if not one.formula.names & missing)
+    return tuple(
+        channel for channel in system.comparison.channels if not channel.formula.names & missing
+    )
 
 
 def prepare(

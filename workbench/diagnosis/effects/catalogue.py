@@ -192,7 +192,9 @@ def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...
                 expected=f"some of {', '.join(known)}",
                 remedy="correct the name",
             )
-    return tuple(one for one in effects if not names or {one.name, one.kind} & set(names))
+    return tuple(
+        effect for effect in effects if not names or {effect.name, effect.kind} & set(names)
+    )
 
 
 def _placed(library: Library, effect: Effect) -> list[Effect]:

@@ -42,7 +42,7 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
 def sizes_by_component(effects: Iterable[Effect]) -> dict[str, list[str]]:
     """Variables of the FMU that are the sizes of a component: without them it is nominal."""
     found: dict[str, list[str]] = {}
-    for effect in (one for one in effects if not one.late):
+    for effect in (effect for effect in effects if not effect.late):
         for name in (name for size in effect.sizes for name in variables(effect, size)):
             found.setdefault(name.rpartition(".")[0], []).append(name)
     return found
@@ -83,7 +83,7 @@ def source(
     used: set[str] = set()
     redeclared = [f"    {written}" for written in _modifiers(parameters)]
     for slot in read_slots(library, base):
-        inside = _bindings([one for one in effects if slot.name in one.slots], values)
+        inside = _bindings([effect for effect in effects if slot.name in effect.slots], values)
         if not inside:
             continue
         label = slot.name[0].upper() + slot.name[1:]

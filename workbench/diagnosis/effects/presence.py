@@ -50,8 +50,12 @@ class Presence:
         unless, falling = effect.unless, effect.falling
         if unless is not None and self.told(unless):
             return unless.because
-        if falling is not None and not any(one.falls(falling.signal) for one in self._recordings):
+        if falling is not None and not any(
+            recording.falls(falling.signal) for recording in self._recordings
+        ):
             return falling.because
-        if effect.restarted and not any(one.restarted.any() for one in self._recordings):
+        if effect.restarted and not any(
+            recording.restarted.any() for recording in self._recordings
+        ):
             return effect.restarted
         return effect.hidden

@@ -64,21 +64,25 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
                 remedy="constrain it by a partial class of the library",
             )
         declared = library.components(partial)
-        inputs = [one for one in declared.values() if "input" in one.prefixes]
+        inputs = [
+            declaration for declaration in declared.values() if "input" in declaration.prefixes
+        ]
         computed = {
             name
-            for one in (partial, *library.ancestors(partial))
-            for name in library.classes[one].equations
+            for ancestor in (partial, *library.ancestors(partial))
+            for name in library.classes[ancestor].equations
         }
         outputs = [
-            one
-            for one in declared.values()
-            if "output" in one.prefixes and one.name not in computed and not one.modifier.value
+            declaration
+            for declaration in declared.values()
+            if "output" in declaration.prefixes
+            and declaration.name not in computed
+            and not declaration.modifier.value
         ]
         counts = tuple(
-            one.name
-            for one in declared.values()
-            if one.type == "Integer" and "parameter" in one.prefixes
+            declaration.name
+            for declaration in declared.values()
+            if declaration.type == "Integer" and "parameter" in declaration.prefixes
         )
         names = {*counts, *(one.name for one in inputs)}
         slots.append(
@@ -87,7 +91,7 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
                 partial=partial,
                 counts=counts,
                 inputs=tuple(one.name for one in inputs),
-                outputs=tuple(one.name for one in outputs),
+                outputs=tuple(output.name for output in outputs),
                 chained=len(outputs) <= len(inputs)
                 and all(
                     library.unit(inlet) == library.unit(outlet)
@@ -96,9 +100,9 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
                 nominal=library.resolve(component.type, component.owner),
                 settled=component.modifier.inner.keys() <= names,
                 handed={
-                    one.name: one.modifier.value
-                    for one in declared.values()
-                    if "output" in one.prefixes and one.modifier.value in names
+                    declaration.name: declaration.modifier.value
+                    for declaration in declared.values()
+                    if "output" in declaration.prefixes and declaration.modifier.value in names
                 },
             )
         )

@@ -24,7 +24,7 @@ def best_estimate(outcome: Outcome, recording: str) -> CaseResult | None:
     if outcome.diagnosis.verdict == "unexplained" or outcome.turns:
         return None
     system, extension = outcome.system, outcome.extension
-    case = next(one for one in outcome.cases if one.name == recording)
+    case = next(case for case in outcome.cases if case.name == recording)
     in_time = case_in_time(case, system, outcome.diagnosis.best.point.sizes)
     models = {"nominal_model": (system, case)}
     if extension is not None:

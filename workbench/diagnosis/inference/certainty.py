@@ -154,7 +154,8 @@ def _elsewhere(fit: Fit, point: Point) -> Sequence[Point]:
             times = rng.uniform(*_TIMES) if of_size else np.exp(rng.uniform(*np.log(_SHAPES)))
             sizes[key] = float(np.clip(value * times, *_bounds(fit, key)))
         phases = {
-            name: rng.uniform(-np.pi, np.pi, size=one.shape) for name, one in point.phases.items()
+            name: rng.uniform(-np.pi, np.pi, size=phase.shape)
+            for name, phase in point.phases.items()
         }
         starts.append(replace(fit.unknowns.start(), sizes=sizes, phases=phases))
     return starts

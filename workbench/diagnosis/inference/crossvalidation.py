@@ -25,20 +25,20 @@ class CrossValidation:
         self._fit = fit
         self._known: dict[int, tuple[Fitted, list[Matrix]]] = {}
 
-    def squares(self, one: Fitted, *, fast: bool) -> Vector:
+    def squares(self, fitted: Fitted, *, fast: bool) -> Vector:
         """Mean square of errors of each recording, fitted to the others, (K,); noise leaves 1.
 
         Parameters
         ----------
         fast : of blocks instead of means over a lasting time.
         """
-        if id(one) not in self._known:
-            self._known[id(one)] = one, self._errors(one)
-        span = one.linearised.lasting
+        if id(fitted) not in self._known:
+            self._known[id(fitted)] = fitted, self._errors(fitted)
+        span = fitted.linearised.lasting
         return np.array(
             [
                 (errors[:, told] ** 2 if fast else lasting(errors[:, told], span)).mean()
-                for errors, told in zip(self._known[id(one)][1], self._told(one), strict=True)
+                for errors, told in zip(self._known[id(fitted)][1], self._told(fitted), strict=True)
             ]
         )
 
@@ -47,29 +47,29 @@ class CrossValidation:
         before, after = (float(self.squares(one, fast=fast).mean()) for one in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
-    def _told(self, one: Fitted) -> list[Mask]:
+    def _told(self, fitted: Fitted) -> list[Mask]:
         """Channels that are told, of each recording or part."""
-        told = [evidence.blocks > 0 for evidence in one.linearised.evidence]
+        told = [evidence.blocks > 0 for evidence in fitted.linearised.evidence]
         return told * self._fit.parts if self._fit.unknowns.count == 1 else told
 
-    def _errors(self, one: Fitted) -> list[Matrix]:
+    def _errors(self, fitted: Fitted) -> list[Matrix]:
         if self._fit.unknowns.count == 1:
-            return self._fit.together(partial(self._refitted, one), range(self._fit.parts))
-        return self._extrapolated(one)
+            return self._fit.together(partial(self._refitted, fitted), range(self._fit.parts))
+        return self._extrapolated(fitted)
 
-    def _refitted(self, one: Fitted, part: int) -> Matrix:
+    def _refitted(self, fitted: Fitted, part: int) -> Matrix:
         """Whitened errors of one part, after a fit without it: laws may bend much within one."""
         hidden = self._fit.without(part)
-        lin = hidden.refine(hidden.hide(one.linearised), one.active, _ROUNDS)
+        lin = hidden.refine(hidden.hide(fitted.linearised), fitted.active, _ROUNDS)
         return self._fit.at(lin.point).evidence[0].errors[self._fit.blocks_of(part)]
 
-    def _extrapolated(self, one: Fitted) -> list[Matrix]:
+    def _extrapolated(self, fitted: Fitted) -> list[Matrix]:
         """Whitened errors of each recording, by one step from the fit to all of them."""
-        joint = self._fit.quadratics(self._fit.linearise(one.linearised, one.active))
+        joint = self._fit.quadratics(self._fit.linearise(fitted.linearised, fitted.active))
         stops = joint.stops()
         total = add([*stops, joint.prior])
         found = []
         for stop, system in zip(stops, joint.systems, strict=True):
             z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-            found.append(system.errors(z) * np.sqrt(one.linearised.inflation))
+            found.append(system.errors(z) * np.sqrt(fitted.linearised.inflation))
         return found

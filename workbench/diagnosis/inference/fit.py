@@ -101,7 +101,10 @@ class Fit:
         """The same with more effects that may be asked for."""
         other = copy(self)
         other.unknowns = copy(self.unknowns)
-        other.unknowns.effects = {**self.unknowns.effects, **{one.name: one for one in effects}}
+        other.unknowns.effects = {
+            **self.unknowns.effects,
+            **{effect.name: effect for effect in effects},
+        }
         return other
 
     def blocks_of(self, part: int) -> slice:
@@ -149,10 +152,10 @@ class Fit:
     def astray(self, lin: Linearised) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""
         found = []
-        for k, (one, evidence) in enumerate(
+        for k, (recording, evidence) in enumerate(
             zip(self._simulations.recordings, lin.evidence, strict=True)
         ):
-            errors = evidence.errors[one.restarted]
+            errors = evidence.errors[recording.restarted]
             if not len(errors):
                 continue
             squares = lasting(errors, min(self.lasting, len(errors)))

@@ -57,28 +57,28 @@ class Linearised:
     def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
         """The same with more columns, (b*m + 1, p) of each stop."""
         evidence = tuple(
-            replace(one, jacobian=np.column_stack([one.jacobian, more]))
-            for one, more in zip(self.evidence, jacobians, strict=True)
+            replace(recording, jacobian=np.column_stack([recording.jacobian, more]))
+            for recording, more in zip(self.evidence, jacobians, strict=True)
         )
         return replace(self, keys=(*self.keys, *keys), evidence=evidence)
 
     def derived_as(self, other: "Linearised") -> "Linearised":
         """The same with derivatives at another point, where errors alone are asked for."""
         evidence = tuple(
-            replace(one, jacobian=there.jacobian)
-            for one, there in zip(self.evidence, other.evidence, strict=True)
+            replace(recording, jacobian=there.jacobian)
+            for recording, there in zip(self.evidence, other.evidence, strict=True)
         )
         return replace(self, keys=other.keys, evidence=evidence)
 
     @property
     def misfit(self) -> float:
         """Chi-squared of all stops at the point, in units of the noise."""
-        return float(sum(one.residual @ one.residual for one in self.evidence))
+        return float(sum(recording.residual @ recording.residual for recording in self.evidence))
 
     @property
     def _squares(self) -> tuple[Vector, Vector]:
         """Number of blocks that are told, and mean square of their errors, by channel (m,)."""
-        errors = np.concatenate([one.errors for one in self.evidence])
+        errors = np.concatenate([recording.errors for recording in self.evidence])
         return _told(self.evidence), _share(self.evidence) * np.square(errors).mean(axis=0)
 
     @property
@@ -92,7 +92,7 @@ class Linearised:
         count, mean = self._squares
         noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
-        rest = sum(one.rest**2 for one in self.evidence)
+        rest = sum(recording.rest**2 for recording in self.evidence)
         return float((noise + wrong).sum()) + rest + self.away
 
     @property
@@ -103,7 +103,12 @@ class Linearised:
 
     def weighed(self, inflation: Vector) -> float:
         """Chi-squared, each channel in units of what is wrong with it, (m,)."""
-        return float(sum((one.errors**2 / inflation).sum() + one.rest**2 for one in self.evidence))
+        return float(
+            sum(
+                (recording.errors**2 / inflation).sum() + recording.rest**2
+                for recording in self.evidence
+            )
+        )
 
 
 def lasting(errors: Matrix, blocks: int) -> Matrix:
@@ -120,32 +125,32 @@ def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
     What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
     against that, not against the noise.
     """
-    squares = np.concatenate([lasting(one.errors, blocks) for one in evidence])
+    squares = np.concatenate([lasting(recording.errors, blocks) for recording in evidence])
     slow: Vector = np.maximum(1.0, _share(evidence) * squares.mean(axis=0))
     return slow
 
 
 def _told(evidence: Sequence[Evidence]) -> Vector:
     """Number of blocks that are told, by channel (m,)."""
-    counts: Vector = np.sum([one.blocks for one in evidence], axis=0)
+    counts: Vector = np.sum([recording.blocks for recording in evidence], axis=0)
     return counts
 
 
 def _share(evidence: Sequence[Evidence]) -> Vector:
     """Blocks over those that are told, by channel (m,): silent ones have no errors."""
-    share: Vector = sum(len(one.errors) for one in evidence) / _told(evidence)
+    share: Vector = sum(len(recording.errors) for recording in evidence) / _told(evidence)
     return share
 
 
-def between(one: Point, other: Point) -> Point:
+def between(point: Point, other: Point) -> Point:
     """Half way; nothing that one of them lacks."""
 
     def half(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> dict[Any, Any]:
         return {key: 0.5 * (value + b[key]) for key, value in a.items()}
 
     return Point(
-        half(one.sizes, other.sizes),
-        half(one.levels, other.levels),
-        0.5 * (one.deviations + other.deviations),
-        half(one.phases, other.phases),
+        half(point.sizes, other.sizes),
+        half(point.levels, other.levels),
+        0.5 * (point.deviations + other.deviations),
+        half(point.phases, other.phases),
     )

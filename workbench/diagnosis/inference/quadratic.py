@@ -216,17 +216,17 @@ def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
     return np.linspace(0, blocks, parts + 1).astype(np.intp)
 
 
-def _cut(one: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
+def _cut(system: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
     """One recording in parts, of blocks that follow each other; the first has the error at rest."""
-    edges = part_edges((one.r.size - 1) // one.channels, parts) * one.channels
-    rest = np.zeros(one.r.size)
+    edges = part_edges((system.r.size - 1) // system.channels, parts) * system.channels
+    rest = np.zeros(system.r.size)
     rest[-1] = 1.0
     cut = []
     for first, end in pairwise(edges):
-        rows = np.append(np.arange(first, end), one.r.size - 1)
+        rows = np.append(np.arange(first, end), system.r.size - 1)
         weight = 1.0 - rest[rows] * (first > 0)
-        part = (one.r[rows] * weight, one.J[rows] * weight[:, None], one.P[rows])
-        cut.append(RecordingSystem(*part, one.deviations, one.furthest, one.channels))
+        part = (system.r[rows] * weight, system.J[rows] * weight[:, None], system.P[rows])
+        cut.append(RecordingSystem(*part, system.deviations, system.furthest, system.channels))
     return tuple(cut)
 
 
@@ -276,7 +276,7 @@ class Joint:
     @property
     def chi_squared(self) -> float:
         """At the point itself, tolerances and the prior included."""
-        return sum(one.chi_squared for one in self.systems) + self.prior.c
+        return sum(system.chi_squared for system in self.systems) + self.prior.c
 
     def stops(self) -> list[Quadratic]:
         """Chi-squared of each stop."""
@@ -289,7 +289,7 @@ class Joint:
     def covariance(self) -> Matrix:
         """Of the common unknowns, then of each deviation's mean over all stops, (p + d, p + d)."""
         count = self.systems[0].deviations.size
-        follows, own = zip(*(one.follows() for one in self.systems), strict=True)
+        follows, own = zip(*(system.follows() for system in self.systems), strict=True)
         mean = np.mean(follows, axis=0)[:count]
         common = covariance(self.total().N)
         both = np.vstack([np.eye(len(common)), mean])
@@ -307,7 +307,7 @@ class Joint:
         systems = self.systems
         while True:
             step = minimum_within(replace(self, systems=systems).total(), low, high)
-            held = tuple(one.holding(step) for one in systems)
+            held = tuple(system.holding(step) for system in systems)
             if held == systems:
-                return step, [one.local(step) for one in systems]
+                return step, [system.local(step) for system in systems]
             systems = held

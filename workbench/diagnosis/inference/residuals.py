@@ -96,22 +96,24 @@ def residuals(
     values = fit.unknowns.values(before.point)
     system, known = simulations.system, _balances(simulations.system)
     found = []
-    for k, (case, one) in enumerate(zip(simulations.cases, simulations.recordings, strict=True)):
-        told = np.flatnonzero(~one.silent)
-        inverse = np.linalg.inv(one.whitening[:, told[:, None], told])
+    for k, (case, recording) in enumerate(
+        zip(simulations.cases, simulations.recordings, strict=True)
+    ):
+        told = np.flatnonzero(~recording.silent)
+        inverse = np.linalg.inv(recording.whitening[:, told[:, None], told])
         unwhitened: list[Matrix] = [
             np.einsum("bij,bj->bi", inverse, lin.evidence[k].errors[:, told])
             for lin in (before, after)
         ]
-        formed = channels(system, one.signals)
+        formed = channels(system, recording.signals)
         fitted = {**simulations.nominal, **values[k]}
         found.append(
             Residuals(
                 name=case.name,
                 time=case.time,
-                balances=tuple(known.balances(system, case, one, fitted)) if known else (),
+                balances=tuple(known.balances(system, case, recording, fitted)) if known else (),
                 channels=tuple(formed[c] for c in told),
-                block_time=case.time[one.blocks.mean(axis=1).astype(int)],
+                block_time=case.time[recording.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
                 after=unwhitened[1],
                 sigma=np.sqrt(np.einsum("bij,bij->bi", inverse, inverse)),
@@ -130,7 +132,9 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
     """What prediction errors go with, strongest before first."""
     system = simulations.system
     influences = [_influences(simulations, k) for k in range(len(found))]
-    turning = {one.name for one in system.comparison.influences if one.way == "turn"}
+    turning = {
+        influence.name for influence in system.comparison.influences if influence.way == "turn"
+    }
     # What changes sign with the direction is wrong by its size, whatever the direction.
     signs = [sign(case, system) for case in simulations.cases]
     pairs = list(zip(signs, found, strict=True))
@@ -200,10 +204,10 @@ def _explained(
     apart : whether each recording has a phase of its own.
     """
     groups, values = [], []
-    everything = np.concatenate([one[name] for one in influences])
+    everything = np.concatenate([influence[name] for influence in influences])
     edges = np.unique(np.quantile(everything, np.linspace(0.0, 1.0, _BINS + 1)[1:-1]))
-    for k, (error, one) in enumerate(zip(errors, influences, strict=True)):
-        groups.append(np.digitize(one[name], edges) + (100 * k if apart else 0))
+    for k, (error, influence) in enumerate(zip(errors, influences, strict=True)):
+        groups.append(np.digitize(influence[name], edges) + (100 * k if apart else 0))
         values.append(error - error.mean() if apart else error)
     group, value = np.unique(np.concatenate(groups), return_inverse=True)[1], np.concatenate(values)
     counts = np.bincount(group)

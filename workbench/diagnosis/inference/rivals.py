@@ -41,12 +41,12 @@ class Rival:
     @property
     def chi_squared(self) -> float:
         """That it leaves, tolerances and what was known beforehand included."""
-        return sum(one.chi_squared for one in self.recordings) + self.prior.c
+        return sum(recording.chi_squared for recording in self.recordings) + self.prior.c
 
     @property
     def information(self) -> Matrix:
         """Inverse covariance of sizes and levels, (p, p)."""
-        return add([*(one.eliminated() for one in self.recordings), self.prior]).N
+        return add([*(recording.eliminated() for recording in self.recordings), self.prior]).N
 
     def so_far(self, shared: Sequence[Key], furthest: float) -> RecordingSystem:
         """All recordings as one, over the common unknowns of new ones.
@@ -59,18 +59,29 @@ class Rival:
         furthest : standard deviations that no level goes beyond.
         """
         old = [*self.sizes, *self.levels]
-        J, N = np.vstack([one.J for one in self.recordings]), np.diag(self.prior.N)
+        J, N = np.vstack([recording.J for recording in self.recordings]), np.diag(self.prior.N)
         gone = [j for j, key in enumerate(old) if key not in shared]
         known = N[gone] > 0.0
         spread = 1.0 / np.sqrt(np.where(known, N[gone], 1.0))
-        P = np.hstack([block_diag(*(one.P for one in self.recordings)), J[:, gone] * spread])
-        counts = [np.arange(one.P.shape[1]) < one.deviations.size for one in self.recordings]
+        P = np.hstack(
+            [block_diag(*(recording.P for recording in self.recordings)), J[:, gone] * spread]
+        )
+        counts = [
+            np.arange(recording.P.shape[1]) < recording.deviations.size
+            for recording in self.recordings
+        ]
         first = np.argsort(~np.concatenate([*counts, known]), kind="stable")
-        away = [*(one.deviations for one in self.recordings), (self.prior.g[gone] * spread)[known]]
-        bounds = [*(one.furthest for one in self.recordings), np.where(known, furthest, np.inf)]
+        away = [
+            *(recording.deviations for recording in self.recordings),
+            (self.prior.g[gone] * spread)[known],
+        ]
+        bounds = [
+            *(recording.furthest for recording in self.recordings),
+            np.where(known, furthest, np.inf),
+        ]
         columns = [J[:, old.index(key)] if key in old else np.zeros(len(J)) for key in shared]
         return RecordingSystem(
-            r=np.concatenate([one.r for one in self.recordings]),
+            r=np.concatenate([recording.r for recording in self.recordings]),
             J=np.column_stack(columns),
             P=P[:, first],
             deviations=np.concatenate(away),
@@ -84,7 +95,7 @@ class Rival:
             "effects": list(self.effects),
             "sizes": [[*key, value] for key, value in self.sizes.items()],
             "levels": [[*key, value] for key, value in self.levels.items()],
-            "recordings": [_told(one) for one in self.recordings],
+            "recordings": [_told(recording) for recording in self.recordings],
             "prior": {
                 "matrix": self.prior.N.tolist(),
                 "gradient": self.prior.g.tolist(),
@@ -115,7 +126,7 @@ class Rivals:
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; `read_rivals` reads it again."""
         return {
-            "models": [one.to_dict() for one in self.models],
+            "models": [model.to_dict() for model in self.models],
             "effects": list(self.effects),
             "given": dict(self.given),
             "signals": list(self.signals),
@@ -141,28 +152,28 @@ def gathered(simulations: Simulations, fit: Fit, base: Fitted, fits: Sequence[Fi
     )
 
 
-def _rival(fit: Fit, base: Fitted, one: Fitted, inflation: Vector) -> Rival:
-    lin = replace(fit.linearise(one.linearised, one.active), inflation=inflation)
+def _rival(fit: Fit, base: Fitted, fitted: Fitted, inflation: Vector) -> Rival:
+    lin = replace(fit.linearise(fitted.linearised, fitted.active), inflation=inflation)
     joint = fit.quadratics(lin)
     still = np.zeros(len(joint.shared))
     return Rival(
-        effects=tuple(effect.name for effect in one.active),
-        sizes=dict(one.point.sizes),
-        levels=dict(one.point.levels),
-        recordings=tuple(one.compressed().moved(still) for one in joint.systems),
+        effects=tuple(effect.name for effect in fitted.active),
+        sizes=dict(fitted.point.sizes),
+        levels=dict(fitted.point.levels),
+        recordings=tuple(system.compressed().moved(still) for system in joint.systems),
         prior=joint.prior,
-        explained=beyond(base, one),
+        explained=beyond(base, fitted),
     )
 
 
-def _told(one: RecordingSystem) -> dict[str, Any]:
+def _told(system: RecordingSystem) -> dict[str, Any]:
     """A recording's errors and derivatives as numbers."""
     return {
-        "errors": one.r.tolist(),
-        "common": one.J.tolist(),
-        "own": one.P.tolist(),
-        "deviations": one.deviations.tolist(),
-        "furthest": one.furthest.tolist(),
+        "errors": system.r.tolist(),
+        "common": system.J.tolist(),
+        "own": system.P.tolist(),
+        "deviations": system.deviations.tolist(),
+        "furthest": system.furthest.tolist(),
     }
 
 
@@ -198,14 +209,14 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
     return Rivals(
         models=tuple(
             Rival(
-                effects=tuple(map(str, one["effects"])),
-                sizes=keyed(one["sizes"]),
-                levels=keyed(one["levels"]),
-                recordings=tuple(_system(recording) for recording in one["recordings"]),
-                prior=_prior(one["prior"]),
-                explained=float(one["explained"]),
+                effects=tuple(map(str, model["effects"])),
+                sizes=keyed(model["sizes"]),
+                levels=keyed(model["levels"]),
+                recordings=tuple(_system(recording) for recording in model["recordings"]),
+                prior=_prior(model["prior"]),
+                explained=float(model["explained"]),
             )
-            for one in said["models"]
+            for model in said["models"]
         ),
         effects=tuple(map(str, said["effects"])),
         given={str(name): float(value) for name, value in said["given"].items()},

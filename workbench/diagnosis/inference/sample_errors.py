@@ -40,14 +40,16 @@ def errors_of(
 ) -> list[Errors]:
     """Errors of all recordings by two models."""
     found = []
-    for k, one in enumerate(simulations.recordings):
+    for k, recording in enumerate(simulations.recordings):
         sizes = [lin.evidence[k].sizes for lin in (before, after)]
-        samples = int(one.told.sum())
-        for c, channel in enumerate(channels(simulations.system, one.signals)):
-            if one.silent[c]:
+        samples = int(recording.told.sum())
+        for c, channel in enumerate(channels(simulations.system, recording.signals)):
+            if recording.silent[c]:
                 continue
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
-            found.append(Errors(one.name, channel.name, channel.unit, held_out, samples, rms, mean))
+            found.append(
+                Errors(recording.name, channel.name, channel.unit, held_out, samples, rms, mean)
+            )
     return found
 
 

@@ -96,7 +96,7 @@ def _step(
     fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
 ) -> Step | None:
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
-    scores = tuple(one for one in trial.scores() if one.effect in catalogue)
+    scores = tuple(score for score in trial.scores() if score.effect in catalogue)
     rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
     if not rivals:
         return None
@@ -105,8 +105,8 @@ def _step(
     if not fits:
         return None
     equals = [one for one in fits if beyond(one, fits[0]) < fit.decides.tied]
-    first = min(equals, key=lambda one: catalogue.index(one.active[-1]))
-    return Step(best, scores, (first, *(one for one in fits if one is not first)))
+    first = min(equals, key=lambda equal: catalogue.index(equal.active[-1]))
+    return Step(best, scores, (first, *(fit for fit in fits if fit is not first)))
 
 
 def _gains(fit: Fit, before: Fitted, after: Fitted) -> bool:
@@ -114,14 +114,14 @@ def _gains(fit: Fit, before: Fitted, after: Fitted) -> bool:
     return before.linearised.deviance - after.linearised.deviance > fit.decides.fall
 
 
-def beyond(one: Fitted, other: Fitted) -> float:
+def beyond(fitted: Fitted, other: Fitted) -> float:
     """Chi-squared that one leaves and another does not.
 
     Each channel in units of the lesser of what they leave wrong there: where both leave much, that
     one leaves a little more means nothing.
     """
-    inflation = np.minimum(one.linearised.inflation, other.linearised.inflation)
-    return one.linearised.weighed(inflation) - other.linearised.weighed(inflation)
+    inflation = np.minimum(fitted.linearised.inflation, other.linearised.inflation)
+    return fitted.linearised.weighed(inflation) - other.linearised.weighed(inflation)
 
 
 def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[Fitted]:
@@ -145,8 +145,8 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
 
 def misfits(fits: Sequence[Fitted]) -> Vector:
     """Chi-squared of each, channels in units of the least that any of them leaves wrong, (f,)."""
-    inflation = np.min([one.linearised.inflation for one in fits], axis=0)
-    return np.array([one.linearised.weighed(inflation) for one in fits])
+    inflation = np.min([fit.linearised.inflation for fit in fits], axis=0)
+    return np.array([fit.linearised.weighed(inflation) for fit in fits])
 
 
 def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | None:
@@ -309,16 +309,16 @@ def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> li
     hinted = best.linearised.inflation.max() > decides.wrong
     clear = decides.hint if hinted else decides.significant
     able: dict[str, list[Prospect]] = {}
-    for one in scores:
-        phases = len(one.phases) if one.effect.order_locked else 0
+    for score in scores:
+        phases = len(score.phases) if score.effect.order_locked else 0
         needed = 0.0 if hinted else decides.fall_of(1 + phases)
-        if one.like_levels:
-            shown = one.gain > needed and one.least > min(needed, decides.immaterial**2)
+        if score.like_levels:
+            shown = score.gain > needed and score.least > min(needed, decides.immaterial**2)
         else:
-            shown = min(one.gain, one.held_out.sum()) > needed
-        significant = abs(one.size) > clear * one.sigma and shown
-        if significant and abs(one.size) >= one.effect.matters:
-            able.setdefault(one.effect.name, []).append(one)
+            shown = min(score.gain, score.held_out.sum()) > needed
+        significant = abs(score.size) > clear * score.sigma and shown
+        if significant and abs(score.size) >= score.effect.matters:
+            able.setdefault(score.effect.name, []).append(score)
     ranked = list(able.values())[: decides.rivals]
     best_score = ranked[0][0].score if ranked else 0.0
     return [one for one in ranked if one[0].score > decides.near * best_score]

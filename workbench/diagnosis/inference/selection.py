@@ -117,7 +117,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
             continue
         names, cosines = _confusability(trial, catalogue)
         alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
-        replaced = [one for fits in alike.values() for one in fits.values()]
+        replaced = [fit for fits in alike.values() for fit in fits.values()]
         better = min(replaced, key=lambda one: beyond(one, best), default=best)
         if interrupted or beyond(best, better) < fit.decides.needed:
             break
@@ -184,7 +184,7 @@ def _alike(
         rivals = {rival.active[-1].name: rival for rival in step.rivals}
         if effect.name not in rivals:
             continue
-        close = {name for name, one in rivals.items() if _close(fit, step.before, one, winner)}
+        close = {name for name, rival in rivals.items() if _close(fit, step.before, rival, winner)}
         named = winner.active[-1] is effect
         alike |= close if named else set(rivals)
         if named and winner.point is best.point:
@@ -202,10 +202,10 @@ def _alike(
     return found | {name: one for name, one in tried if one is not None}
 
 
-def _close(fit: Fit, before: Fitted, one: Fitted, best: Fitted) -> bool:
+def _close(fit: Fit, before: Fitted, fitted: Fitted, best: Fitted) -> bool:
     """Whether chi-squared does not tell two effects apart, either of which explains."""
     form = max(fit.decides.form, fit.decides.form_share * beyond(before, best))
-    return beyond(one, best) < form
+    return beyond(fitted, best) < form
 
 
 def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:

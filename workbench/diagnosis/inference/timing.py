@@ -63,15 +63,15 @@ def _fall(fit: Fit, clocks: Sequence[Effect], best: Fitted) -> float:
     return known.at(minimum(known)) - total.at(minimum(total))
 
 
-def _together(fit: Fit, clocks: Sequence[Effect], one: Fitted) -> Late:
+def _together(fit: Fit, clocks: Sequence[Effect], fitted: Fitted) -> Late:
     """The fewest signals that, late together, explain as well as each by its own clock.
 
     The clock of the one signal that has none is what the others are late against.
     """
-    joint = fit.quadratics(fit.linearise(one.linearised, one.active))
+    joint = fit.quadratics(fit.linearise(fitted.linearised, fitted.active))
     at = [joint.shared.index((clock.name, clock.size)) for clock in clocks]
     N = np.linalg.inv(covariance(joint.total().N)[np.ix_(at, at)])
-    skews = np.array([one.point.sizes[clock.name, clock.size] for clock in clocks])
+    skews = np.array([fitted.point.sizes[clock.name, clock.size] for clock in clocks])
     names = [fit.reference, *(signal for clock in clocks for signal in clock.late)]
     for count in range(1, len(names) // 2 + 1):
         tried = []

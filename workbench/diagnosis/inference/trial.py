@@ -146,7 +146,7 @@ class Trial:
             for at, direction in own.items():
                 transform[at, -1] = direction[k]
             transforms.append(transform)
-        stops = [one.columns(t) for one, t in zip(self._stops, transforms, strict=True)]
+        stops = [stop.columns(t) for stop, t in zip(self._stops, transforms, strict=True)]
         prior = self.joint.prior.columns(transforms[0])
         for j, (_, matters) in enumerate(others, start=len(self._known)):
             prior.N[j, j] += (self._fit.decides.immaterial / matters) ** 2
@@ -209,19 +209,19 @@ def _phase(stop: Quadratic, at: Sequence[int]) -> float:
     return float(np.arctan2(amplitude[1], amplitude[0]))
 
 
-def _fixed(one: Quadratic, last: float) -> Quadratic:
+def _fixed(quadratic: Quadratic, last: float) -> Quadratic:
     """Chi-squared over the other unknowns, the last one held."""
-    N = one.N[:-1, :-1]
-    g = one.g[:-1] + last * one.N[:-1, -1]
-    c = one.c + 2.0 * last * one.g[-1] + last**2 * one.N[-1, -1]
-    return Quadratic(N, g, float(c), one.rows)
+    N = quadratic.N[:-1, :-1]
+    g = quadratic.g[:-1] + last * quadratic.N[:-1, -1]
+    c = quadratic.c + 2.0 * last * quadratic.g[-1] + last**2 * quadratic.N[-1, -1]
+    return Quadratic(N, g, float(c), quadratic.rows)
 
 
 def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadratic]:
     """Chi-squared without each of the stops."""
     return [
-        Quadratic(total.N - one.N, total.g - one.g, total.c - one.c, total.rows - one.rows)
-        for one in stops
+        Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, total.rows - stop.rows)
+        for stop in stops
     ]
 
 

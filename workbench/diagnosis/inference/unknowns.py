@@ -47,9 +47,9 @@ class Unknowns:
         self._compare = simulations.system.comparison
         self.effects = {effect.name: effect for effect in effects}
         self.modes = {
-            delay(one.name): one.mode
-            for one in simulations.system.judged + simulations.system.outputs
-            if one.mode is not None and one.name in simulations.recordings[0].signals
+            delay(signal.name): signal.mode
+            for signal in simulations.system.judged + simulations.system.outputs
+            if signal.mode is not None and signal.name in simulations.recordings[0].signals
         }
         self.presence = Presence(simulations.cases, simulations.recordings, beside)
         self.count = len(simulations.cases)

@@ -135,7 +135,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         gain = _gain(fit.tests, before, after)
         causes = [_cause(fit, chosen, one) for one in _strongest_first(fit, chosen, catalogue)]
         twins = [fits.values() for fits in chosen.twins.values()]
-        rivals = (best, *(one for fits in twins for one in fits))
+        rivals = (best, *(fit for fits in twins for fit in fits))
     presence = fit.unknowns.presence
     return Diagnosis(
         verdict=verdict,
@@ -189,12 +189,12 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     if len(causes) < 2:
         return causes
     first = chosen.steps[0]
-    alone = {one.active[-1]: one for one in first.rivals if first.before is chosen.base}
-    scores = [one for step in chosen.steps for one in step.scores]
-    best = {one.effect: one for one in reversed(scores)}  # of its shapes
+    alone = {rival.active[-1]: rival for rival in first.rivals if first.before is chosen.base}
+    scores = [score for step in chosen.steps for score in step.scores]
+    best = {score.effect: score for score in reversed(scores)}  # of its shapes
     begun = [best[effect] for effect in causes if effect in best and effect not in alone]
     fits = fit.together(partial(extended, fit, chosen.base, rounds=BEGUN), begun)
-    alone |= {one.active[-1]: one for one in fits if one is not None}
+    alone |= {fit.active[-1]: fit for fit in fits if fit is not None}
     left = dict(zip(alone, misfits(list(alone.values())), strict=True))
     ordered = list[Effect]()
     while rest := [effect for effect in causes if effect not in ordered]:

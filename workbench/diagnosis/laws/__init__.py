@@ -96,10 +96,10 @@ def propose(
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
     decides = of_system(system.comparison, len(scan.prospects))
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
-    tied = [one for one in estimates if estimates[0].evidence - one.evidence < near]
+    tied = [estimate for estimate in estimates if estimates[0].evidence - estimate.evidence < near]
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
-    forms = {one.written.name: one for estimate in tied for one in _forms(estimate)}
+    forms = {form.written.name: form for estimate in tied for form in _forms(estimate)}
     forms = _surviving(system, library, cases, forms, workers, report, about)
     found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
     proposal = Proposal(before, *found, forms, None)
@@ -124,7 +124,7 @@ def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
     """
     if not prospects or not _turns(prospects[0]):
         return []
-    likeliest = [one for one in prospects if _turns(one)][:_TRIED]
+    likeliest = [prospect for prospect in prospects if _turns(prospect)][:_TRIED]
     return [
         FittedLaw(
             one, one.smoothness.evidence, one.smoothness.coefficients, one.smoothness.posterior
@@ -134,8 +134,8 @@ def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
     ]
 
 
-def _turns(one: LawProspect) -> bool:
-    return one.law.influence is not None and one.law.influence.turns
+def _turns(prospect: LawProspect) -> bool:
+    return prospect.law.influence is not None and prospect.law.influence.turns
 
 
 def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
@@ -145,20 +145,24 @@ def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
     known hardly tell.
     """
     best: dict[tuple[str, ...], LawProspect] = {}
-    for one in prospects:
-        influence = one.law.influence
-        if one.smoothness.evidence <= 0.0 or _turns(one):
+    for prospect in prospects:
+        influence = prospect.law.influence
+        if prospect.smoothness.evidence <= 0.0 or _turns(prospect):
             continue
         factors = () if influence is None else tuple(part.name for part in influence.factors)
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
-        best.setdefault((one.law.place.name, kind, *factors), one)
+        best.setdefault((prospect.law.place.name, kind, *factors), prospect)
     of_place: dict[str, list[LawProspect]] = {}
     for one in best.values():
         of_place.setdefault(one.law.place.name, []).append(one)
     kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
     first = sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
     wanted = {_called(one.law) for one in first}
-    return [one for one in prospects if not _turns(one) and _called(one.law) in wanted]
+    return [
+        prospect
+        for prospect in prospects
+        if not _turns(prospect) and _called(prospect.law) in wanted
+    ]
 
 
 def _called(law: Law) -> tuple[str, ...]:
@@ -208,7 +212,7 @@ def _surviving(
         return {}
     before, rivals = steps[0].before, steps[0].rivals
     near = max(decides.form, decides.form_share * beyond(before, rivals[0]))
-    alike = [one for one in rivals if beyond(one, rivals[0]) < near]
+    alike = [rival for rival in rivals if beyond(rival, rivals[0]) < near]
     names = [one.active[-1].name for one in sorted(alike, key=description_length)]
     return {name: forms[name] for name in names}
 
@@ -217,9 +221,9 @@ def _as_effects(
     library: Library, base: str, forms: Mapping[str, WrittenForm], folder: Path
 ) -> tuple[Library, list[Effect]]:
     """A library with closed forms, and these: the likelier law and the simpler form first."""
-    extended = extended_library(library, [one.written for one in forms.values()], folder)
+    extended = extended_library(library, [form.written for form in forms.values()], folder)
     order = list(forms)
-    own = [one for one in read_effects(extended, base) if one.name in forms]
+    own = [effect for effect in read_effects(extended, base) if effect.name in forms]
     return extended, sorted(own, key=lambda one: order.index(one.name))
 
 
@@ -243,6 +247,6 @@ def _diagnosed(
             *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
         )
     if outcome.extension is not None:
-        text = package(library, [one.written for one in forms.values()])
+        text = package(library, [form.written for form in forms.values()])
         write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome

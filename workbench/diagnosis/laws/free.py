@@ -170,10 +170,10 @@ def estimated(
 def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
     return [
         Free(
-            **vars(effect_at(f"Free{k}", library, one.law.place, "c0")),
-            count=len(one.smoothness.coefficients),
+            **vars(effect_at(f"Free{k}", library, prospect.law.place, "c0")),
+            count=len(prospect.smoothness.coefficients),
         )
-        for k, one in enumerate(prospects)
+        for k, prospect in enumerate(prospects)
     ]
 
 
@@ -190,7 +190,7 @@ def _compiled(
     """
     base = system.models[OBSERVER].name
     with tempfile.TemporaryDirectory() as scratch:
-        written = [_written(f"Free{k}", one) for k, one in enumerate(prospects)]
+        written = [_written(f"Free{k}", prospect) for k, prospect in enumerate(prospects)]
         extended = extended_library(library, written, Path(scratch))
         effects = [*known, *_effects(library, prospects)]
         text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
@@ -201,7 +201,9 @@ def _compiled(
                 return []
         else:
             return list(prospects)
-    able = [one for one in prospects if _compiled(system, library, [one], path, known)]
+    able = [
+        prospect for prospect in prospects if _compiled(system, library, [prospect], path, known)
+    ]
     return _compiled(system, library, able, path, known) if able else []
 
 

@@ -61,7 +61,7 @@ class Proposal:
         of its mean squares.
         """
         gain = outcome.diagnosis.gain
-        held_out = [one for one in outcome.errors if one.held_out]
+        held_out = [error for error in outcome.errors if error.held_out]
         before, after = (sum(one.samples * one.rms[i] ** 2 for one in held_out) for i in (0, 1))
         if gain is None or (held_out and after >= before):
             return False
@@ -108,8 +108,8 @@ class Proposal:
     def said(self, cause: Cause) -> str:
         """A law in words, with those that are as good."""
         alike = [
-            f"{one.law.short}, {one.form.text}"
-            for name, one in self.forms.items()
+            f"{form.law.short}, {form.form.text}"
+            for name, form in self.forms.items()
             if name != cause.effect.name
         ]
         others = [*alike, *cause.confusable_with]
@@ -121,8 +121,9 @@ class Proposal:
         for cause in self.laws:
             lines += ["", f"{cause.effect.name}, {MARK}: {self.forms[cause.effect.name].text}"]
             lines += [
-                f"  {name} = {one.value:.4g} {one.unit}, 95 %: {one.low:.4g} to {one.high:.4g}"
-                for name, one in cause.parameters.items()
+                f"  {name} = {parameter.value:.4g} {parameter.unit}, "
+                f"95 %: {parameter.low:.4g} to {parameter.high:.4g}"
+                for name, parameter in cause.parameters.items()
             ]
             lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
         if self.laws and self.outcome is not None and self.outcome.extension is not None:
@@ -132,19 +133,19 @@ class Proposal:
 
     def to_frame(self) -> pd.DataFrame:
         """Laws as free functions, the likeliest first; those fitted in full before the others."""
-        fitted = {id(one.prospect): one for one in self.estimates}
+        fitted = {id(estimate.prospect): estimate for estimate in self.estimates}
         rows = []
-        for one in (*(e.prospect for e in self.estimates), *self.prospects):
-            if id(one) in fitted or one not in [e.prospect for e in self.estimates]:
-                full = fitted.pop(id(one), None)
-                law = one.law
+        for prospect in (*(e.prospect for e in self.estimates), *self.prospects):
+            if id(prospect) in fitted or prospect not in [e.prospect for e in self.estimates]:
+                full = fitted.pop(id(prospect), None)
+                law = prospect.law
                 rows.append(
                     {
                         "slot": law.place.slot.name,
                         "output": law.place.output.name,
                         "carrier": law.carrier.text,
                         "depends_on": "" if law.influence is None else law.influence.text,
-                        "log_evidence_nominal": one.smoothness.evidence,
+                        "log_evidence_nominal": prospect.smoothness.evidence,
                         "log_evidence": None if full is None else full.evidence,
                         "tied": full is not None and full in self.tied,
                     }
@@ -154,20 +155,20 @@ class Proposal:
     def functions(self) -> pd.DataFrame:
         """Estimated functions with their 95 % bands, and those of their shapes, in SI units."""
         tables = []
-        for one in self.estimates:
-            if one.law.influence is None:
+        for estimate in self.estimates:
+            if estimate.law.influence is None:
                 continue
-            values, function, sigma, shape = one.function()
+            values, function, sigma, shape = estimate.function()
             tables.append(
                 pd.DataFrame(
                     {
-                        "slot": one.law.place.slot.name,
-                        "output": one.law.place.output.name,
-                        "carrier": one.law.carrier.text,
-                        "depends_on": one.law.influence.text,
-                        "unit": one.law.influence.unit,
+                        "slot": estimate.law.place.slot.name,
+                        "output": estimate.law.place.output.name,
+                        "carrier": estimate.law.carrier.text,
+                        "depends_on": estimate.law.influence.text,
+                        "unit": estimate.law.influence.unit,
                         "value": values,
-                        "function_unit": one.law.carrier.unit,
+                        "function_unit": estimate.law.carrier.unit,
                         "function": function,
                         "low": function - BAND * sigma,
                         "high": function + BAND * sigma,
@@ -184,7 +185,7 @@ class Proposal:
             "sentence": self.sentence,
             "mark": MARK,
             "tied": [one.law.text for one in self.tied],
-            "alike": {name: one.text for name, one in self.forms.items()},
+            "alike": {name: form.text for name, form in self.forms.items()},
             "laws": [
                 {
                     "class": cause.effect.name,
@@ -215,5 +216,5 @@ def description_length(best: Fitted) -> float:
     Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
     """
     lin = best.linearised
-    count = sum(one.blocks.sum() for one in lin.evidence) / lin.lasting
+    count = sum(recording.blocks.sum() for recording in lin.evidence) / lin.lasting
     return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)

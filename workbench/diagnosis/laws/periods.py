@@ -47,7 +47,7 @@ def strongest_period(
     -------
     period : None where no recording has enough periods that its blocks resolve.
     """
-    fast = [one - uniform_filter1d(one, lasting, axis=0, mode="nearest") for one in errors]
+    fast = [error - uniform_filter1d(error, lasting, axis=0, mode="nearest") for error in errors]
     rates = [np.gradient(clock) for clock in clocks]
     longest = max(float(np.ptp(clock)) for clock in clocks)
     slow = float(np.quantile(np.concatenate(rates), 0.25))

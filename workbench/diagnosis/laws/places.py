@@ -90,7 +90,7 @@ class LawInfluence:
     @property
     def name(self) -> str:
         """Part of a Modelica name."""
-        parts = (self.kind, *(one.name for one in self.factors))
+        parts = (self.kind, *(factor.name for factor in self.factors))
         return "".join(part[0].upper() + part[1:] for part in parts)
 
     @property
@@ -125,7 +125,7 @@ class LawInfluence:
             return f"{clock}{own}, with a period of {self.span:.4g} {self.unit}"
         if self.kind == "since":
             return f"the time since {self.factors[0].name} ({self.factors[0].text}) began"
-        what = " x ".join(f"{one.name} ({one.text})" for one in self.factors)
+        what = " x ".join(f"{factor.name} ({factor.text})" for factor in self.factors)
         before = {"size": "the size of ", "rate": "the rate of ", "work": "heat, the work of "}
         lost = f", lost with a time constant of {self.span:g} s" if self.cools else ""
         return before.get(self.kind, "") + what + lost
@@ -137,7 +137,7 @@ class LawInfluence:
             return "time"
         if self.turns:
             return f"turns of {self.factors[0].name}" if self.factors else "turns in time"
-        product = "*".join(one.name for one in self.factors)
+        product = "*".join(factor.name for factor in self.factors)
         if self.kind == "size":
             return f"|{product}|"
         before = {"rate": "rate of ", "work": "heat of ", "since": "time since "}
@@ -167,7 +167,7 @@ class LawInfluence:
         if self.kind == "rate":
             return f"({self.factors[0].name} - {CLOCK})/{self.span!r}"
         if self.kind == "work":
-            power = f"noEvent(abs({'*'.join(one.name for one in self.factors)}))"
+            power = f"noEvent(abs({'*'.join(factor.name for factor in self.factors)}))"
             return f"{power} - {CLOCK}/{LOST}" if self.cools else power
         return ""
 
@@ -176,7 +176,9 @@ class LawInfluence:
         if self.kind == "time" or not self.factors:
             since: Vector = time - time[0]
             return since
-        product: Vector = np.prod([place.at(watched, one.name) for one in self.factors], axis=0)
+        product: Vector = np.prod(
+            [place.at(watched, factor.name) for factor in self.factors], axis=0
+        )
         if self.kind == "value":
             return product
         if self.kind == "size":
@@ -321,17 +323,17 @@ def turning_laws(
 
 def _varies(recordings: Sequence[Vector]) -> bool:
     """Whether something varies within any recording: between them, tolerances do."""
-    size = max(float(np.abs(one).max()) for one in recordings)
-    return any(np.ptp(one) > _VARIES * size for one in recordings)
+    size = max(float(np.abs(recording).max()) for recording in recordings)
+    return any(np.ptp(recording) > _VARIES * size for recording in recordings)
 
 
 def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Carrier]:
     output = place.output
-    values = [place.at(one, output.name) for one in recordings]
+    values = [place.at(recording, output.name) for recording in recordings]
     what = f"{output.name} ({output.text})"
-    if any(np.any(one) for one in values):
+    if any(np.any(value) for value in values):
         yield Carrier(place.nominal, "1", f"multiplies {what}")
-    if _varies(values) or not any(np.any(one) for one in values):
+    if _varies(values) or not any(np.any(value) for value in values):
         yield Carrier("1.0", output.unit, f"adds to {what}")
     for one in place.inputs:
         passes = place.slot.chained and one.name == place.nominal

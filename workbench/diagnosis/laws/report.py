@@ -49,7 +49,9 @@ def write_proposal(
 
 def functions_figure(found: Proposal) -> Figure:
     """Draw the likeliest functions with the 95 % bands of their shapes."""
-    shown = [one for one in found.estimates if one.law.influence is not None][:_SHOWN]
+    shown = [estimate for estimate in found.estimates if estimate.law.influence is not None][
+        :_SHOWN
+    ]
     table = found.functions()
     with mpl.rc_context(STYLE | {"font.size": 8}):
         sheet = Figure(figsize=(4.2 * max(1, len(shown)), 3.0), layout="constrained")

@@ -129,8 +129,8 @@ class Scan:
                 values = self._fit.unknowns.values(self.base.point)
                 tables = simulations.along(values, [f"watched{k}" for k in range(len(names))])
                 self._recordings = [
-                    (one.time, dict(zip(names, table.T, strict=True)))
-                    for one, table in zip(simulations.recordings, tables, strict=True)
+                    (recording.time, dict(zip(names, table.T, strict=True)))
+                    for recording, table in zip(simulations.recordings, tables, strict=True)
                 ]
                 span = _SPAN * system.comparison.lasting
                 every = [law for place in where for law in laws(place, self._recordings, span)]
@@ -164,7 +164,7 @@ class Scan:
             for law, (knots, basis) in zip(part, bases, strict=True):
                 count = basis[0].shape[1]
                 keys = [(law.place.name, f"c{k}") for k in range(count)]
-                more = [one[:, at : at + count] for one in derivatives]
+                more = [derivative[:, at : at + count] for derivative in derivatives]
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
                 largest = self._largest(law.place)
                 smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
@@ -207,9 +207,9 @@ class Scan:
         found = []
         for n, (law, period) in enumerate(every):
             keys = [(law.place.name, f"c{k}") for k in range(2 * len(derivatives))]
-            more = [np.zeros((len(one), len(keys))) for one in derivatives]
-            for k, one in enumerate(derivatives):
-                more[k][:, 2 * k : 2 * k + 2] = one[:, 2 * n : 2 * n + 2]
+            more = [np.zeros((len(derivative), len(keys))) for derivative in derivatives]
+            for k, derivative in enumerate(derivatives):
+                more[k][:, 2 * k : 2 * k + 2] = derivative[:, 2 * n : 2 * n + 2]
             joint = self._fit.quadratics(self.base.linearised.extended(keys, more), keys)
             largest = self._largest(law.place)
             likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
@@ -222,13 +222,17 @@ class Scan:
         self, simulations: Simulations, place: Place, influence: LawInfluence
     ) -> Period | None:
         """The period that errors have most of, along an influence."""
-        middles = [one.blocks.mean(axis=1).astype(int) for one in simulations.recordings]
+        middles = [
+            recording.blocks.mean(axis=1).astype(int) for recording in simulations.recordings
+        ]
         clocks = [
             influence.course(place, watched, time)[at]
             for (time, watched), at in zip(self._recordings, middles, strict=True)
         ]
         lin = self.base.linearised
-        return strongest_period([one.errors for one in lin.evidence], clocks, lin.lasting)
+        return strongest_period(
+            [recording.errors for recording in lin.evidence], clocks, lin.lasting
+        )
 
     def _waves(self, law: Law, period: Period) -> list[Matrix]:
         """Carrier times cosine and sine in each recording, (n, 2)."""
@@ -249,7 +253,7 @@ class Scan:
         """Columns of a law in each recording: carrier times basis functions."""
         carriers = [law.carrier.course(law.place, watched) for _, watched in self._recordings]
         if law.influence is None:
-            return None, [one[:, None] for one in carriers]
+            return None, [carrier[:, None] for carrier in carriers]
         courses = [
             law.influence.course(law.place, watched, time) for time, watched in self._recordings
         ]
@@ -261,8 +265,8 @@ class Scan:
         if law.influence.kind == "since":  # what is slower is a function of time
             knots = Knots(0.0, min(knots.high, _BEGINS * self._lasting))
         return knots, [
-            one[:, None] * knots.basis(course)
-            for one, course in zip(carriers, courses, strict=True)
+            carrier[:, None] * knots.basis(course)
+            for carrier, course in zip(carriers, courses, strict=True)
         ]
 
 

@@ -44,7 +44,7 @@ class Written:
             nominal = dict(zip(slot.outputs, slot.inputs, strict=False))
         else:
             bindings = ", ".join(f"{one}={one}" for one in slot.inputs)
-            nominal = {one: f"unchanged.{one}" for one in slot.outputs}
+            nominal = {output: f"unchanged.{output}" for output in slot.outputs}
             lines += [
                 "  protected",
                 f"    {written(slot.nominal, library)} unchanged({bindings}) "
@@ -78,12 +78,12 @@ def package(library: Library, classes: Iterable[Written]) -> str:
     """Source of a package with classes of slots of a library."""
     every = list(classes)
     slots = [one.place.slot for one in every]
-    names = {name.partition(".")[0] for one in slots for name in (one.partial, one.nominal)}
+    names = {name.partition(".")[0] for slot in slots for name in (slot.partial, slot.nominal)}
     return "\n".join(
         [
             f"within {library.name};",
             f'package {PACKAGE} "Laws that were proposed from recordings: not known physics"',
-            *(f"  import {USED}{one} = {one};" for one in sorted(names - {library.name})),
+            *(f"  import {USED}{name} = {name};" for name in sorted(names - {library.name})),
             *(one.source(library) for one in every),
             f"end {PACKAGE};\n",
         ]
@@ -115,7 +115,7 @@ def effect(
     sizes: tuple[str, ...], matters: float, slot: str, shapes: Mapping[str, tuple[float, ...]]
 ) -> str:
     """Annotation of an effect."""
-    names = ", ".join(f'"{one}"' for one in sizes)
+    names = ", ".join(f'"{size}"' for size in sizes)
     size = names if len(sizes) == 1 else f"{{{names}}}"
     parts = [f"size={size}", f"matters={number(matters)}", f'slots={{"{slot}"}}']
     if shapes:

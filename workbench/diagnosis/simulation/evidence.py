@@ -82,7 +82,7 @@ class Simulations:
         with ExitStack() as stack:
             self._model = model or stack.enter_context(opened(path, system, given))
             self._tell(self._model.fmu)
-            self.recordings = [self._ready(one, restarting=restarting) for one in cases]
+            self.recordings = [self._ready(case, restarting=restarting) for case in cases]
             coarse = Simulated(path, system, tuple(self.recordings))
             parts = settled_parts(self._simulator(coarse), self.nominal)
             self.simulated = coarse._replace(parts=parts)
@@ -140,7 +140,7 @@ class Simulations:
     def _lesser(self) -> list[Samples]:
         """Recordings as they are where what is restarted does not count."""
         found: list[Samples] = []
-        for k in (k for k, one in enumerate(self.recordings) if one.restarted.any()):
+        for k in (k for k, recording in enumerate(self.recordings) if recording.restarted.any()):
             try:
                 found.append(self._ready(self.cases[k], restarting=False))
                 self._without[k] = len(self.cases) + len(found) - 1
@@ -239,7 +239,7 @@ class Simulations:
         with ThreadPoolExecutor(len(items)) as threads:
             jobs = [threads.submit(job, item) for item in items]
             try:
-                return [one.result() for one in jobs]
+                return [job.result() for job in jobs]
             except BaseException:
                 # Others end with what they wait for.
                 self._interrupted.set()
@@ -257,7 +257,7 @@ class Simulations:
             for name, task in tasks.items():
                 under_way[name] = self._pool.submit(*task)
                 under_way[name].add_done_callback(counted)
-            return {name: one.result() for name, one in under_way.items()}
+            return {name: task.result() for name, task in under_way.items()}
         finally:
             # After Ctrl-C nobody waits for the others.
             for one in under_way.values():

@@ -211,34 +211,38 @@ class Simulator:
         ----------
         values : of the FMU's variables, SI, at which this is judged.
         """
-        one = self._recordings[number]
+        recording = self._recordings[number]
         compare = self._system.comparison
-        if one.restarts is None and not compare.wander:
-            return one
+        if recording.restarts is None and not compare.wander:
+            return recording
         values = {**dict.fromkeys((name for name, _ in self._delays.values()), 0.0), **values}
-        nominal, moved = self._means(number, one.y, values), []
+        nominal, moved = self._means(number, recording.y, values), []
 
         def shifted(name: str, share: float) -> Matrix:
             value = (1.0 + share) * values.get(name, self._fmu.defaults[name])
-            return self._means(number, one.y, {**values, name: value}) - nominal
+            return self._means(number, recording.y, {**values, name: value}) - nominal
 
-        if one.restarts is not None:
-            for name, noise in one.restarts.noise.items():
-                y, read = one.y.copy(), np.flatnonzero(one.restarts.at) - 1
-                y[read, one.signals.index(name)] += noise[read]
+        if recording.restarts is not None:
+            for name, noise in recording.restarts.noise.items():
+                y, read = recording.y.copy(), np.flatnonzero(recording.restarts.at) - 1
+                y[read, recording.signals.index(name)] += noise[read]
                 moved.append(self._means(number, y, values) - nominal)
-            moved.extend(shifted(name, share) for name, share in one.restarts.uncertain.items())
+            moved.extend(
+                shifted(name, share) for name, share in recording.restarts.uncertain.items()
+            )
         apart = [
             shifted(name, by.share) * max(1.0, 2.0 * by.over / compare.block) ** 0.5
             for name, by in compare.wander.items()
         ]
-        return one.loosened(moved, apart)
+        return recording.loosened(moved, apart)
 
     def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""
-        one = self._recordings[number]
-        errors = self._predictor.errors(replace(one, y=y), self._known(values)) - (y - one.y)
-        return one.channels(self._read(number, errors, values))
+        recording = self._recordings[number]
+        errors = self._predictor.errors(replace(recording, y=y), self._known(values)) - (
+            y - recording.y
+        )
+        return recording.channels(self._read(number, errors, values))
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
         """Prediction errors of all samples, and the whitened error of the input at rest."""
@@ -277,8 +281,10 @@ class Simulator:
 
     def _whitened(self, number: int, errors: Matrix) -> Matrix:
         """Whitened errors of the blocks, (b, c, ...)."""
-        one = self._recordings[number]
-        whitened: Matrix = np.einsum("bij,bj...->bi...", one.whitening, one.channels(errors))
+        recording = self._recordings[number]
+        whitened: Matrix = np.einsum(
+            "bij,bj...->bi...", recording.whitening, recording.channels(errors)
+        )
         return whitened
 
 
@@ -290,10 +296,12 @@ def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[lis
     left : numbers of columns that are left out.
     """
     parts: list[tuple[list[int], dict[str, float]]] = []
-    for j, column in ((j, one) for j, one in enumerate(columns) if j not in left):
+    for j, column in ((j, column) for j, column in enumerate(columns) if j not in left):
         wanted = column.setting.items()
         able = (
-            one for one in parts if all(one[1].get(name, value) == value for name, value in wanted)
+            part
+            for part in parts
+            if all(part[1].get(name, value) == value for name, value in wanted)
         )
         if (part := next(able, None)) is None:
             parts.append(part := ([], {}))

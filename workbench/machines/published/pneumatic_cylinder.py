@@ -59,7 +59,7 @@ def _read(
     folder: Path,
 ) -> list[PublishedRecording]:
     return [
-        one
+        recording
         for name, path in paths.items()
-        for one in recordings(name, columns_of(folder / path), path)
+        for recording in recordings(name, columns_of(folder / path), path)
     ]

@@ -85,7 +85,7 @@ def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecordi
     time, stroke, p, force = (
         columns[one][_DROPPED:] for one in ("time", "stroke", "pressure", "force")
     )
-    one = PublishedRecording(
+    recording = PublishedRecording(
         name,
         f"Ten strokes at {pressure} bar, seal {seal}",
         {
@@ -104,7 +104,7 @@ def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecordi
         held_out=name.endswith(_HELD_OUT),
         machine=seal,
     )
-    return [one]
+    return [recording]
 
 
 def _theirs(path: Path) -> Columns:

@@ -101,7 +101,7 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
 
 
 def _planting(number: int, folder: Path) -> Planting:
-    path, known = folder / _TRUTH, {one.name: one for one in PLANTABLE}
+    path, known = folder / _TRUTH, {plantable.name: plantable for plantable in PLANTABLE}
     try:
         effects = json.loads(read_text(path, "name another folder"))["effects"]
         gains = dict(_gain(name, told) for name, told in effects.items())

@@ -70,7 +70,7 @@ def covered(
 
     In a stop whose share is low the filter is overconfident, which a mean may hide.
     """
-    shares = [one.share for one in _of_stops(stops, name, quantity)]
+    shares = [stop.share for stop in _of_stops(stops, name, quantity)]
     return float(np.min(shares) if least else np.mean(shares)) if shares else None
 
 
@@ -82,7 +82,7 @@ def needed(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> float |
     predictive inference for regression, J. Amer. Stat. Assoc. 113, 1094-1111, section 5.2 (errors
     over an estimate of their scatter). Each stop counts alike.
     """
-    errors = [one.errors for one in _of_stops(stops, name, quantity)]
+    errors = [stop.errors for stop in _of_stops(stops, name, quantity)]
     return float(np.quantile(np.concatenate(errors), SURE)) if errors else None
 
 
@@ -97,7 +97,7 @@ def needed_bands(stops: Sequence["StopAccuracy"]) -> dict[str, dict[str, float]]
 
 def _of_stops(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> list[Held]:
     bands: list[Mapping[str, Held]] = [stop.estimators[name].bands for stop in stops]
-    return [one[quantity] for one in bands if quantity in one]
+    return [band[quantity] for band in bands if quantity in band]
 
 
 # Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.

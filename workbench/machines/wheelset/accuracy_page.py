@@ -42,8 +42,8 @@ def write_accuracy_page(
             "definitions",
             "Definitions",
             terms={
-                name.replace("_", " "): f"{one['text']} [{one['unit']}]"
-                for name, one in summary["quantities"].items()
+                name.replace("_", " "): f"{quantity['text']} [{quantity['unit']}]"
+                for name, quantity in summary["quantities"].items()
             },
         ),
     ]
@@ -93,12 +93,13 @@ def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
         for quantity in COVERED:
             shares = [covered(stops, name, quantity, least=least) for name in names]
             cells = (
-                number(None if one is None else 100.0 * one, "{:.1f}".format, one) for one in shares
+                number(None if share is None else 100.0 * share, "{:.1f}".format, share)
+                for share in shares
             )
             rows.append((f"{quantity}, {'least' if least else 'mean'}", tuple(cells)))
     columns = (
         Heading("quantity", number=False),
-        *(Heading(f"{one} [%]") for one in names.values()),
+        *(Heading(f"{name} [%]") for name in names.values()),
     )
     caption = (
         "Share of samples in which a 95 % band holds the truth: mean of all stops, and the stop in "
@@ -112,8 +113,11 @@ def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
     for stop in stops:
         forces = (stop.estimators[name].force for name in names)
         cells = tuple(
-            number(None if one is None or not math.isfinite(one) else 100.0 * one, "{:.2f}".format)
-            for one in forces
+            number(
+                None if force is None or not math.isfinite(force) else 100.0 * force,
+                "{:.2f}".format,
+            )
+            for force in forces
         )
         rows.append((stop.name, (Cell(stop.title), *cells)))
     columns = (

@@ -26,7 +26,7 @@ from workbench.pages.views import percent
 from workbench.runtime.files import write_json, write_whole
 from workbench.system.system import System
 
-_QUANTITIES = {one.name: one.metadata for one in fields(Accuracy) if one.metadata}
+_QUANTITIES = {field.name: field.metadata for field in fields(Accuracy) if field.metadata}
 _CELL = 8  # characters, that of "+100.0 %"
 _DIGITS = {"force": 2, "oscillation": 0}  # of percentages, else 1
 
@@ -78,9 +78,9 @@ def write_accuracy(
         "bands": {
             name: {
                 quantity: system.bands.get(name, {}).get(quantity, 1.0) * factor
-                for quantity, factor in one.items()
+                for quantity, factor in needed_band.items()
             }
-            for name, one in needed_bands(stops).items()
+            for name, needed_band in needed_bands(stops).items()
         },
     }
     write_json(path, with_answer(_answer(system, stops), summary))
@@ -129,7 +129,7 @@ def _plain(result: Accuracy) -> dict[str, Any]:
         return {"failure": result.failure}
     values = {name: getattr(result, name) for name in _QUANTITIES}
     plain = {name: _finite(value) for name, value in values.items() if value is not None}
-    shares = {name: one.share for name, one in result.bands.items()}
+    shares = {name: band.share for name, band in result.bands.items()}
     return plain | ({"covers": shares} if shares else {})
 
 
@@ -172,7 +172,9 @@ def _covers(
     stops: Sequence[StopAccuracy], names: Sequence[str], quantity: str, *, least: bool = False
 ) -> str:
     shares = {name: covered(stops, name, quantity, least=least) for name in names}
-    texts = {name: "" if one is None else f"{100.0 * one:.1f} %" for name, one in shares.items()}
+    texts = {
+        name: "" if share is None else f"{100.0 * share:.1f} %" for name, share in shares.items()
+    }
     return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
 
 

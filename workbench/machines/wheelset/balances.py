@@ -69,8 +69,12 @@ def balances(
 def _within(values: Mapping[str, float], slot: str, *parameters: str) -> list[str]:
     """Names of parameters of a slot, wherever its component keeps them: a law has it within."""
     return [
-        next(name for name in values if name.startswith(f"{slot}.") and name.endswith(f".{one}"))
-        for one in parameters
+        next(
+            name
+            for name in values
+            if name.startswith(f"{slot}.") and name.endswith(f".{parameter}")
+        )
+        for parameter in parameters
     ]
 
 

@@ -53,7 +53,7 @@ class PeakForce:
 
     def __init__(self, fmu: FMU, system: System) -> None:
         fmu.start({"omegaW": 0.0, "omegaR": 0.0})
-        rail = next(one for one in system.estimated if one.name == "muWR")
+        rail = next(quantity for quantity in system.estimated if quantity.name == "muWR")
         assert system.fading is not None
         self._slowest = system.fading.half
         self._columns = list(system.columns)

@@ -29,7 +29,7 @@ _USUAL = (
     *("01_dry_80_1.5", "02_dry_100_2.7", "03_dry_120_3.6", "04_dry_160_4.2"),
     *("05_dry_120_2.7_rev", "06_dry_160_3.6_rev"),
 )
-_FIELDS = {one.name: one.metadata for one in dataclasses.fields(Effects)}
+_FIELDS = {field.name: field.metadata for field in dataclasses.fields(Effects)}
 _FILM = {"E0": 0.45e6}
 
 

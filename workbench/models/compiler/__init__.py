@@ -37,7 +37,7 @@ FMI_VERSIONS = (2, 3)
 def source_hash(*libraries: Path) -> str:
     """SHA-256 over all files of libraries, of those that they use, and of the compiler."""
     here = Path(__file__).parent
-    every = dict.fromkeys(one for library in libraries for one in packages(library))
+    every = dict.fromkeys(package for library in libraries for package in packages(library))
     found = [(package.parent, files(package)) for package in every]
     found.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
     parts: list[str | bytes] = []

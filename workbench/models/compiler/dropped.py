@@ -24,8 +24,8 @@ def refuse_dropped(library: Library, reached: Iterable[str]) -> None:
         for extends in library.classes[name].extends:
             _refuse_values(extends.modifier)
         for component in library.classes[name].components:
-            for one in component.modifier.inner.values():
-                _refuse_values(_inside(one))
+            for modification in component.modifier.inner.values():
+                _refuse_values(_inside(modification))
 
 
 def _refuse_redeclarations(library: Library, name: str) -> None:
@@ -33,7 +33,7 @@ def _refuse_redeclarations(library: Library, name: str) -> None:
         if kind not in library.classes:
             continue
         inherited = set(library.components(kind))
-        inherited -= {one.name for one in library.classes[kind].components}
+        inherited -= {component.name for component in library.classes[kind].components}
         for slot, modifier in extends.modifier.inner.items():
             if modifier.redeclared is not None and slot in inherited:
                 raise InputError(

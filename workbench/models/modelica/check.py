@@ -81,16 +81,16 @@ class _Checker:
         if written.constraint:
             self._type(written.constraint, name, written.where)
         seen: dict[str, str] = {}
-        for one in written.components:
-            if one.name in seen:
+        for component in written.components:
+            if component.name in seen:
                 _refuse(
-                    one.where,
-                    f"a second element '{one.name}' of {name}",
-                    f"one, which is in {seen[one.name]}",
+                    component.where,
+                    f"a second element '{component.name}' of {name}",
+                    f"one, which is in {seen[component.name]}",
                     "remove one of the two, or rename it",
                 )
-            seen[one.name] = one.where
-            self._component(one)
+            seen[component.name] = component.where
+            self._component(component)
         for connection in written.connections:
             self._connection(connection, name)
         return tuple(self._reached)
@@ -110,23 +110,23 @@ class _Checker:
                 "remove it",
             )
         parts = self._parts(kind, modifier).values()
-        inner = {one.name for one in parts if "inner" in one.prefixes}
-        for one in parts:
-            if "outer" not in one.prefixes:
-                deeper = self.outside(self._kind(one), one.modifier, (*around, kind))
+        inner = {part.name for part in parts if "inner" in part.prefixes}
+        for part in parts:
+            if "outer" not in part.prefixes:
+                deeper = self.outside(self._kind(part), part.modifier, (*around, kind))
                 yield from (outer for outer in deeper if outer.name not in inner)
-            elif "inner" not in one.prefixes:
-                yield one
+            elif "inner" not in part.prefixes:
+                yield part
 
     # --- what a class declares ---
 
-    def _component(self, one: Component) -> None:
-        kind = self._type(one.type, one.owner, one.where)
-        self._modifier(one.modifier, kind, _NOTHING, inherits=False)
-        if one.constraint:
-            constraint = self._type(one.constraint, one.owner, one.where)
-            self._modifier(one.constraining, constraint, _NOTHING, inherits=False)
-            self._fits(kind, constraint, one)
+    def _component(self, component: Component) -> None:
+        kind = self._type(component.type, component.owner, component.where)
+        self._modifier(component.modifier, kind, _NOTHING, inherits=False)
+        if component.constraint:
+            constraint = self._type(component.constraint, component.owner, component.where)
+            self._modifier(component.constraining, constraint, _NOTHING, inherits=False)
+            self._fits(kind, constraint, component)
 
     def _type(self, name: str, scope: str, where: str) -> str:
         """Dotted name of a class that something is of."""
@@ -171,44 +171,44 @@ class _Checker:
         parts = self._parts(kind, before)
         redeclared = {n: m for n, m in modifier.inner.items() if m.redeclared and n not in parts}
         parts = self.library.modified(parts, Modifier(inner=redeclared))
-        for name, one in modifier.inner.items():
+        for name, modification in modifier.inner.items():
             part = parts.get(name)
             if part is None:
-                self._class(name, one, kind, parts)
+                self._class(name, modification, kind, parts)
                 continue
             if "protected" in part.prefixes and not inherits:
                 _refuse(
-                    one.where,
+                    modification.where,
                     f"a modifier of '{name}', which is protected in {part.owner}",
                     "a public element",
                     f"make '{name}' public, or set it in a class that extends {kind}",
                 )
             if "final" in part.prefixes or part.modifier.final:
                 _refuse(
-                    one.where,
+                    modification.where,
                     f"a modifier of '{name}', which is final in {part.where}",
                     "an element that may change",
                     "remove the modifier, or the 'final'",
                 )
-            if one.redeclared is not None:
-                self._redeclaration(part, one.redeclared)
+            if modification.redeclared is not None:
+                self._redeclaration(part, modification.redeclared)
             else:
-                self._modifier(one, self._kind(part), part.modifier, inherits=False)
+                self._modifier(modification, self._kind(part), part.modifier, inherits=False)
 
     def _attributes(self, modifier: Modifier, predefined: str, kind: str, before: Modifier) -> None:
         known = ATTRIBUTES.get(predefined, frozenset())
-        for name, one in modifier.inner.items():
-            if name not in known or one.inner or one.redeclared is not None:
+        for name, modification in modifier.inner.items():
+            if name not in known or modification.inner or modification.redeclared is not None:
                 unfit = f"'{name}'{closest(name, known)}" if name not in known else f"'{name}(...)'"
                 _refuse(
-                    one.where,
+                    modification.where,
                     f"a modifier {unfit} of {predefined}",
                     f"one of {', '.join(sorted(known)) or 'none'}",
                     "correct or remove it",
                 )
             if self._final(name, kind, before):
                 _refuse(
-                    one.where,
+                    modification.where,
                     f"a modifier '{name}', which is final in {kind}",
                     "an attribute that may change",
                     "remove it, or choose another type",
@@ -224,24 +224,26 @@ class _Checker:
 
     # --- redeclarations ---
 
-    def _class(self, name: str, one: Modifier, kind: str, parts: Mapping[str, Component]) -> None:
+    def _class(
+        self, name: str, modifier: Modifier, kind: str, parts: Mapping[str, Component]
+    ) -> None:
         """Check a modifier of a class within another one."""
         inside = self.library.inside(name, kind)
         if not inside:
             _refuse(
-                one.where,
+                modifier.where,
                 f"a modifier of '{name}', but {kind or 'it'} has no such element"
                 f"{closest(name, parts)}",
                 f"one of {', '.join(parts) or 'none'}",
                 "correct the name, or remove the modifier",
             )
-        if one.redeclared is None:
-            self._modifier(one, inside, _NOTHING, inherits=False)
+        if modifier.redeclared is None:
+            self._modifier(modifier, inside, _NOTHING, inherits=False)
             return
         old = self.library.classes[inside]
         if "replaceable" not in old.prefixes:
-            _not_replaceable(one.where, name, old.where)
-        new = one.redeclared
+            _not_replaceable(modifier.where, name, old.where)
+        new = modifier.redeclared
         made = self._type(new.type, new.owner, new.where)
         self._modifier(new.modifier, made, _NOTHING, inherits=True)
         wanted = self._type(old.constraint, inside, old.where) if old.constraint else inside
@@ -273,19 +275,19 @@ class _Checker:
             return [self._predefined(wanted) or wanted]
         have = self._parts(made, _NOTHING)
         lacking = []
-        for name, one in self._parts(wanted, _NOTHING).items():
-            if "protected" in one.prefixes:
+        for name, part in self._parts(wanted, _NOTHING).items():
+            if "protected" in part.prefixes:
                 continue
             mine = have.get(name)
-            if mine is None or self._lacking(self._kind(mine), self._kind(one), (*around, wanted)):
-                lacking.append(f"{one.type} {name}")
+            if mine is None or self._lacking(self._kind(mine), self._kind(part), (*around, wanted)):
+                lacking.append(f"{part.type} {name}")
         return lacking
 
     def _lineage(self, kind: str) -> tuple[str, ...]:
         return self.library.ancestors(kind) if kind in self.library.classes else ()
 
-    def _kind(self, one: Component) -> str:
-        return self.library.resolve(one.type, one.owner)
+    def _kind(self, component: Component) -> str:
+        return self.library.resolve(component.type, component.owner)
 
     # --- connections ---
 
@@ -347,8 +349,8 @@ class _Checker:
     def _signature(self, kind: str) -> object:
         """What two connectors must share: a predefined type, or names, kinds and what flows."""
         return self._predefined(kind) or {
-            name: (one.prefixes & {"flow", "stream"}, self._signature(self._kind(one)))
-            for name, one in self._parts(kind, _NOTHING).items()
+            name: (part.prefixes & {"flow", "stream"}, self._signature(self._kind(part)))
+            for name, part in self._parts(kind, _NOTHING).items()
         }
 
 

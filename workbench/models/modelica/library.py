@@ -84,7 +84,7 @@ class Library:
         if name not in self._bases:
             self._bases[name] = ()  # while they are looked up, nothing is inherited from them
             self._bases[name] = tuple(
-                self.resolve(one.name, name) for one in self.classes[name].extends
+                self.resolve(extend.name, name) for extend in self.classes[name].extends
             )
         return self._bases[name]
 
@@ -130,10 +130,12 @@ class Library:
     ) -> dict[str, Component]:
         """Components of a class as a modifier leaves them; what it names and is none is ignored."""
         found = dict(components)
-        for key, one in modifier.inner.items():
-            new = one.redeclared
+        for key, modification in modifier.inner.items():
+            new = modification.redeclared
             if key in found and new is None:
-                found[key] = replace(found[key], modifier=_merged(found[key].modifier, one))
+                found[key] = replace(
+                    found[key], modifier=_merged(found[key].modifier, modification)
+                )
             elif key in found and new is not None:
                 found[key] = self._redeclared(found[key], new)
             elif new is not None:  # a class, of which components may be
@@ -237,8 +239,8 @@ def _outward(scope: str) -> list[str]:
 
 def _merged(old: Modifier, new: Modifier) -> Modifier:
     inner = dict(old.inner)
-    for name, one in new.inner.items():
-        inner[name] = _merged(inner[name], one) if name in inner else one
+    for name, modification in new.inner.items():
+        inner[name] = _merged(inner[name], modification) if name in inner else modification
     return Modifier(
         value=new.value or old.value,
         inner=inner,

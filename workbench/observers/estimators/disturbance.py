@@ -245,19 +245,22 @@ class DisturbanceObserver(Estimator):
         """See Estimator."""
         states = corrected_states(fmu, system)
         rows = {name: fmu.units.get(name, "1") for name in states}
-        rows |= {one.correction: one.unit for one in system.estimated}
+        rows |= {quantity.correction: quantity.unit for quantity in system.estimated}
         rates = {f"rate of {name}": quotient(unit, "s") for name, unit in rows.items()}
-        told = feedback_meanings(rates, {one.name: one.unit for one in system.outputs})
+        told = feedback_meanings(rates, {output.name: output.unit for output in system.outputs})
         decays = {
-            f"T_{one.name}": (f"rate at which {one.correction} decays", "1/s")
-            for one in system.estimated
+            f"T_{quantity.name}": (f"rate at which {quantity.correction} decays", "1/s")
+            for quantity in system.estimated
         }
         return told | decays
 
     @classmethod
     def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:
         """Gains of given matrices; see `DisturbanceObserver`."""
-        names = (*matrix_names("L", *L.shape), *(f"T_{one.name}" for one in system.estimated))
+        names = (
+            *matrix_names("L", *L.shape),
+            *(f"T_{quantity.name}" for quantity in system.estimated),
+        )
         return Gains(cls.name, names, np.append(L, T), {"effect": np.asarray(effect)}, source)
 
     @classmethod
@@ -285,21 +288,24 @@ class DisturbanceObserver(Estimator):
                 expected="something to estimate",
                 remedy="add a table [estimated.NAME], or run the open loop: --estimator open_loop",
             )
-        if constant := [one.name for one in system.estimated if one.walk == 0.0]:
+        if constant := [quantity.name for quantity in system.estimated if quantity.walk == 0.0]:
             raise InputError(
                 where=f"{system.source}, [estimated.{constant[0]}] walk, {cls.name}",
                 found="0: a constant, on which a gain that stays must be zero",
                 expected="quantities that walk",
                 remedy="give it a walk, or estimate with a Kalman filter: --estimator ekf",
             )
-        decay = np.array([-1.0 / one.memory for one in system.estimated])
+        decay = np.array([-1.0 / quantity.memory for quantity in system.estimated])
         extended = np.block([[model.A, model.B], [np.zeros((q, s)), np.diag(decay)]])
         of_states = dict(zip(fmu.states, walks(fmu, system), strict=True))
         process = np.array(
-            [*(of_states[name] for name in names), *(one.walk for one in system.estimated)]
+            [
+                *(of_states[name] for name in names),
+                *(quantity.walk for quantity in system.estimated),
+            ]
         )
         # White noise of a continuous signal that, sampled, has the given variance.
-        noise = np.array([one.noise_at_scale for one in system.outputs])
+        noise = np.array([output.noise_at_scale for output in system.outputs])
         measurement = noise * np.sqrt(system.sample_time)
         # In units of the noise, both noise matrices are the identity and the equation well scaled.
         A = extended * process / process[:, None]
@@ -368,8 +374,11 @@ class DisturbanceObserver(Estimator):
 
 def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
     """Effect of each quantity on the rate or output that shows it, at the design point, (q,)."""
-    shown = dict(zip((one.name for one in system.outputs), model.D, strict=True))
+    shown = dict(zip((output.name for output in system.outputs), model.D, strict=True))
     shown |= dict(zip(model.states, model.B, strict=True))
     return np.array(
-        [shown[one.acts_on][i] if one.acts_on else 1.0 for i, one in enumerate(system.estimated)]
+        [
+            shown[quantity.acts_on][i] if quantity.acts_on else 1.0
+            for i, quantity in enumerate(system.estimated)
+        ]
     )

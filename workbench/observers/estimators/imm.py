@@ -49,7 +49,9 @@ class Hypothesis:
 
 def hypotheses(system: System) -> tuple[Hypothesis, ...]:
     """All combinations of choices that set parameters; one without any where none does."""
-    telling = [one for one in system.conditions if one.parameters and not one.count]
+    telling = [
+        condition for condition in system.conditions if condition.parameters and not condition.count
+    ]
     return tuple(
         Hypothesis(
             {one.name: choice for one, choice in zip(telling, chosen, strict=True)},
@@ -69,11 +71,11 @@ def changes(system: System) -> Matrix:
     A choice lasts for a mean time, then each of the others is as likely.
     """
     rates = np.zeros((1, 1))
-    for one in system.conditions:
-        if one.parameters and not one.count:
-            k = len(one.parameters)
+    for condition in system.conditions:
+        if condition.parameters and not condition.count:
+            k = len(condition.parameters)
             # Nothing to change to: a lone choice lasts.
-            each = 1.0 / (one.lasts * (k - 1)) if k > 1 else 0.0
+            each = 1.0 / (condition.lasts * (k - 1)) if k > 1 else 0.0
             own = each * (np.ones((k, k)) - k * np.eye(k))
             rates = np.kron(rates, np.eye(k)) + np.kron(np.eye(len(rates)), own)
     return rates
@@ -237,7 +239,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
         self.modes = tuple(one.name for one in found)
         self.finds = frozenset(name for one in found for name in one.choices)
         super().__init__(fmu, system, gains)
-        names = [one.name for one in system.estimated]
+        names = [quantity.name for quantity in system.estimated]
         filters = [
             ExtendedKalmanFilter(fmu.variant(_held(one, fmu, names)), system, gains)
             for one in found

@@ -576,14 +576,14 @@ class ExtendedKalmanFilter(Estimator):
         system = self.system
         n, q = len(fmu.states), len(system.estimated)
         of_states = gains["model"] * walks(fmu, system)
-        initial = [gains["initial"] * one.spread for one in system.estimated]
+        initial = [gains["initial"] * quantity.spread for quantity in system.estimated]
         learns = learning(system)
         told = float(learns.within < np.inf)
         self._settings: Any = FilterSettings(
             layout=self._layout,
-            relative=np.array([_share(gains, one.name) for one in system.outputs]),
-            floor=np.array([gains[one.name] for one in system.outputs]),
-            walk=np.array([*of_states, *(gains[one.name] for one in system.estimated)]),
+            relative=np.array([_share(gains, output.name) for output in system.outputs]),
+            floor=np.array([gains[output.name] for output in system.outputs]),
+            walk=np.array([*of_states, *(gains[quantity.name] for quantity in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
             learning=learns,
             driven=told * np.array([one.noise for one in system.inputs]),
@@ -613,7 +613,9 @@ class ExtendedKalmanFilter(Estimator):
 
     def _start_values(self) -> Vector:
         """States and deviations of the quantities at the start, (n + q,)."""
-        starts = [self._known.get(one.name, one.start) for one in self.system.estimated]
+        starts = [
+            self._known.get(quantity.name, quantity.start) for quantity in self.system.estimated
+        ]
         begins = np.array(starts) - self._layout.nominal
         return np.concatenate([self.fmu.get_states(), np.nan_to_num(begins)])
 
@@ -627,21 +629,25 @@ class ExtendedKalmanFilter(Estimator):
         for output in cls.fed(system).outputs:
             told[output.name] = f"scatter of {output.name}", output.unit
             told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
-        for one in system.estimated:
-            told[one.name] = f"random walk of {one.name}", f"{one.unit}/sqrt(s)"
+        for quantity in system.estimated:
+            told[quantity.name] = f"random walk of {quantity.name}", f"{quantity.unit}/sqrt(s)"
         return {name: told[name] for name in gains.names}
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:
         """The noise of the sensors and what the system says of states and quantities."""
         outputs = cls.fed(system).outputs
-        levels = {one.name: one.noise for one in outputs}
+        levels = {output.name: output.noise for output in outputs}
         levels |= {
-            f"{one.name}_relative": one.relative_error
-            for one in outputs
-            if one.relative_error > 0.0
+            f"{output.name}_relative": output.relative_error
+            for output in outputs
+            if output.relative_error > 0.0
         }
-        levels |= {"model": 1.0, **{one.name: one.walk for one in system.estimated}, "initial": 1.0}
+        levels |= {
+            "model": 1.0,
+            **{quantity.name: quantity.walk for quantity in system.estimated},
+            "initial": 1.0,
+        }
         return Gains(
             cls.name, tuple(levels), np.array(list(levels.values())), {}, "noise of the sensors"
         )

@@ -163,8 +163,8 @@ class ParameterEstimator(Estimator):
     @classmethod
     def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
         """See Estimator."""
-        rows = {one.correction: one.unit for one in system.estimated}
-        return feedback_meanings(rows, {one.name: one.unit for one in system.outputs})
+        rows = {quantity.correction: quantity.unit for quantity in system.estimated}
+        return feedback_meanings(rows, {output.name: output.unit for output in system.outputs})
 
     @classmethod
     def of(cls, L: Matrix, effect: Vector, source: str = "") -> Gains:
@@ -184,8 +184,8 @@ class ParameterEstimator(Estimator):
         """
         model = linearised(fmu, system)
         (n, q), outputs = model.B.shape, len(model.C)
-        noise = np.array([one.noise_at_scale for one in system.outputs])
-        useful = np.array([one.useful for one in system.estimated])
+        noise = np.array([output.noise_at_scale for output in system.outputs])
+        useful = np.array([quantity.useful for quantity in system.estimated])
         effect = effects(fmu, system, model)
         fastest = 0.1 * np.pi / system.sample_time
         speed, L = fastest, np.zeros((q, 2 * outputs))

@@ -87,7 +87,9 @@ def remembered(estimator: Estimator, sample: Vector) -> Remembered:
 def usual_sample(estimator: Estimator) -> Vector:
     """A sample at which the model is valid, (m + l,): its own start."""
     system, defaults = estimator.system, estimator.fmu.defaults
-    return np.array([defaults.get(one.name, 0.0) for one in (*system.inputs, *system.outputs)])
+    return np.array(
+        [defaults.get(signal.name, 0.0) for signal in (*system.inputs, *system.outputs)]
+    )
 
 
 def said_by_first(estimator: Estimator) -> list[FirstValue]:
@@ -100,7 +102,7 @@ def said_by_first(estimator: Estimator) -> list[FirstValue]:
     """
     usual = usual_sample(estimator)
     signals = (*estimator.system.inputs, *estimator.system.outputs)
-    sizes = np.array([abs(one.scale) or 1.0 for one in signals])
+    sizes = np.array([abs(signal.scale) or 1.0 for signal in signals])
     places, begin = _flat(remembered(estimator, usual))
     # By powers of two, so that what is measured is found without rounding where zero is usual.
     steps = 2.0 ** np.round(np.log2(sizes))

@@ -181,8 +181,10 @@ def _shell(estimator: Estimator) -> StateSpace:
     """The FMU as other tools see it: samples are inputs, entries of an estimate are its states."""
     system, defaults = estimator.system, estimator.fmu.defaults
     inputs = [
-        _variable(one.name, one.unit, f"Measured: {one.label}", defaults.get(one.name, 0.0))
-        for one in (*system.inputs, *system.outputs)
+        _variable(
+            signal.name, signal.unit, f"Measured: {signal.label}", defaults.get(signal.name, 0.0)
+        )
+        for signal in (*system.inputs, *system.outputs)
     ]
     states = _entries(estimator)
     x, u = (ca.vertcat(ca.SX(0, 1), *(one.symbol for one in group)) for group in (states, inputs))
@@ -204,15 +206,18 @@ def _shell(estimator: Estimator) -> StateSpace:
         parameters=[],
         tunable=[],
         outputs=[],
-        state_outputs=[one.name for one in states],
+        state_outputs=[state.name for state in states],
     )
 
 
 def _entries(estimator: Estimator) -> list[FlatVariable]:
     """Entries of an estimate: values, standard deviations, probabilities, and the innovation."""
     system, defaults = estimator.system, estimator.fmu.defaults
-    seen = {one.name: f"{one.name}Estimate" for one in system.outputs}
-    ranges = {one.name: (_finite(one.low), _finite(one.high)) for one in system.estimated}
+    seen = {output.name: f"{output.name}Estimate" for output in system.outputs}
+    ranges = {
+        quantity.name: (_finite(quantity.low), _finite(quantity.high))
+        for quantity in system.estimated
+    }
     values = [
         _variable(
             seen.get(name, name),
@@ -228,7 +233,7 @@ def _entries(estimator: Estimator) -> list[FlatVariable]:
         for name, unit in system.columns.items()
     ]
     modes = [
-        _variable(f"probability_{one}", "1", f"Probability of {one}") for one in estimator.modes
+        _variable(f"probability_{mode}", "1", f"Probability of {mode}") for mode in estimator.modes
     ]
     return [*values, *deviations, *modes, _variable("nis", "1", "Normalised innovation squared")]
 

@@ -86,8 +86,8 @@ def parameter_values(gains: Gains, system: System) -> dict[str, float]:
     """
     values = dict(zip(gains.names, map(float, gains.values), strict=True))
     for name, constants in gains.design.items():
-        for one, value in zip(system.estimated, constants, strict=True):
-            values[f"{name}_{one.name}"] = float(value)
+        for quantity, value in zip(system.estimated, constants, strict=True):
+            values[f"{name}_{quantity.name}"] = float(value)
     return values | ({_HALF: system.fading.half} if system.fading else {})
 
 
@@ -143,7 +143,7 @@ def _rolls(space: StateSpace, system: System) -> tuple[int, int, int, float, int
     if system.rolling is None or system.fading is None:
         return None
     states = [variable.name for variable in space.states]
-    leader = [one.name for one in system.outputs].index(system.rolling.leader)
+    leader = [output.name for output in system.outputs].index(system.rolling.leader)
     return (
         states.index(f"{_PLANT}.{system.rolling.follower}"),
         states.index(f"{_PLANT}.{system.rolling.leader}"),

@@ -52,11 +52,14 @@ def wiring(system: System) -> Wiring:
     own names; the package gives estimates as `nameEstimate`, beside the truth of the machine.
     """
     inputs = {one.name: ("input", one.unit) for one in system.inputs}
-    outputs = {one.name: ("input", one.unit) for one in system.outputs}
-    estimates = {**system.reported, **{one.name: one.unit for one in system.estimated}}
-    seen = {f"{one.name}Estimate": one.unit for one in system.outputs}
-    readings = {one.reading: one.unit for one in (*system.outputs, *system.judged)}
-    shown = {one.name: (one.reading, one.unit) for one in system.judged}
+    outputs = {output.name: ("input", output.unit) for output in system.outputs}
+    estimates = {
+        **system.reported,
+        **{quantity.name: quantity.unit for quantity in system.estimated},
+    }
+    seen = {f"{output.name}Estimate": output.unit for output in system.outputs}
+    readings = {signal.reading: signal.unit for signal in (*system.outputs, *system.judged)}
+    shown = {signal.name: (signal.reading, signal.unit) for signal in system.judged}
     shown |= {name: (name, unit) for name, unit in system.reported.items() if name not in shown}
     truth = {reading: unit for reading, unit in shown.values()}
     return Wiring(
@@ -67,7 +70,7 @@ def wiring(system: System) -> Wiring:
         | _given({f"{name}Estimate": unit for name, unit in estimates.items()}),
         connections=(
             *(("", name, to, name) for name in inputs for to in (_MACHINE, _OBSERVER)),
-            *((_MACHINE, one.reading, _OBSERVER, one.name) for one in system.outputs),
+            *((_MACHINE, output.reading, _OBSERVER, output.name) for output in system.outputs),
             *((_MACHINE, reading, "", name) for name, (reading, _) in shown.items()),
             *((_OBSERVER, name, "", f"{name}Estimate") for name in estimates),
         ),
@@ -166,7 +169,7 @@ def _start_values(system: System) -> str:
     """Text of the file of start values."""
     start = system.export.start
     held = {name: float(formula(system.values)) for name, formula in start.held.items()}
-    measured = [one.name for one in system.outputs if one.name in held]
+    measured = [output.name for output in system.outputs if output.name in held]
     values = {(_MACHINE, name): value for name, value in (held | dict(start.quantities)).items()}
     values |= {(_OBSERVER, name): held[name] for name in measured}  # its first sample
     units = {name: system.unit(name) for _, name in values}

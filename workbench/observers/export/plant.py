@@ -27,9 +27,9 @@ def plant_of(estimator: Estimator) -> StateSpace:
     library = read_library(system.library).name
     name = f"{library}.{system.model(estimator.role).name}"
     space = make_explicit(flatten(system.library, name))
-    states = [one.name for one in space.states]
-    ours = [fmu.names.get(one, one) for one in fmu.states]
-    known = {fmu.names.get(one, one) for one in fmu.defaults}
+    states = [state.name for state in space.states]
+    ours = [fmu.names.get(state, state) for state in fmu.states]
+    known = {fmu.names.get(default, default) for default in fmu.defaults}
     missing = [one.name for one in (*space.parameters, *space.inputs) if one.name not in known]
     if states != ours or missing:
         raise InputError(
@@ -38,7 +38,7 @@ def plant_of(estimator: Estimator) -> StateSpace:
             expected=f"what {name} has, {', '.join(missing or states)}",
             remedy="build the FMU from the library of the system",
         )
-    listed = [one.name for one in space.outputs]
+    listed = [output.name for output in space.outputs]
     read = [listed.index(one) for one in _read(estimator) if one not in states]
     return replace(
         space,
@@ -63,7 +63,7 @@ def plant_code(plant: StateSpace, estimator: Estimator) -> dict[str, str]:
             outputs.append(len(unknown) - len(states))
             unknown.append(len(states) + column)
     ours = {theirs: name for name, theirs in fmu.names.items()}
-    names = [ours.get(one.name, one.name) for one in plant.parameters]
+    names = [ours.get(parameter.name, parameter.name) for parameter in plant.parameters]
     parameters = tuple(
         np.array([model.defaults[name] for name in names] or [0.0]) for model in estimator.models
     )
@@ -87,7 +87,7 @@ def plant_code(plant: StateSpace, estimator: Estimator) -> dict[str, str]:
 def _read(estimator: Estimator) -> list[str]:
     """The model's names of outputs that the law reads."""
     system, fmu = estimator.system, estimator.fmu
-    unseen = [one.name for one in system.outputs if one.name not in fmu.states]
+    unseen = [output.name for output in system.outputs if output.name not in fmu.states]
     return [fmu.names.get(name, name) for name in (*system.reported, *unseen)]
 
 

@@ -60,15 +60,15 @@ def read_clock(
     if step is not None:
         return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
     if named is not None:
-        found = next((one for one in group.channels if one.name == named.channel), None)
+        found = next((channel for channel in group.channels if channel.name == named.channel), None)
         if found is not None:
             return _going_on(_named(found, named, system, where), where)
     if group.time is not None:
         one = group.time
         return _going_on(Clock("", one.values, one.start, "s", "the file says it", True), where)
     # Stamps are often coarser than a counted time beside them.
-    channels = sorted(group.channels, key=lambda one: one.stamp)
-    clocks = [clock for one in channels if (clock := _candidate(one, group, system))]
+    channels = sorted(group.channels, key=lambda channel: channel.stamp)
+    clocks = [clock for channel in channels if (clock := _candidate(channel, group, system))]
     for clock in clocks:
         if clock.certain and _increases(clock.times):
             return clock
@@ -89,12 +89,12 @@ def read_clock(
 
 def _no_time(group: Group, system: System, where: str) -> InputError:
     """What a group has in place of times."""
-    found, name = f"no time among {listed([one.name for one in group.channels])}", "NAME"
-    for one in group.channels:
-        if not one.unit and is_time(one.name):
-            units = _unstated(one.values, system)
+    found, name = f"no time among {listed([channel.name for channel in group.channels])}", "NAME"
+    for channel in group.channels:
+        if not channel.unit and is_time(channel.name):
+            units = _unstated(channel.values, system)
             likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
-            found, name = f"'{one.name}' without a unit, {likely}", one.name
+            found, name = f"'{channel.name}' without a unit, {likely}", channel.name
     return InputError(
         where=where,
         found=found,

@@ -168,7 +168,7 @@ def _by_name(
                     doubts[signal.name] = doubt
     settled = set(assigned)
     for level in found.values():
-        taken = {id(one.channel) for one in assigned.values()}
+        taken = {id(assignment.channel) for assignment in assigned.values()}
         left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
         for signal, one in left:
             rivals = [o.label for s, o in left if s is signal]
@@ -190,7 +190,7 @@ def _by_unit(
     system: System,
 ) -> dict[str, Assigned]:
     """The only channel that has its unit, for each signal that alone lacks one of it."""
-    taken = {id(one.channel) for one in assigned.values()}
+    taken = {id(assignment.channel) for assignment in assigned.values()}
     fitting = [
         (signal, one)
         for signal in signals

@@ -65,12 +65,14 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     """
     starts = _starts(files, proposal)
     tracks = [
-        _track(system.signals[name], one, proposal, starts[one.file, one.group])
-        for name, one in proposal.assigned.items()
+        _track(
+            system.signals[name], assignment, proposal, starts[assignment.file, assignment.group]
+        )
+        for name, assignment in proposal.assigned.items()
     ]
-    outputs = {one.name for one in system.outputs}
-    slowest = max((one for one in tracks if one.signal.name in outputs), key=lambda t: t.step)
-    asked = [one for one in tracks if one.signal not in system.aids]
+    outputs = {output.name for output in system.outputs}
+    slowest = max((track for track in tracks if track.signal.name in outputs), key=lambda t: t.step)
+    asked = [track for track in tracks if track.signal not in system.aids]
     begin = max(float(one.times[0]) for one in asked)
     end = min(float(one.times[-1]) for one in asked)
     inside = (slowest.times >= begin) & (slowest.times <= end)
@@ -78,26 +80,28 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     limit = system.sampling.gap if math.isfinite(system.sampling.gap) else system.comparison.block
     known = np.ones(time.size, dtype=bool)
     notes = [
-        f"{one.signal.name}: {one.missing} samples without a value" for one in tracks if one.missing
+        f"{track.signal.name}: {track.missing} samples without a value"
+        for track in tracks
+        if track.missing
     ]
     if cut := int((~inside).sum()):
         notes.append(f"{cut} samples at the ends, where not all channels have any, were left out")
     signals: dict[str, Vector] = {}
-    for one in tracks:
-        values, near = _at(one, time, max(limit, _LATE * one.step))
-        if one in asked:
+    for track in tracks:
+        values, near = _at(track, time, max(limit, _LATE * track.step))
+        if track in asked:
             known &= near
         else:
             values = np.where(near, values, np.nan)
-        signals[one.signal.name] = values
-        if not np.isin(time, one.times).all():
-            way = "held" if one.signal.held else "interpolated"
-            notes.append(f"{one.signal.name}: {way} from samples every {one.step:.6g} s")
+        signals[track.signal.name] = values
+        if not np.isin(time, track.times).all():
+            way = "held" if track.signal.held else "interpolated"
+            notes.append(f"{track.signal.name}: {way} from samples every {track.step:.6g} s")
     if gone := int((~known).sum()):
         notes.append(f"{gone} samples in gaps of more than {limit:g} s were left out")
     if known.sum() < 2:
         raise InputError(
-            where=", ".join(str(one.path) for one in files),
+            where=", ".join(str(file.path) for file in files),
             found=f"channels with {int(known.sum())} samples at common times",
             expected="channels that were recorded at the same time",
             remedy="give the files of one recording together, and others apart",
@@ -105,7 +109,7 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     signals = {name: values[known] for name, values in signals.items()}
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
     zero = min(begun, default=math.nan)
-    damaged = [f"{one.path}: {doubt}" for one in files for doubt in one.doubts]
+    damaged = [f"{file.path}: {doubt}" for file in files for doubt in file.doubts]
     doubts = *damaged, *proposal.contradictions, *_mixed(files, proposal)
     return Measured(time[known], signals, zero, tuple(notes), doubts)
 
@@ -157,13 +161,13 @@ def _starts(
     return {key: clock.start - first for key, clock in clocks.items()}
 
 
-def _track(signal: Signal, one: Assigned, proposal: ProposedMapping, start: float) -> _Track:
-    times = proposal.clocks[one.file, one.group].times + start
-    values = one.values
+def _track(signal: Signal, assigned: Assigned, proposal: ProposedMapping, start: float) -> _Track:
+    times = proposal.clocks[assigned.file, assigned.group].times + start
+    values = assigned.values
     held = np.isfinite(times) & np.isfinite(values)
     if held.sum() < 2:
         raise InputError(
-            where=f"channel '{one.channel.name}'",
+            where=f"channel '{assigned.channel.name}'",
             found=f"{int(held.sum())} samples",
             expected=f"samples of {signal.label}",
             remedy="name another channel",

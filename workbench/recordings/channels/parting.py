@@ -73,10 +73,10 @@ def _tried(
 
 def _names_a_group(told: Told, files: Sequence[RecordedFile]) -> bool:
     """Whether the user chooses among groups: GROUP/NAME."""
-    groups = [group for one in files for group in one.groups]
+    groups = [group for file in files for group in file.groups]
     names = {channel.name for group in groups for channel in group.channels}
     full = {f"{group.name}/{channel.name}" for group in groups for channel in group.channels}
-    return any(one.channel in full - names for one in told.columns.values())
+    return any(column.channel in full - names for column in told.columns.values())
 
 
 def _doubted(
@@ -117,7 +117,7 @@ def _apart(
 
 
 def _needed(system: System) -> list[str]:
-    return [one.name for one in (*system.inputs, *system.outputs)]
+    return [signal.name for signal in (*system.inputs, *system.outputs)]
 
 
 def _alike(tried: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
@@ -132,14 +132,14 @@ def _alike(tried: Sequence[ProposedRecording], system: System) -> list[ProposedR
     return max(complete or several, key=len, default=[])
 
 
-def _signature(one: ProposedRecording, system: System) -> _Signature:
+def _signature(recording: ProposedRecording, system: System) -> _Signature:
     """Channels of all signals that are needed; where some have none, the names of all channels.
 
     A unit that was named for all sheets is not taken for one that states another.
     """
-    named, proposal = one.proposal.named, one.proposal
+    named, proposal = recording.proposal.named, recording.proposal
     needed = tuple((name, named[name]) for name in (TIME, *_needed(system)) if name in named)
-    names = _names(one.files[0]) if proposal.problems else frozenset()
+    names = _names(recording.files[0]) if proposal.problems else frozenset()
     return needed, proposal.contradictions, names
 
 
@@ -199,9 +199,11 @@ def _refusal(
     )
 
 
-def _differences(one: ProposedRecording, other: ProposedRecording, system: System) -> Iterator[str]:
+def _differences(
+    recording: ProposedRecording, other: ProposedRecording, system: System
+) -> Iterator[str]:
     """Channels that are not those of another recording, in words."""
-    named, others = one.proposal.named, other.proposal.named
+    named, others = recording.proposal.named, other.proposal.named
     for signal in (TIME, *_needed(system)):
         if signal in named and named[signal] != others.get(signal):
             own, theirs = (

@@ -45,14 +45,18 @@ class ProposedMapping:
     @property
     def certain(self) -> bool:
         """Whether it follows from names and units alone."""
-        own = all(one.certain for one in self.assigned.values())
-        return not self.problems and own and all(one.certain for one in self.clocks.values())
+        own = all(assignment.certain for assignment in self.assigned.values())
+        return not self.problems and own and all(clock.certain for clock in self.clocks.values())
 
     @property
     def doubts(self) -> list[str]:
         """What somebody must confirm, in words: nobody has said it, nor does a file."""
-        found = [f"{name}: {one.doubt}" for name, one in self.assigned.items() if one.doubt]
-        times = {one.channel: one.unit for one in self.clocks.values() if not one.certain}
+        found = [
+            f"{name}: {assignment.doubt}"
+            for name, assignment in self.assigned.items()
+            if assignment.doubt
+        ]
+        times = {clock.channel: clock.unit for clock in self.clocks.values() if not clock.certain}
         return found + [
             f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
         ]
@@ -60,7 +64,7 @@ class ProposedMapping:
     @property
     def named(self) -> dict[str, NamedChannel]:
         """As it is stored."""
-        found = {name: one.named for name, one in self.assigned.items()}
+        found = {name: assignment.named for name, assignment in self.assigned.items()}
         for clock in self.clocks.values():
             if clock.channel:
                 found.setdefault(
@@ -90,7 +94,7 @@ def propose(
         holds a signal has no time.
     """
     places = _places(files)
-    where = ", ".join(str(one.path) for one in files)
+    where = ", ".join(str(file.path) for file in files)
     assigned = {
         name: _as_named(one, system.signals[name], places, system, where)
         for name, one in given.items()
@@ -101,25 +105,25 @@ def propose(
         _find(given[TIME], TIME, places, where)
     times = {given[TIME].channel} if TIME in given else set()
     free = [
-        one
-        for one in places
-        if one.channel.name not in times
-        and not one.channel.stamp
-        and all(one.channel is not other.channel for other in assigned.values())
+        place
+        for place in places
+        if place.channel.name not in times
+        and not place.channel.stamp
+        and all(place.channel is not other.channel for other in assigned.values())
     ]
     assigned, doubts = match(assigned, free, system)
     problems = tuple(
-        f"{one.name}: {doubts.get(one.name, 'no channel whose name or unit tells')}"
-        for one in (*system.inputs, *system.outputs)
-        if one.name not in assigned
+        f"{signal.name}: {doubts.get(signal.name, 'no channel whose name or unit tells')}"
+        for signal in (*system.inputs, *system.outputs)
+        if signal.name not in assigned
     )
     unmatched = tuple(
-        f"{one.name}: {doubts[one.name]}"
-        for one in system.judged
-        if one.name in doubts and one.name not in assigned
+        f"{signal.name}: {doubts[signal.name]}"
+        for signal in system.judged
+        if signal.name in doubts and signal.name not in assigned
     )
     clocks = _clocks(assigned, files, given.get(TIME), step, system)
-    taken = {id(one.channel) for one in assigned.values()}
+    taken = {id(assignment.channel) for assignment in assigned.values()}
     timed = {clock.channel for clock in clocks.values()}
     left = [p for p in places if id(p.channel) not in taken and p.channel.name not in timed]
     shown = tuple(f"{p.label} [{p.channel.unit}]" if p.channel.unit else p.label for p in left)
@@ -131,8 +135,8 @@ def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
     """All channels, each with a name that no other has, if groups have names."""
     found = [
         (i, j, group, channel)
-        for i, one in enumerate(files)
-        for j, group in enumerate(one.groups)
+        for i, file in enumerate(files)
+        for j, group in enumerate(file.groups)
         for channel in group.channels
     ]
     counts = Counter(channel.name for *_, channel in found)
@@ -145,10 +149,10 @@ def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
 
 
 def _find(
-    one: NamedChannel, signal: str, places: Sequence[PlacedChannel], where: str
+    channel: NamedChannel, signal: str, places: Sequence[PlacedChannel], where: str
 ) -> PlacedChannel:
     """The place that a user names."""
-    name = one.channel
+    name = channel.channel
     found = [place for place in places if place.channel.name == name]
     found = found or [place for place in places if name in (place.label, place.full)]
     found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
@@ -167,19 +171,23 @@ def _find(
 
 
 def _as_named(
-    one: NamedChannel, signal: Signal, places: Sequence[PlacedChannel], system: System, where: str
+    channel: NamedChannel,
+    signal: Signal,
+    places: Sequence[PlacedChannel],
+    system: System,
+    where: str,
 ) -> Assigned:
     """The channel that a user names for a signal."""
-    place = _find(one, signal.name, places, where)
-    unit = stated = one.unit or place.channel.unit
+    place = _find(channel, signal.name, places, where)
+    unit = stated = channel.unit or place.channel.unit
     if not stated:
         fitting = fitting_units(place.channel, signal, system)
         unit = fitting[0] if len(fitting) == 1 else ""
     concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system) if unit else None
     if way is None:
-        raise _no_unit_of(signal, place, unit, stated_by_user=bool(one.unit), where=where)
-    turn = -1.0 if one.reversed else 1.0
+        raise _no_unit_of(signal, place, unit, stated_by_user=bool(channel.unit), where=where)
+    turn = -1.0 if channel.reversed else 1.0
     scale, formula = way
     return Assigned(
         place.file,
@@ -192,7 +200,7 @@ def _as_named(
         formula,
         unit_reason("named", unit, concluded),
         certain=not concluded,
-        concluded=concluded or bool(one.unit),
+        concluded=concluded or bool(channel.unit),
         doubt=unconfirmed(signal.name, place.label, unit) if concluded else "",
     )
 
@@ -222,15 +230,15 @@ def _no_unit_of(
 def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
     """Refuse one channel that is named for two signals."""
     taken: dict[int, str] = {}
-    for signal, one in assigned.items():
-        if id(one.channel) in taken:
+    for signal, assignment in assigned.items():
+        if id(assignment.channel) in taken:
             raise InputError(
-                where=f"{where}, channel '{one.label}'",
-                found=f"it stands for {taken[id(one.channel)]} and for {signal}",
+                where=f"{where}, channel '{assignment.label}'",
+                found=f"it stands for {taken[id(assignment.channel)]} and for {signal}",
                 expected="a channel of its own for each signal",
                 remedy=f"correct one of the two, --column '{signal}=NAME'",
             )
-        taken[id(one.channel)] = signal
+        taken[id(assignment.channel)] = signal
 
 
 def _clocks(
@@ -248,7 +256,9 @@ def _clocks(
         If a group has none, or one rate is that of unlike numbers of samples in one file.
     """
     clocks: dict[tuple[int, int], Clock] = {}
-    for i, j in dict.fromkeys((one.file, one.group) for one in assigned.values()):
+    for i, j in dict.fromkeys(
+        (assignment.file, assignment.group) for assignment in assigned.values()
+    ):
         group = files[i].groups[j]
         at = str(files[i].path) + (f", '{group.name}'" if group.name else "")
         clocks[i, j] = read_clock(group, named, step, system, at)
@@ -279,7 +289,9 @@ def _contradictions(
         if one.channel.unit and ways[0] != ways[1]:
             yield _contradiction(files[one.file], one.label, one.unit, one.channel.unit)
     for (i, j), clock in clocks.items():
-        stated = {one.name: one.unit for one in files[i].groups[j].channels}.get(clock.channel)
+        stated = {channel.name: channel.unit for channel in files[i].groups[j].channels}.get(
+            clock.channel
+        )
         if stated and conversion(clock.unit, "s") != conversion(stated, "s"):
             yield _contradiction(files[i], clock.channel, clock.unit, stated)
 

@@ -23,7 +23,7 @@ def has_own_names(path: Path, system: System) -> bool:
     except OSError:
         return True  # the strict reader says what is wrong
     names = {header(cell)[0] for cell in re.split("[,;\t]", line)}
-    return {TIME, *(one.name for one in (*system.inputs, *system.outputs))} <= names
+    return {TIME, *(signal.name for signal in (*system.inputs, *system.outputs))} <= names
 
 
 def read_measured(
@@ -60,11 +60,11 @@ def read_measured(
 
 def _unsure(path: Path, proposal: ProposedMapping) -> InputError:
     proposed = [
-        f"{name} = {one.channel.name} [{one.unit}]"
-        for name, one in proposal.assigned.items()
-        if not one.certain
+        f"{name} = {assignment.channel.name} [{assignment.unit}]"
+        for name, assignment in proposal.assigned.items()
+        if not assignment.certain
     ]
-    found = [*proposal.problems, *(f"perhaps {one}" for one in proposed)]
+    found = [*proposal.problems, *(f"perhaps {proposal}" for proposal in proposed)]
     found += [
         f"perhaps time = {clock.channel} [{clock.unit}]"
         if clock.channel

@@ -84,5 +84,5 @@ def _once(lists: Iterable[Iterable[str]]) -> list[str]:
 
 def where(files: Sequence[RecordedFile], name: str) -> str:
     """Files and the part of them that is meant, for messages."""
-    paths = ", ".join(str(one.path) for one in files)
+    paths = ", ".join(str(file.path) for file in files)
     return f"{paths}, '{name}'" if name else paths

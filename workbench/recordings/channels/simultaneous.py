@@ -44,8 +44,8 @@ def at_one_time(parts: Sequence[ProposedRecording], system: System) -> str:
 
     Times that count from a zero within them are of a recording of their own.
     """
-    spans = [_span(one) for one in parts]
-    rows = [_rows(one, system) for one in parts]
+    spans = [_span(part) for part in parts]
+    rows = [_rows(part, system) for part in parts]
     for i, j in combinations(range(len(parts)), 2):
         names = f"'{parts[i].name}' and '{parts[j].name}'"
         one, other = spans[i], spans[j]
@@ -56,10 +56,10 @@ def at_one_time(parts: Sequence[ProposedRecording], system: System) -> str:
     return ""
 
 
-def _span(one: ProposedRecording) -> _Span | None:
+def _span(recording: ProposedRecording) -> _Span | None:
     """When a part was recorded; None: its times count from a zero of their own."""
-    for key, clock in one.proposal.clocks.items():
-        group = one.files[key[0]].groups[key[1]]
+    for key, clock in recording.proposal.clocks.items():
+        group = recording.files[key[0]].groups[key[1]]
         shown = [c for c in (group.time, *group.channels) if c is not None and _is_dated(c)]
         times, zero, kind = clock.times, 0.0, _CLOCK
         if shown:
@@ -79,12 +79,12 @@ def _is_dated(channel: FileChannel) -> bool:
     return bool(np.isfinite(channel.start) or np.isfinite(channel.shown))
 
 
-def _same_output(one: ProposedRecording, other: ProposedRecording, system: System) -> str:
+def _same_output(recording: ProposedRecording, other: ProposedRecording, system: System) -> str:
     """An output that goes the same way in both, counted from their first samples; or none."""
     for signal in system.outputs:
-        if not all(signal.name in part.proposal.assigned for part in (one, other)):
+        if not all(signal.name in part.proposal.assigned for part in (recording, other)):
             continue
-        (t, x), (u, y) = (_samples(part, signal.name) for part in (one, other))
+        (t, x), (u, y) = (_samples(part, signal.name) for part in (recording, other))
         near = u <= t[-1]
         with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
             spread = float(np.std(y[near]))
@@ -96,8 +96,8 @@ def _same_output(one: ProposedRecording, other: ProposedRecording, system: Syste
 
 def _samples(part: ProposedRecording, signal: str) -> tuple[Vector, Vector]:
     """Times from the first sample [s], and values, SI, where there are any."""
-    one = part.proposal.assigned[signal]
-    times, values = part.proposal.clocks[one.file, one.group].times, one.values
+    assignment = part.proposal.assigned[signal]
+    times, values = part.proposal.clocks[assignment.file, assignment.group].times, assignment.values
     held = np.isfinite(times) & np.isfinite(values)
     if not held.any():
         return np.zeros(1), np.zeros(1)
@@ -106,7 +106,7 @@ def _samples(part: ProposedRecording, signal: str) -> tuple[Vector, Vector]:
 
 def _rows(part: ProposedRecording, system: System) -> Vector:
     """A number for each row of signals that differs from all others; empty if rates differ."""
-    needed = [one.name for one in (*system.inputs, *system.outputs)]
+    needed = [signal.name for signal in (*system.inputs, *system.outputs)]
     held = [part.proposal.assigned[name] for name in needed if name in part.proposal.assigned]
     if not held or len({(one.file, one.group) for one in held}) > 1:
         return np.empty(0)

@@ -53,7 +53,7 @@ def usable(
 ) -> dict[str, NamedChannel]:
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
-    for group in (group for one in files for group in one.groups):
+    for group in (group for file in files for group in file.groups):
         for channel in group.channels:
             units[channel.name] = units[f"{group.name}/{channel.name}"] = channel.unit
     return {

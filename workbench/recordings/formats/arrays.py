@@ -96,7 +96,9 @@ def _units(content: Mapping[str, Any]) -> dict[str, str]:
 
 def _entry(content: Mapping[str, Any], names: tuple[str, ...]) -> tuple[str, Any]:
     """Key and value of the first entry that has one of some names."""
-    return next(((key, one) for key, one in content.items() if key.lower() in names), ("", None))
+    return next(
+        ((key, entry) for key, entry in content.items() if key.lower() in names), ("", None)
+    )
 
 
 def _timed(name: str, content: Mapping[str, Any]) -> Group | None:

@@ -53,9 +53,9 @@ def _structures(group: h5py.Group, file: h5py.File) -> list[dict[str, Any]]:
     fields = dict(group.items())
     if _class_of(group) != "struct" or not all(map(_refers, fields.values())):
         return []
-    if len({one.size for one in fields.values()}) != 1:
+    if len({field.size for field in fields.values()}) != 1:
         return []
-    rows = zip(*(np.ravel(one[()]) for one in fields.values()), strict=True)
+    rows = zip(*(np.ravel(field[()]) for field in fields.values()), strict=True)
     return [_entries({k: file[r] for k, r in zip(fields, row, strict=True)}, file) for row in rows]
 
 

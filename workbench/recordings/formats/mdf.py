@@ -53,11 +53,11 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
     master = file.masters_db.get(index)
     clock: FileChannel | None = None
     channels: list[FileChannel] = []
-    for number, one in enumerate(held.channels):
+    for number, channel in enumerate(held.channels):
         if number == master:
             continue
         signal = file.get(group=index, index=number, ignore_invalidation_bits=True)
-        name, unit = named(one.name)
+        name, unit = named(channel.name)
         if signal.samples.dtype.kind not in "fiub" or signal.samples.ndim > 1:
             notes.append(f"'{name}' holds no numbers")
             continue

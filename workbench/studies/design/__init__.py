@@ -67,16 +67,20 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
         ranked = chosen(_foreseen(system, pool, plan))
         near = [
-            one
+            other_setting
             for best in ranked[:_SETTINGS]
-            for one in other_settings(experiments, best.candidate)
+            for other_setting in other_settings(experiments, best.candidate)
         ]
         beside = [one for one in every if one in near and one not in plan]
         if beside:
             report(f"{len(beside)} others that differ from the best {_SETTINGS} in one setting")
             ranked = chosen([*ranked, *_foreseen(system, pool, beside)])
         best = [one.candidate for one in ranked[:_SETTINGS]]
-        more = [one for setting in best for one in other_profiles(experiments, setting)]
+        more = [
+            other_profile
+            for setting in best
+            for other_profile in other_profiles(experiments, setting)
+        ]
         if more:
             report(f"{len(more)} profiles with the best {len(best)}")
             ranked = chosen([*ranked, *_foreseen(system, pool, more)])
@@ -203,7 +207,7 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
         tasks += [pool.submit(Foresight.confirm, one, number) for number, one in some]
         found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
         judged, left = left[: len(found)], left[len(found) :]
-        doubtful += [one for one, well in zip(judged, found, strict=True) if well is None]
+        doubtful += [signal for signal, well in zip(judged, found, strict=True) if well is None]
         sure = [one for one in found if one is not None]
         if not sure:
             continue
@@ -216,7 +220,9 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
     return [*confirmed, *left, *doubtful]
 
 
-def _proposal(system: System, experiments: Experiments, one: Prediction) -> RankedExperiment:
-    duration = float(one.case.time[-1] - one.case.time[0])
-    cost = float(experiments.cost.formula({**one.candidate.numbers, "duration": duration}))
-    return RankedExperiment(one.candidate.text(system), cost, experiments.cost.unit, one)
+def _proposal(system: System, experiments: Experiments, prediction: Prediction) -> RankedExperiment:
+    duration = float(prediction.case.time[-1] - prediction.case.time[0])
+    cost = float(experiments.cost.formula({**prediction.candidate.numbers, "duration": duration}))
+    return RankedExperiment(
+        prediction.candidate.text(system), cost, experiments.cost.unit, prediction
+    )

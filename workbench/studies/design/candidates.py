@@ -91,7 +91,7 @@ class Experiment:
     @property
     def numbers(self) -> dict[str, float]:
         """Settings that are numbers, SI."""
-        values = {name: one.value for name, one in self.settings.items()}
+        values = {name: setting.value for name, setting in self.settings.items()}
         return {name: v for name, v in values.items() if isinstance(v, int | float)}
 
     def text(self, system: System) -> str:
@@ -102,7 +102,7 @@ class Experiment:
             f"{besides[name] if name in besides else system.condition(name).label} {setting.text}"
             for name, setting in self.settings.items()
         ]
-        return "; ".join([*said, *(one.text(system) for one in self.profiles)])
+        return "; ".join([*said, *(profile.text(system) for profile in self.profiles)])
 
 
 def every_setting(experiments: Experiments) -> list[Experiment]:
@@ -128,20 +128,24 @@ def some_settings(experiments: Experiments) -> list[Experiment]:
     return [one for one, at in zip(plan, numbers, strict=True) if sum(at) % parts == 0]
 
 
-def other_settings(experiments: Experiments, one: Experiment) -> list[Experiment]:
+def other_settings(experiments: Experiments, experiment: Experiment) -> list[Experiment]:
     """All that differ from an experiment in one setting."""
     return [
-        replace(one, settings={**one.settings, name: value})
+        replace(experiment, settings={**experiment.settings, name: value})
         for name, values in experiments.settings.items()
         for value in values
-        if value != one.settings[name]
+        if value != experiment.settings[name]
     ]
 
 
-def other_profiles(experiments: Experiments, one: Experiment) -> list[Experiment]:
+def other_profiles(experiments: Experiments, experiment: Experiment) -> list[Experiment]:
     """All other profiles, with the settings of an experiment."""
     every = product(*(_profiles(varied) for varied in experiments.varied))
-    return [replace(one, profiles=followed) for followed in every if followed != one.profiles]
+    return [
+        replace(experiment, profiles=followed)
+        for followed in every
+        if followed != experiment.profiles
+    ]
 
 
 def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
@@ -153,22 +157,34 @@ def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
     return Experiment(settings, tuple(some[rng.integers(len(some))] for some in profiles))
 
 
-def _profiles(one: VariedInput) -> list[Profile]:
+def _profiles(varied_input: VariedInput) -> list[Profile]:
     """Stairs begun at either end; sines; steps to the ends of the range and between them.
 
     What is released was so from the upper end, and between them.
     """
-    low, high = one.low, one.high
+    low, high = varied_input.low, varied_input.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()
     stairs = (*rising, *rising[-2:0:-1])
     found = []
-    if STAIRCASE in one.profiles:
+    if STAIRCASE in varied_input.profiles:
         falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
-        found += [Profile(one, STAIRCASE, levels, one.every) for levels in (stairs, falling)]
-    if SINE in one.profiles:
-        found += [Profile(one, SINE, (low, high), times * one.every) for times in (1.0, 2.0)]
-    if STEP in one.profiles:
-        found += [Profile(one, STEP, (to,), one.every) for to in (low, 0.5 * (low + high), high)]
-    if RELEASE in one.profiles:
-        found += [Profile(one, RELEASE, (to,), one.every) for to in (0.5 * (low + high), high)]
+        found += [
+            Profile(varied_input, STAIRCASE, levels, varied_input.every)
+            for levels in (stairs, falling)
+        ]
+    if SINE in varied_input.profiles:
+        found += [
+            Profile(varied_input, SINE, (low, high), times * varied_input.every)
+            for times in (1.0, 2.0)
+        ]
+    if STEP in varied_input.profiles:
+        found += [
+            Profile(varied_input, STEP, (to,), varied_input.every)
+            for to in (low, 0.5 * (low + high), high)
+        ]
+    if RELEASE in varied_input.profiles:
+        found += [
+            Profile(varied_input, RELEASE, (to,), varied_input.every)
+            for to in (0.5 * (low + high), high)
+        ]
     return found

@@ -17,7 +17,9 @@ def left_claims(case: Case, system: System) -> set[str] | None:
     counted = _counted(case, system, restarting=False)
     if counted is None:
         return None
-    reasons = [one.reason for one in system.comparison.exclusions if not one.to_the_end]
+    reasons = [
+        exclusion.reason for exclusion in system.comparison.exclusions if not exclusion.to_the_end
+    ]
     return {reason for reason in reasons if counted.excluded[reason].any()}
 
 

@@ -44,28 +44,28 @@ class Foresight:
             return None
         return predicted(asked, self._derived, candidate, case, in_full=in_full)
 
-    def confirm(self, one: Prediction, number: int) -> Prediction | None:
+    def confirm(self, prediction: Prediction, number: int) -> Prediction | None:
         """The same with models fitted again in full; None where not all rivals claim it alike.
 
         They do where all stay within what the system claims, or leave it for the same reasons. What
         one of them alone takes out of the claims is foreseen by none.
         """
         asked = self._asked
-        first = left_claims(one.case, asked.system)
+        first = left_claims(prediction.case, asked.system)
         if first is None:
             return None
         for rival in asked.rivals.models[1:]:
-            other = self._recorded(asked, one.candidate, rival, number)
+            other = self._recorded(asked, prediction.candidate, rival, number)
             if left_claims(other, asked.system) != first:
                 return None
-        return predicted(asked, self._derived, one.candidate, one.case, in_full=True)
+        return predicted(asked, self._derived, prediction.candidate, prediction.case, in_full=True)
 
     def _recorded(self, asked: Outlook, candidate: Experiment, rival: Rival, number: int) -> Case:
         """A recording of an experiment as a rival predicts it."""
         system, experiments = asked.system, asked.experiments
-        added = {one.name for one in experiments.sensors}
+        added = {sensor.name for sensor in experiments.sensors}
         named = {*asked.rivals.signals, *added}
-        judged = tuple(one.name for one in system.judged if one.name in named)
+        judged = tuple(signal.name for signal in system.judged if signal.name in named)
         values = _values(asked, candidate, rival)
         rest = (f"{number:03}", judged, number)
         return recorded(self._model, system, experiments, candidate, values, *rest)

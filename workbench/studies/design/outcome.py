@@ -46,8 +46,12 @@ class RankedExperiment:
             "cost": {"value": self.cost, "unit": self.unit},
             "duration": float(found.case.time[-1] - found.case.time[0]),
             "inputs": {
-                one.input.name: {"profile": one.kind, "levels": one.levels, "every": one.every}
-                for one in found.candidate.profiles
+                profile.input.name: {
+                    "profile": profile.kind,
+                    "levels": profile.levels,
+                    "every": profile.every,
+                }
+                for profile in found.candidate.profiles
             },
             "conditions": {
                 name: list(value) if isinstance(value, tuple) else value
@@ -88,7 +92,7 @@ class NextStop:
     @property
     def names(self) -> tuple[str, ...]:
         """The rivals, by their causes."""
-        return tuple(" with ".join(one.effects) for one in self.rivals.models)
+        return tuple(" with ".join(model.effects) for model in self.rivals.models)
 
     @property
     def parts(self) -> bool:
@@ -121,8 +125,8 @@ class NextStop:
     def summary(self) -> str:
         """The answer and the best experiments, for people."""
         lines = [self.sentence]
-        for number, one in enumerate(self.proposals, 1):
-            lines += [f"{number}. {one.text}", f"   {_told(one)}"]
+        for number, proposal in enumerate(self.proposals, 1):
+            lines += [f"{number}. {proposal.text}", f"   {_told(proposal)}"]
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
@@ -145,7 +149,7 @@ class NextStop:
             "rivals": list(self.names),
             "parts": self.parts,
             "tried": [one.to_dict() for one in self.tried],
-            "sensors": {name: one.to_dict() for name, one in self.sensors.items()},
+            "sensors": {name: sensor.to_dict() for name, sensor in self.sensors.items()},
         }
 
     def plot(self) -> "Figure":
@@ -167,9 +171,9 @@ def _ratio(found: Prediction) -> float:
     return found.precision[0] / found.precision[1]
 
 
-def _told(one: RankedExperiment) -> str:
-    found = one.prediction
-    cost = f"cost {one.cost:.3g} {one.unit}"
+def _told(experiment: RankedExperiment) -> str:
+    found = experiment.prediction
+    cost = f"cost {experiment.cost:.3g} {experiment.unit}"
     if len(found.apart) == 1:
         return f"{_ratio(found):.2g} times as sure, {cost}"
     group = " or its group" if 1 < len(found.groups) < len(found.apart) else ""
@@ -182,7 +186,11 @@ def _told(one: RankedExperiment) -> str:
 def chosen(ranked: Sequence[Prediction]) -> list[Prediction]:
     """Best first: pairs that are told apart, then the least distance, then precision."""
 
-    def worth(one: Prediction) -> tuple[float, float, float]:
-        return float(np.round(one.chance.sum(), 2)), one.separation, _ratio(one)
+    def worth(prediction: Prediction) -> tuple[float, float, float]:
+        return (
+            float(np.round(prediction.chance.sum(), 2)),
+            prediction.separation,
+            _ratio(prediction),
+        )
 
     return sorted(ranked, key=worth, reverse=True)

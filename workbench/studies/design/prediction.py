@@ -121,7 +121,7 @@ def predicted(
     with Simulations(*given, model=model) as simulations:
         fit = Fit(simulations, list(asked.effects.values()), beside=[case])
         begun = _begun(fit, start_of(asked.system, asked.experiments, candidate))
-        rows = [_linearised(fit, asked, one, begun) for one in asked.rivals.models]
+        rows = [_linearised(fit, asked, model, begun) for model in asked.rivals.models]
 
         def again(true: _Row, other: _Row) -> tuple[float, Matrix]:
             refit = Refit(fit, other.lin, true.own.r, other.so_far)

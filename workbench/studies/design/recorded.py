@@ -52,7 +52,7 @@ def recorded(
     time: Vector = h * np.arange(round(experiments.lasts / h) + 1.0)
     u, y = _driven(model, system, experiments, candidate, values, judged, time)
     time, rng = time[: len(y)], np.random.default_rng(seed)
-    outputs = tuple(one.name for one in system.outputs)
+    outputs = tuple(output.name for output in system.outputs)
     clean = dict(
         zip((*(one.name for one in system.inputs), *outputs, *judged), [*u.T, *y.T], strict=True)
     )
@@ -95,15 +95,17 @@ def _driven(
         start_of(system, experiments, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
-    names, outputs = [one.name for one in system.inputs], [one.name for one in system.outputs]
+    names, outputs = [one.name for one in system.inputs], [output.name for output in system.outputs]
     readings = [system.signals[key].reading for key in (*outputs, *judged)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []
     variables = {v.name for v in model.description.variables}
-    felt = model.variables(sorted({key for one in formulas for key in one.names} & variables))
+    felt = model.variables(
+        sorted({key for formula in formulas for key in formula.names} & variables)
+    )
     u, y = np.zeros((time.size, len(names))), np.zeros((time.size, len(readings)))
-    for one in candidate.profiles:
-        u[:, names.index(one.input.name)] = one.signal(time)
+    for profile in candidate.profiles:
+        u[:, names.index(profile.input.name)] = profile.signal(time)
     held = np.array([one.held for one in system.inputs], np.bool_)
     h = float(time[1] - time[0])
     every = max(1, round(system.comparison.block / h))
@@ -145,24 +147,28 @@ def _conditions(
 ) -> dict[str, Value]:
     """Conditions as they are set; others as the recording says, or the usual ones."""
     found: dict[str, Value] = {}
-    for one in system.conditions:
-        if one.name in candidate.settings:
-            found[one.name] = candidate.settings[one.name].value
-        elif one.choices:
-            found[one.name] = (one.choices[0],) * one.count if one.count else one.choices[0]
-        elif not one.sets:
-            found[one.name] = _told(system, one, clean)
+    for condition in system.conditions:
+        if condition.name in candidate.settings:
+            found[condition.name] = candidate.settings[condition.name].value
+        elif condition.choices:
+            found[condition.name] = (
+                (condition.choices[0],) * condition.count
+                if condition.count
+                else condition.choices[0]
+            )
+        elif not condition.sets:
+            found[condition.name] = _told(system, condition, clean)
     return found
 
 
-def _told(system: System, one: Condition, clean: Mapping[str, Vector]) -> float:
+def _told(system: System, condition: Condition, clean: Mapping[str, Vector]) -> float:
     """A quantity as a recording says it."""
-    if one.agrees is None:
+    if condition.agrees is None:
         raise InputError(
             where=f"{system.source}, [next.conditions]",
-            found=f"no '{one.name}', of which no recording tells",
+            found=f"no '{condition.name}', of which no recording tells",
             expected="its values",
-            remedy=f"add {one.name} = [...], or agrees = {{ is = ... }} to the condition",
+            remedy=f"add {condition.name} = [...], or agrees = {{ is = ... }} to the condition",
         )
-    values = system.evaluate(one.agrees.formula, clean)
-    return float(values.max() if one.agrees.place == LARGEST else values[0])
+    values = system.evaluate(condition.agrees.formula, clean)
+    return float(values.max() if condition.agrees.place == LARGEST else values[0])

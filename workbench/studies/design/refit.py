@@ -49,5 +49,5 @@ class Refit(Fit):
         """
         right = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
         value, lin = self.least(self._begun, active, self._begun.inflation, right)
-        one = self.quadratics(lin.derived_as(self._begun)).systems[0]
-        return value - right, one.r[:-1].reshape(-1, one.channels)
+        system = self.quadratics(lin.derived_as(self._begun)).systems[0]
+        return value - right, system.r[:-1].reshape(-1, system.channels)

@@ -26,7 +26,7 @@ def write_next_stop_page(found: NextStop, summary: Mapping[str, Any], out: Path)
     ----------
     summary : as written to next.json.
     """
-    figures = [_figure(found, one, k) for k, one in enumerate(found.proposals, 1)]
+    figures = [_figure(found, proposal, k) for k, proposal in enumerate(found.proposals, 1)]
     drawn = placed(figures, summary, out)
     parts = [
         Part(
@@ -50,9 +50,9 @@ def write_next_stop_page(found: NextStop, summary: Mapping[str, Any], out: Path)
     return path
 
 
-def _figure(found: NextStop, one: RankedExperiment, place: int) -> CaseFigure:
+def _figure(found: NextStop, experiment: RankedExperiment, place: int) -> CaseFigure:
     """Inputs and what each model leaves by channel, at the blocks."""
-    predicted = one.prediction
+    predicted = experiment.prediction
     time = predicted.block_time
     panels = []
     for profile in predicted.candidate.profiles:
@@ -77,8 +77,8 @@ def _figure(found: NextStop, one: RankedExperiment, place: int) -> CaseFigure:
     legend += list(zip(ESTIMATORS, found.names, strict=False))
     return CaseFigure(
         name=f"Proposal {place}",
-        title=capital(one.text),
-        finding=f"Cost {one.cost:.3g} {one.unit}.",
+        title=capital(experiment.text),
+        finding=f"Cost {experiment.cost:.3g} {experiment.unit}.",
         time=time,
         window=None,
         legend=tuple(legend),
@@ -151,9 +151,9 @@ def responses_figure(found: NextStop) -> Figure:
     with mpl.rc_context(STYLE | {"font.size": 8}):
         sheet = Figure(figsize=(4.2 * len(proposals), 0.8 + 1.5 * rows), layout="constrained")
         panels = sheet.subplots(rows, len(proposals), sharey="row", sharex="col", squeeze=False)
-        for column, one in enumerate(proposals):
-            case, predicted = one.prediction.case, one.prediction
-            title = f"{column + 1}. {one.text}".replace("; ", "\n")
+        for column, proposal in enumerate(proposals):
+            case, predicted = proposal.prediction.case, proposal.prediction
+            title = f"{column + 1}. {proposal.text}".replace("; ", "\n")
             panels[0, column].set_title(title, fontsize=7, loc="left")
             for axes, profile in zip(panels[:, column], varied, strict=False):
                 signal = system.signals[profile.input.name]

@@ -129,7 +129,7 @@ class _Forecasts:
             pool.submit(Forecaster.halt, one.stop, values)
             for one, values in zip(made, own, strict=True)
         ]
-        self._model = np.array([one.result().distance for one in halts])
+        self._model = np.array([halt.result().distance for halt in halts])
         measured = np.array([one.distance for one in made])
         self._left = np.log(measured / self._model)
 
@@ -138,7 +138,9 @@ class _Forecasts:
         counted = Pace(self._report, "distributions").part(len(self._made) + 1)
         questions = [self._question(one.stop, k) for k, one in enumerate(self._made)]
         asked = self._question(stop, None)
-        drawn = [self._drawn(one, self._effort.checked, k) for k, one in enumerate(questions)]
+        drawn = [
+            self._drawn(question, self._effort.checked, k) for k, question in enumerate(questions)
+        ]
         drawn.append(self._drawn(asked, self._effort.samples, len(questions)))
         for one in drawn:
             one.add_done_callback(counted)
@@ -190,9 +192,9 @@ class _Forecasts:
             wait(under_way)
         except KeyboardInterrupt:
             interrupted = True
-            for one in under_way:
-                one.cancel()
-        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+            for task in under_way:
+                task.cancel()
+        done = [task.result() for task in under_way if task.done() and not task.cancelled()]
         if len(done) < 2:
             return None, interrupted
         tail = Tail(tuple(run for run, _ in done), question.addend)
@@ -217,9 +219,9 @@ class _Forecasts:
             wait(under_way)
         except KeyboardInterrupt:
             interrupted = True
-            for one in under_way:
-                one.cancel()
-        done = [one.result() for one in under_way if one.done() and not one.cancelled()]
+            for task in under_way:
+                task.cancel()
+        done = [task.result() for task in under_way if task.done() and not task.cancelled()]
         shortness = np.concatenate([np.empty(0), *done])
         speed, response = question.stop.asked[SPEED], self._stopping.response
         return Plain.of(shortness, effort.decades, speed, response, nominal), interrupted

@@ -85,7 +85,7 @@ class Forecaster:
         distances : (2, n) as asked, and with all that is known but by nature [m].
         outside : share of the first that is beyond what the model claims.
         """
-        names = [one.name for one in self._system.outputs]
+        names = [output.name for output in self._system.outputs]
         distances, outside = [], []
         for drive, values, factor in self._draws(question, points):
             halt = self._stops.halt(drive, values)
@@ -157,7 +157,7 @@ class Forecaster:
             ]
         except FMUError:
             return np.full(len(points), np.nan)
-        return np.array([one.distance for one in halts])
+        return np.array([halt.distance for halt in halts])
 
     def _draws(
         self, question: Question, points: Matrix
@@ -175,8 +175,8 @@ class Forecaster:
             for (name, spread), u in zip(tolerances.items(), point[first:second], strict=True):
                 values[name] = self._usual(name, values) * (1.0 + spread * u)
             differing = replace(drive, to=drive.to.copy(), along=drive.along.copy())
-            for one, u in zip(self._stopping.differences, point[second:-1], strict=True):
-                self._move(one, float(u), values, differing)
+            for difference, u in zip(self._stopping.differences, point[second:-1], strict=True):
+                self._move(difference, float(u), values, differing)
             yield differing, values, float(factor)
 
     def _begun(self, stop: Stop) -> dict[str, float]:
@@ -202,19 +202,21 @@ class Forecaster:
         return DrivingInputs(to, np.ascontiguousarray(delays), np.ascontiguousarray(lags), along)
 
     def _move(
-        self, one: Difference, u: float, values: dict[str, float], drive: DrivingInputs
+        self, difference: Difference, u: float, values: dict[str, float], drive: DrivingInputs
     ) -> None:
         """Let what differs be u standard deviations off."""
         inputs = [driven.name for driven in self._stopping.driven]
-        for name in one.of:
+        for name in difference.of:
             if name not in inputs:
                 usual = self._usual(name, values)
-                values[name] = usual + one.spread * u * (usual if one.relative else 1.0)
-            elif one.relative:
-                drive.to[inputs.index(name)] *= 1.0 + one.spread * u
-                drive.along[inputs.index(name)] *= 1.0 + one.spread * u
+                values[name] = usual + difference.spread * u * (
+                    usual if difference.relative else 1.0
+                )
+            elif difference.relative:
+                drive.to[inputs.index(name)] *= 1.0 + difference.spread * u
+                drive.along[inputs.index(name)] *= 1.0 + difference.spread * u
             else:
-                drive.to[inputs.index(name)] += one.spread * u
+                drive.to[inputs.index(name)] += difference.spread * u
 
 
 def dimension(question: Question, system: System, stopping: Stopping) -> int:

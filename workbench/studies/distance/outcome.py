@@ -211,10 +211,10 @@ class Distance:
         """Equivalent deceleration by which the stop has a distance [m/s2]."""
         return equivalent_rate(self.stop.asked[SPEED], self.response, distance)
 
-    def corrected(self, one: RecordedStop) -> Corrected | None:
+    def corrected(self, stop: RecordedStop) -> Corrected | None:
         """A past stop under nominal conditions; None where no nominal speed is near."""
         stopping = stopping_of(self.system)
-        nominal, asked = stopping.nominal, one.stop.asked
+        nominal, asked = stopping.nominal, stop.stop.asked
         if nominal is None:
             return None
         speed = min(nominal.speeds, key=lambda v: abs(v - asked[SPEED]))
@@ -223,9 +223,9 @@ class Distance:
         made = StopConditions(
             mass=float(nominal.mass(asked)),
             rotating=float(nominal.rotating(self.system.values)),
-            resistance=one.resistance,
+            resistance=stop.resistance,
         )
-        rate = equivalent_rate(asked[SPEED], stopping.response, one.distance)
+        rate = equivalent_rate(asked[SPEED], stopping.response, stop.distance)
         rate = nominal_rate(rate, made, nominal.reference)
         distance = stopping_distance(speed, stopping.response, rate)
         constants = None
@@ -301,7 +301,7 @@ class Distance:
             lines += ["", *_told(self.safety)]
         if self.plain is not None:
             lines += self.plain.told()
-        lines += [f"warning: {one}" for one in self.warnings]
+        lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
@@ -360,7 +360,9 @@ class Distance:
             "nominal": {"distance": self.nominal, "deceleration": self.rate(self.nominal)},
             "outside": self.ahead.outside,
             "width": self.ahead.width,
-            "safety": None if self.safety is None else [asdict(one) for one in self.safety.levels],
+            "safety": None
+            if self.safety is None
+            else [asdict(level) for level in self.safety.levels],
             "plain": None if self.plain is None else asdict(self.plain),
             "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
             "held": {"of": len(self.claimed), "stops": sum(one.held for one in self.claimed)},
@@ -390,10 +392,10 @@ def _told(safety: Safety) -> list[str]:
         f"so many reach; {safety.stops} stops drawn, {1e3 * safety.spent:.2g} ms each:",
         "  one in     ratio    95 %               variation   by plain sampling",
     ]
-    for one in safety.levels:
+    for level in safety.levels:
         lines.append(
-            f"  1e{one.decade:<6} {one.ratio:7.4f}    {one.low:.4f} to {one.high:.4f}"
-            f"   {one.variation:8.3f}    {one.plain_stops:.1e} stops, {one.plain_hours:.1e} h"
+            f"  1e{level.decade:<6} {level.ratio:7.4f}    {level.low:.4f} to {level.high:.4f}"
+            f"   {level.variation:8.3f}    {level.plain_stops:.1e} stops, {level.plain_hours:.1e} h"
         )
     return lines
 
@@ -450,8 +452,8 @@ def _past(axes: Axes, past: tuple[PastStop, ...]) -> None:
 
 
 def _levels(axes: Axes, safety: Safety) -> None:
-    decades = np.array([one.decade for one in safety.levels])
-    ratio, low, high = np.array([(one.ratio, one.low, one.high) for one in safety.levels]).T
+    decades = np.array([level.decade for level in safety.levels])
+    ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
     axes.errorbar(
         *(decades, ratio),
         yerr=np.maximum(0.0, [ratio - low, high - ratio]),

@@ -62,7 +62,7 @@ class Past:
     def known(self, without: int | None = None) -> Known:
         """Levels by all recordings, or by all but one, by one step from the fit to all."""
         stops = self.joint.stops()
-        kept = [one for k, one in enumerate(stops) if k != without]
+        kept = [stop for k, stop in enumerate(stops) if k != without]
         total = add([*kept, self.joint.prior])
         step = minimum(Quadratic(total.N, total.g, total.c, 0))
         return Known(self.joint.shared, self.mean + step, covariance(total.N))
@@ -90,7 +90,7 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
         names=tuple(case.name for case in cases),
         joint=joint,
         mean=np.array([best.point.levels[key] for key in joint.shared]),
-        own=tuple({name: float(one[name]) for name in tolerances} for one in values),
+        own=tuple({name: float(value[name]) for name in tolerances} for value in values),
     )
 
 

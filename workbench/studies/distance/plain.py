@@ -60,8 +60,8 @@ class Plain:
     def told(self) -> list[str]:
         """Lines for people."""
         return [f"the same by {self.samples} plain samples, 95 %:"] + [
-            f"  1e{one.decade:<6} {one.ratio:7.4f}    {one.low:.4f} to {one.high:.4f}"
-            for one in self.levels
+            f"  1e{level.decade:<6} {level.ratio:7.4f}    {level.low:.4f} to {level.high:.4f}"
+            for level in self.levels
         ]
 
 

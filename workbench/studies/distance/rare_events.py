@@ -76,17 +76,17 @@ class Tail:
         Runs scatter by Student's t. Over closed forms, intervals of 95 % hold nine times in ten:
         what runs miss together, they do not show.
         """
-        values = np.array([self._quantile(one, 10.0**-decade) for one in self.runs])
+        values = np.array([self._quantile(run, 10.0**-decade) for run in self.runs])
         middle, root = float(values.mean()), math.sqrt(values.size)
         half = float(t.isf(0.025, values.size - 1) * values.std(ddof=1)) / root
-        beyond = np.array([self._beyond(one, middle) for one in self.runs])
+        beyond = np.array([self._beyond(run, middle) for run in self.runs])
         variation = float(beyond.std(ddof=1) / beyond.mean()) / root
         return Quantile(10.0**-decade, middle, middle - half, middle + half, variation)
 
     @property
     def evaluations(self) -> int:
         """Of the function, in all."""
-        return sum(one.evaluations for one in self.runs)
+        return sum(run.evaluations for run in self.runs)
 
     def _quantile(self, run: Descent, probability: float) -> float:
         if self.addend is None:

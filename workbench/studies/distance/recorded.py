@@ -115,18 +115,18 @@ def asked_stop(said: Mapping[str, Any], system: System, stopping: Stopping) -> S
     where = "what is asked for"
     kinds = {one.name: one for one in stopping.asked}
     table = Table(said, where)
-    table.refuse_unknown([*kinds, *(one.name for one in system.conditions)])
-    asked = {name: table.number(name, one.unit, one.usual) for name, one in kinds.items()}
+    table.refuse_unknown([*kinds, *(condition.name for condition in system.conditions)])
+    asked = {name: table.number(name, kind.unit, kind.usual) for name, kind in kinds.items()}
     told = {
-        one.name: said.get(one.name, _usual(one))
-        for one in system.conditions
-        if one.name in said or one.choices
+        condition.name: said.get(condition.name, _usual(condition))
+        for condition in system.conditions
+        if condition.name in said or condition.choices
     }
     return Stop("asked for", asked, read_conditions(Table(told, where), system), {})
 
 
-def _usual(one: Condition) -> Any:
-    return [one.choices[0]] * one.count if one.count else one.choices[0]
+def _usual(condition: Condition) -> Any:
+    return [condition.choices[0]] * condition.count if condition.count else condition.choices[0]
 
 
 def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) -> bool:
@@ -137,11 +137,11 @@ def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) ->
 
 
 def _met(
-    one: Exclusion, signals: Mapping[str, Vector], system: System, time: Vector, h: float
+    exclusion: Exclusion, signals: Mapping[str, Vector], system: System, time: Vector, h: float
 ) -> NDArray[np.bool_]:
     """Where a reason holds; at rest a ratio is none, which no reason holds for."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return excluded_by(one, signals, system, time, h, 1)
+        return excluded_by(exclusion, signals, system, time, h, 1)
 
 
 def _step(case: Case) -> float:

@@ -241,9 +241,9 @@ def stopping(summary: Mapping[str, Any]) -> Answer:
         name = f"deceleration over the nominal one, all but one stop in 1e{one['decade']}"
         headline[name] = Measure(one["ratio"], "1", "higher", one["low"], one["high"])
     details = {
-        f"{one['stop']}: measured over predicted distance": Measure(
-            one["distance [m]"] / one["predicted [m]"], "1"
+        f"{stop['stop']}: measured over predicted distance": Measure(
+            stop["distance [m]"] / stop["predicted [m]"], "1"
         )
-        for one in summary["stops"]
+        for stop in summary["stops"]
     }
     return Answer(summary["sentence"], headline, details)

@@ -119,7 +119,7 @@ class Stops:
     def __init__(self, fmu: FMU, system: System, stopping: Stopping) -> None:
         self._fmu, self._stopping = fmu, stopping
         inputs = [one.name for one in system.inputs]
-        outputs = [one.name for one in system.outputs]
+        outputs = [output.name for output in system.outputs]
         readings = [system.signals[name].reading for name in outputs]
         self._model = instance(fmu, inputs, system.corrections, readings)
         self._h = system.sample_time

@@ -46,12 +46,16 @@ def watched(system: System) -> tuple[Estimated, ...]:
         for parameters in condition.parameters.values()
         for name in parameters
     } | {condition.sets for condition in system.conditions}
-    return tuple(one for one in system.estimated if one.watched and one.name not in set_by)
+    return tuple(
+        quantity
+        for quantity in system.estimated
+        if quantity.watched and quantity.name not in set_by
+    )
 
 
-def reach(one: Estimated) -> float:
+def reach(estimated: Estimated) -> float:
     """Standard deviation of what is known of a quantity before a recording: all of its range."""
-    return float((one.high - one.low) / np.sqrt(12.0))
+    return float((estimated.high - estimated.low) / np.sqrt(12.0))
 
 
 class Appraiser:
@@ -74,7 +78,9 @@ class Appraiser:
     def __init__(self, system: System, model: FMU) -> None:
         self.system = system
         constant = [
-            replace(one, walk=0.0, spread=reach(one)) for one in system.estimated if one.watched
+            replace(quantity, walk=0.0, spread=reach(quantity))
+            for quantity in system.estimated
+            if quantity.watched
         ]
         # Recordings with an aid and without would be compared, and what wears as it should be told.
         self._constant = replace(system, estimated=tuple(constant), learns=math.inf, aids=())
@@ -103,7 +109,7 @@ class Appraiser:
                 expected="one that the model follows",
                 remedy="leave it out; `workbench simulate` shows where it fails",
             )
-        estimated = [one.name for one in self._constant.estimated]
+        estimated = [quantity.name for quantity in self._constant.estimated]
         own = [estimated.index(one.name) for one in watched(self._constant)]
         values = {name: float(run.signal(name)[-1]) for name in estimated}
         return RecordingEstimate(
@@ -127,7 +133,7 @@ class Appraiser:
         system = self._constant
         known = {**system.values, **values}
         powers = [system.evaluate(one.formula, case.signals, known) for one in system.work]
-        return np.array([np.trapezoid(one, case.time) for one in powers])
+        return np.array([np.trapezoid(power, case.time) for power in powers])
 
 
 @contextmanager
@@ -139,15 +145,17 @@ def appraising(system: System) -> Iterator[Appraiser]:
 
 def _parameters(case: Case, system: System) -> dict[str, float]:
     """Parameters of the model that the conditions of a recording set, but for those estimated."""
-    for one in system.conditions:
-        if (one.parameters or one.sets) and case.conditions.get(one.name) == UNKNOWN:
+    for condition in system.conditions:
+        if (condition.parameters or condition.sets) and case.conditions.get(
+            condition.name
+        ) == UNKNOWN:
             raise InputError(
                 where=str(case.source),
-                found=f"{one.label}: unknown",
+                found=f"{condition.label}: unknown",
                 expected="what it was, because the model is another one by that",
-                remedy=f"write {one.name} into case.toml, if anybody knows",
+                remedy=f"write {condition.name} into case.toml, if anybody knows",
             )
-    estimated = {one.name for one in system.estimated}
+    estimated = {quantity.name for quantity in system.estimated}
     found = system.set_by(case.conditions)
     return {name: value for name, value in found.items() if name not in estimated}
 

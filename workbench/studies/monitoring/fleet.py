@@ -55,8 +55,8 @@ class Fleet:
         """
         try:
             if (remote := self._remote) is None:
-                entries = [one for one in Path(self.location).iterdir() if one.is_dir()]
-                found = sorted(one.name for one in entries if not one.name.startswith("."))
+                entries = [path for path in Path(self.location).iterdir() if path.is_dir()]
+                found = sorted(entry.name for entry in entries if not entry.name.startswith("."))
             else:
                 system, path = remote
                 listed = system.ls(path, detail=True)
@@ -139,7 +139,7 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> Watched:
             return Watched(machine, refusal=str(error))
         except Exception as error:  # one machine must not cost the others; it is listed
             return Watched(machine, refusal=f"{machine}: {error!r}")
-        files = {one.name: one.read_bytes() for one in sorted(out.iterdir())}
+        files = {path.name: path.read_bytes() for path in sorted(out.iterdir())}
         return Watched(machine, len(found.names), len(found.changes), "", files)
 
 

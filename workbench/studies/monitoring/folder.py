@@ -32,8 +32,8 @@ def deliveries(folder: Path) -> list[Delivery]:
     """
     try:
         found = sorted(
-            (one for one in folder.iterdir() if one.is_dir() and not one.name.startswith(".")),
-            key=lambda one: one.name,
+            (path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")),
+            key=lambda path: path.name,
         )
         if found:
             return [Delivery(one.name, _content(one), one) for one in found]
@@ -51,7 +51,7 @@ def deliveries(folder: Path) -> list[Delivery]:
 def _content(folder: Path) -> str:
     """SHA-256 of the files in a folder."""
     digest = hashlib.sha256()
-    for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         own = hashlib.sha256(path.read_bytes()).hexdigest()
         digest.update(f"{path.relative_to(folder).as_posix()}\0{own}\n".encode())
     return digest.hexdigest()

@@ -244,8 +244,8 @@ def concluded(
     if dated:
         counted.sort(key=lambda one: one.date)
     estimates = [one.estimate for one in counted if one.estimate is not None]
-    values = np.array([one.values for one in estimates])
-    covariances = [one.covariance for one in estimates]
+    values = np.array([estimate.values for estimate in estimates])
+    covariances = [estimate.covariance for estimate in estimates]
     tracks, threshold = watch(watched(system), values, covariances, rate)
     return Monitored(
         system=system,
@@ -255,8 +255,8 @@ def concluded(
         tracks=tuple(tracks),
         threshold=threshold,
         rate=rate,
-        work=np.array([one.work for one in estimates]),
-        counted=np.array([one.counted for one in estimates]),
+        work=np.array([estimate.work for estimate in estimates]),
+        counted=np.array([estimate.counted for estimate in estimates]),
         refused=refused,
         again=again,
         interrupted=interrupted,

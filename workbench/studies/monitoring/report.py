@@ -33,10 +33,10 @@ def write_monitoring_page(found: Monitored, summary: Mapping[str, Any], out: Pat
     ----------
     summary : as written to summary.json.
     """
-    tracks = [one for one in found.tracks if np.isfinite(one.values).any()]
+    tracks = [track for track in found.tracks if np.isfinite(track.values).any()]
     tracks.sort(key=_first_told)
-    figures = [_figure(one, found) for one in tracks] if len(found.names) > 1 else []
-    changed = sum(bool(one.changes) for one in tracks)
+    figures = [_figure(track, found) for track in tracks] if len(found.names) > 1 else []
+    changed = sum(bool(track.changes) for track in tracks)
     drawn = placed(figures, summary, out)
     shown = drawn[: max(changed, 1)]
     title = "What has changed" if changed else "The quantity that moved most; nothing has changed"
@@ -103,8 +103,10 @@ def _strips(tracks: Sequence[Track], found: Monitored) -> list[Strip]:
             arrays.setdefault(entry[1], {})[int(entry[2])] = track
     strips = []
     for members in arrays.values():
-        if changed := [one.label for one in members.values() if one.changes]:
-            entries = tuple((str(k), _moved(one, found)) for k, one in sorted(members.items()))
+        if changed := [member.label for member in members.values() if member.changes]:
+            entries = tuple(
+                (str(k), _moved(member, found)) for k, member in sorted(members.items())
+            )
             finding = capital(f"{', '.join(changed)}: changed; the others are as they were.")
             strips.append(Strip(finding, entries))
     return strips
@@ -179,20 +181,20 @@ def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Rows:
         Heading("unit", number=False),
     )
     rows = []
-    for one in alarms:
-        size, sure, share = one["change"], one["standard_error"], one["share_of_nominal"]
-        between = dict.fromkeys((one["earliest"], one["latest"]))
+    for alarm in alarms:
+        size, sure, share = alarm["change"], alarm["standard_error"], alarm["share_of_nominal"]
+        between = dict.fromkeys((alarm["earliest"], alarm["latest"]))
         cells = (
-            Cell(one["quantity"]),
-            Cell(one["changed_after"]),
+            Cell(alarm["quantity"]),
+            Cell(alarm["changed_after"]),
             Cell(" to ".join(between)),
             number(size, "{:+.3g}".format),
             number(size - BAND * sure, "{:+.3g}".format),
             number(size + BAND * sure, "{:+.3g}".format),
             number(None if share is None else 100.0 * share, "{:+.1f}".format),
-            Cell(one["unit"]),
+            Cell(alarm["unit"]),
         )
-        rows.append((str(one["told_at"]), cells))
+        rows.append((str(alarm["told_at"]), cells))
     caption = "All alarms in their order: the recording at which each was told."
     return Rows("alarm-table", caption, columns, tuple(rows))
 
@@ -208,13 +210,13 @@ def _quantities(summary: Mapping[str, Any]) -> Rows:
         Heading("told in", meaning="recordings that tell it"),
     )
     rows = []
-    for name, one in summary["quantities"].items():
+    for name, quantity in summary["quantities"].items():
         cells = (
-            Cell(one["label"]),
-            *(number(one[key], "{:.4g}".format) for key in ("level", "standard_error")),
-            number(one["trend_by_recording"], "{:+.2g}".format),
-            Cell(one["unit"]),
-            number(one["told_in"], "{:.0f}".format),
+            Cell(quantity["label"]),
+            *(number(quantity[key], "{:.4g}".format) for key in ("level", "standard_error")),
+            number(quantity["trend_by_recording"], "{:+.2g}".format),
+            Cell(quantity["unit"]),
+            number(quantity["told_in"], "{:.0f}".format),
         )
         rows.append((name, cells))
     caption = "Mean level of each quantity since its last change."
@@ -279,7 +281,7 @@ def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) 
 
 def history_figure(found: Monitored) -> Figure:
     """Draw each quantity over the recordings: estimates, levels, changes and alarms."""
-    tracks = [one for one in found.tracks if np.isfinite(one.values).any()]
+    tracks = [track for track in found.tracks if np.isfinite(track.values).any()]
     rows = -(-len(tracks) // _COLUMNS)
     with mpl.rc_context(STYLE | {"font.size": 8}):
         sheet = Figure(figsize=(11.0, 0.8 + 1.5 * rows), layout="constrained")
@@ -346,12 +348,12 @@ def watched(summary: Mapping[str, Any]) -> Answer:
     said, count = summary["sentences"], recordings(summary["recordings"])
     headline = {"alarms": Measure(len(summary["alarms"]), "1", "lower")}
     details = {}
-    for name, one in summary["quantities"].items():
-        level, sure = one["level"], one["standard_error"]
+    for name, quantity in summary["quantities"].items():
+        level, sure = quantity["level"], quantity["standard_error"]
         ends = (None, None)
         if level is not None and sure is not None:
             ends = (level - BAND * sure, level + BAND * sure)
-        details[f"level of {name}"] = Measure(level, one["unit"], "", *ends)
+        details[f"level of {name}"] = Measure(level, quantity["unit"], "", *ends)
     return Answer(
         "; ".join(said) + "." if said else f"Nothing changed in {count}.", headline, details
     )

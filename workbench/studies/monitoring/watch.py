@@ -84,9 +84,9 @@ class _Group:
             self.directions = np.vstack([against, np.full((1, m), 1.0 / m)])
             scatters = [Scatter((m - 1.0) / m)] * m + scatters
         self.charts = [Chart(scatter) for scatter in scatters]
-        self.usual = np.array([one.scatter**2 for one in self.members])
+        self.usual = np.array([member.scatter**2 for member in self.members])
         self.moved = np.zeros(m)
-        before = np.array([reach(one) ** 2 for one in self.members])
+        before = np.array([reach(member) ** 2 for member in self.members])
         self.known = np.square(self.directions) @ before
 
     @property
@@ -140,7 +140,7 @@ class _Group:
     def tracks(self) -> list[Track]:
         """What was watched."""
         values, deviations, surprises = (np.array(one).T for one in zip(*self.rows, strict=True))
-        names = [(one.name, one.label, self.against) for one in self.members]
+        names = [(member.name, member.label, self.against) for member in self.members]
         names += [
             (self.name, f"mean of {self.members[0].label} and the like", False)
         ] * self.against
@@ -165,8 +165,8 @@ class _Group:
 def grouped(estimated: Sequence[Estimated]) -> list[_Group]:
     """Entries of one array together, where there are enough; all others alone."""
     arrays: dict[str, list[int]] = {}
-    for column, one in enumerate(estimated):
-        arrays.setdefault(re.sub(r"\[\d+\]$", "", one.name), []).append(column)
+    for column, quantity in enumerate(estimated):
+        arrays.setdefault(re.sub(r"\[\d+\]$", "", quantity.name), []).append(column)
     groups = []
     for name, columns in arrays.items():
         alike = [columns] if len(columns) >= _FEWEST else [[column] for column in columns]
@@ -192,8 +192,10 @@ def watch(
     level : threshold of the sums; rates of quantities add (Bonferroni).
     """
     groups = grouped(estimated)
-    level = threshold(rate / sum(len(one.charts) for one in groups))
+    level = threshold(rate / sum(len(group.charts) for group in groups))
     for number, (row, covariance) in enumerate(zip(values, covariances, strict=True)):
-        for one in groups:
-            one.take(number, row[one.columns], covariance[np.ix_(one.columns, one.columns)], level)
-    return [track for one in groups for track in one.tracks()], level
+        for group in groups:
+            group.take(
+                number, row[group.columns], covariance[np.ix_(group.columns, group.columns)], level
+            )
+    return [track for group in groups for track in group.tracks()], level

@@ -105,10 +105,10 @@ def follow_proposals(
 
 def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Shares, see `SHARES`, of groups that hold the planted effect."""
-    groups = [one for one in rows if one["proposed"] is not None]
-    made = [one["proposed"] for one in groups]
+    groups = [row for row in rows if row["proposed"] is not None]
+    made = [group["proposed"] for group in groups]
     drawn_ = [one for row in groups for one in row["drawn"]]
-    away = [one for recording in (*made, *drawn_) for one in recording["separations"]]
+    away = [separation for recording in (*made, *drawn_) for separation in recording["separations"]]
     return {
         "proposed": share(one["parts"] for one in made),
         "drawn": share(one["parts"] for one in drawn_),
@@ -192,7 +192,7 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
 
 
 def _made(
-    one: RankedExperiment,
+    experiment: RankedExperiment,
     setup: Setup,
     planting: Planting,
     rivals: Rivals,
@@ -203,7 +203,7 @@ def _made(
     (planted,) = planting.effects
     names = [" with ".join(model.effects) for model in rivals.models]
     at = names.index(planted)
-    rig = setup.rig.following(one.to_dict(), setup.system)
+    rig = setup.rig.following(experiment.to_dict(), setup.system)
     more = replace(setup, rig=rig).recorded(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
     found, shown = distances_in_set(
@@ -211,15 +211,15 @@ def _made(
     )
     named = _named(found)
     return {
-        "experiment": one.text,
-        "foreseen": (at,) in one.prediction.groups,
+        "experiment": experiment.text,
+        "foreseen": (at,) in experiment.prediction.groups,
         "verdict": found.verdict,
         "named": named,
         "parts": named == [planted],
         "separations": [
             {
                 "from": name,
-                "predicted": distance(float(one.prediction.apart[at, j])),
+                "predicted": distance(float(experiment.prediction.apart[at, j])),
                 "shown": shown.get(name),
             }
             for j, name in enumerate(names)

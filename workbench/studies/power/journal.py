@@ -75,8 +75,8 @@ def diagnosed(
         NamedCause(
             cause.effect.name,
             {
-                name: (float(one.value), float(one.low), float(one.high))
-                for name, one in cause.parameters.items()
+                name: (float(parameter.value), float(parameter.low), float(parameter.high))
+                for name, parameter in cause.parameters.items()
             },
             cause.confusable_with,
         )
@@ -134,7 +134,7 @@ class Journal:
             if resume:
                 self._parse(text, identity)
             write_whole(before_last(path), text)
-        lines = [sealed(identity), *(sealed(asdict(one)) for one in self.results)]
+        lines = [sealed(identity), *(sealed(asdict(result)) for result in self.results)]
         write_whole(path, "".join(f"{line}\n" for line in lines))
 
     def append(self, result: Diagnosed) -> None:
@@ -176,11 +176,11 @@ class Journal:
 def _result(content: dict[str, Any]) -> Diagnosed:
     causes = tuple(
         NamedCause(
-            one["effect"],
-            {name: tuple(values) for name, values in one["parameters"].items()},
-            tuple(one["confusable_with"]),
+            cause["effect"],
+            {name: tuple(values) for name, values in cause["parameters"].items()},
+            tuple(cause["confusable_with"]),
         )
-        for one in content["causes"]
+        for cause in content["causes"]
     )
     planted = content["planting"]
     planting = Planting(**{**planted, "effects": tuple(planted["effects"])})

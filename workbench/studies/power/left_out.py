@@ -94,10 +94,14 @@ def _row(
     effects: Sequence[Effect],
     workers: int,
 ) -> dict[str, Any]:
-    planted = [one for one in effects if one.name in planting.effects]
-    others = [one for one in effects if one not in planted]
+    planted = [effect for effect in effects if effect.name in planting.effects]
+    others = [effect for effect in effects if effect not in planted]
     acting = {slot for one in planted for slot in one.slots}
-    acting |= {one.slot for one in rig.plantables if one.name in planting.gains and one.slot}
+    acting |= {
+        plantable.slot
+        for plantable in rig.plantables
+        if plantable.name in planting.gains and plantable.slot
+    }
     row: dict[str, Any] = {
         "rig": planting.options,
         "left_out": [one.name for one in planted],
@@ -147,7 +151,7 @@ def _row(
 
 def _told(found: Proposal) -> dict[str, Any]:
     """What is proposed; its slots are also those of laws that are as good."""
-    laws = [one.law for one in found.forms.values()] if found.laws else []
+    laws = [form.law for form in found.forms.values()] if found.laws else []
     gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
     return {
         "laws": [found.said(law) for law in found.laws],

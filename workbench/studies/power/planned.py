@@ -70,7 +70,7 @@ def foresee(
         cases = setup.recorded(Planting("clean", seed, 0.0, {}, ()), rig.simulate(seed, {}))
         found = diagnose_set(system, effects, setup.everything, cases)
     decides = of_system(system.comparison, len(effects))
-    known = {one.name: one for one in effects}
+    known = {effect.name: effect for effect in effects}
     return [
         _foreseen(known[one.effect], one, found, sizes, decides)
         for one in wanted

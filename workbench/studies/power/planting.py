@@ -132,13 +132,13 @@ class Repertoire:
 
     def plantable(self, name: str) -> Plantable:
         """By the rig's name."""
-        return next(one for one in self.plantables if one.name == name)
+        return next(plantable for plantable in self.plantables if plantable.name == name)
 
-    def size(self, one: Plantable) -> float:
+    def size(self, plantable: Plantable) -> float:
         """Unit of all sizes, in the unit of the effect: the rig's, or the least worth a finding."""
-        if not math.isnan(one.unit_size):
-            return one.unit_size
-        return next((e.matters for e in self.effects if e.name == one.effect), math.nan)
+        if not math.isnan(plantable.unit_size):
+            return plantable.unit_size
+        return next((e.matters for e in self.effects if e.name == plantable.effect), math.nan)
 
     def label(self, effect: str) -> str:
         """Name of the size of an effect of the library in results."""
@@ -147,12 +147,12 @@ class Repertoire:
     @property
     def hidden(self) -> frozenset[str]:
         """Effects of the library that recordings cannot show."""
-        return frozenset(one.name for one in self.effects if one.hidden)
+        return frozenset(effect.name for effect in self.effects if effect.hidden)
 
     @property
     def able(self) -> tuple[Plantable, ...]:
         """What can be planted of the library's, and be shown by recordings."""
-        known = (one for one in self.plantables if one.effect)
+        known = (plantable for plantable in self.plantables if plantable.effect)
         return tuple(one for one in known if one.effect not in self.hidden)
 
 
@@ -205,9 +205,9 @@ def plan(
     pairs : sets with two effects, at the largest size; none where there are no two.
     """
     largest_first = sorted(sizes, reverse=True)
-    known = [one for one in repertoire.plantables if one.effect]
+    known = [plantable for plantable in repertoire.plantables if plantable.effect]
     pairs = pairs if len(repertoire.able) > 1 else 0
-    unknown = [one for one in repertoire.plantables if not one.effect]
+    unknown = [plantable for plantable in repertoire.plantables if not plantable.effect]
     kinds: list[list[Group]] = [
         [(Planting("clean", _seed(seed, "clean", n), 0.0, {}, ()),) for n in range(clean)],
         _each(repertoire, known, largest_first, repeats, seed),
@@ -223,9 +223,9 @@ def plan_sheet_errors(errors: Sequence[SheetError], repeats: int, seed: int) -> 
     """Plan sets of a rig that differs from its data sheet, each error alone, in so many sets."""
     groups: list[Group] = []
     for n in range(repeats):
-        for one in errors:
-            own = _seed(seed, f"{one.name} {one.gain:g}", n)
-            groups.append((Planting("sheet", own, 1.0, {one.name: one.gain}, (one.effect,)),))
+        for error in errors:
+            own = _seed(seed, f"{error.name} {error.gain:g}", n)
+            groups.append((Planting("sheet", own, 1.0, {error.name: error.gain}, (error.effect,)),))
     return groups
 
 
@@ -248,22 +248,22 @@ def _each(
 ) -> list[Group]:
     groups: list[Group] = []
     for repeat in range(repeats):
-        for one in plantables:
-            if one.sensed:
-                own = _seed(seed, one.name, repeat)
-                groups.append(tuple(_single(repertoire, one, size, own) for size in sizes))
+        for plantable in plantables:
+            if plantable.sensed:
+                own = _seed(seed, plantable.name, repeat)
+                groups.append(tuple(_single(repertoire, plantable, size, own) for size in sizes))
         for size in sizes:
-            for one in plantables:
-                if not one.sensed:
-                    own = _seed(seed, f"{one.name} {size:g}", repeat)
-                    groups.append((_single(repertoire, one, size, own),))
+            for plantable in plantables:
+                if not plantable.sensed:
+                    own = _seed(seed, f"{plantable.name} {size:g}", repeat)
+                    groups.append((_single(repertoire, plantable, size, own),))
     return groups
 
 
-def _single(repertoire: Repertoire, one: Plantable, multiple: float, seed: int) -> Planting:
-    gain = _gain(one, multiple * repertoire.size(one), np.random.default_rng(seed))
-    kind: Kind = "single" if one.effect else "outside"
-    return Planting(kind, seed, multiple, {one.name: gain}, (one.effect,))
+def _single(repertoire: Repertoire, plantable: Plantable, multiple: float, seed: int) -> Planting:
+    gain = _gain(plantable, multiple * repertoire.size(plantable), np.random.default_rng(seed))
+    kind: Kind = "single" if plantable.effect else "outside"
+    return Planting(kind, seed, multiple, {plantable.name: gain}, (plantable.effect,))
 
 
 def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
@@ -275,9 +275,9 @@ def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
     return Planting("pair", seed, multiple, gains, tuple(one.effect for one in both))
 
 
-def _gain(one: Plantable, size: float, rng: np.random.Generator) -> float:
+def _gain(plantable: Plantable, size: float, rng: np.random.Generator) -> float:
     gain = float(f"{size:.6g}")
-    negative = one.signed and rng.random() < 0.5 and -gain >= one.least
+    negative = plantable.signed and rng.random() < 0.5 and -gain >= plantable.least
     return -gain if negative else gain
 
 

@@ -35,15 +35,15 @@ def write_thresholds(
     """
     sets = [
         {
-            "rig": one.planting.options,
-            "kind": one.planting.kind,
-            "planted": one.planting.effects,
-            "said": one.said,
-            "changed": [asdict(other) for other in one.changed],
+            "rig": result.planting.options,
+            "kind": result.planting.kind,
+            "planted": result.planting.effects,
+            "said": result.said,
+            "changed": [asdict(other) for other in result.changed],
         }
-        for one in results
+        for result in results
     ]
-    changes = sum(bool(one.changed) for one in results)
+    changes = sum(bool(result.changed) for result in results)
     sentence = (
         f"Half or twice of a threshold changes what is said of {changes} of {len(results)} sets."
     )
@@ -58,7 +58,10 @@ def format_thresholds(results: Sequence[Varied], usual: Mapping[str, float]) -> 
     idle = []
     for name, value in usual.items():
         rows = [
-            (change, one) for one in results for change in one.changed if change.threshold == name
+            (change, result)
+            for result in results
+            for change in result.changed
+            if change.threshold == name
         ]
         if not rows:
             idle.append(f"{name} {value:.4g}")
@@ -138,16 +141,17 @@ def _measures(
     """Shares as numbers of an answer."""
     return {
         texts[name]: Measure(
-            one["share"], "1", "lower" if name in lower else "higher", one["low"], one["high"]
+            entry["share"], "1", "lower" if name in lower else "higher", entry["low"], entry["high"]
         )
-        for name, one in summary.items()
+        for name, entry in summary.items()
     }
 
 
 def _shares(summary: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
     return [
-        f"{one['hits']} of {one['of']} {texts[name]} ({one['low']:.0%} to {one['high']:.0%})"
-        for name, one in summary.items()
+        f"{entry['hits']} of {entry['of']} {texts[name]} "
+        f"({entry['low']:.0%} to {entry['high']:.0%})"
+        for name, entry in summary.items()
     ]
 
 
@@ -199,7 +203,7 @@ def write_plan(
     ----------
     sizes : multiples of what matters.
     """
-    seen = sum(one.least is not None and one.least <= sizes[-1] * one.matters for one in rows)
+    seen = sum(row.least is not None and row.least <= sizes[-1] * row.matters for row in rows)
     sentence = (
         f"Of {len(rows)} effects, these recordings show {seen} with a chance of {SURE:.0%} or more "
         f"at {sizes[-1]:g} times the size that matters."
@@ -228,14 +232,14 @@ def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
 def _chances(rows: Sequence[Foreseen], sizes: Sequence[float]) -> Figure:
     """Chance that an effect is named [%], by effect and size."""
     table = np.array(
-        [[100.0 * c for _, c in one.chances] or [0.0] * len(sizes) for one in rows]
+        [[100.0 * c for _, c in row.chances] or [0.0] * len(sizes) for row in rows]
     ).reshape(len(rows), len(sizes))
     sheet = Figure(figsize=(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)), layout="constrained")
     axes = sheet.subplots()
     axes.grid(visible=False)
     draw_heat(axes, table, 100.0)
     axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
-    axes.set_yticks(range(len(rows)), [one.effect for one in rows])
+    axes.set_yticks(range(len(rows)), [row.effect for row in rows])
     axes.set_xlabel("size over the least that matters")
     sheet.suptitle("Chance that the planned recordings show it [%]")
     return sheet
@@ -283,14 +287,14 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
 def _share_dots(summary: Mapping[str, Any]) -> Dots:
     """The headline as dots with their intervals."""
     rows = []
-    for name, one in summary["answer"]["headline"].items():
-        known = one["value"] is not None
-        dot = (Dot(one["value"], _STYLE, one["low"], one["high"]),) if known else ()
+    for name, measure in summary["answer"]["headline"].items():
+        known = measure["value"] is not None
+        dot = (Dot(measure["value"], _STYLE, measure["low"], measure["high"]),) if known else ()
         rows.append((name, dot))
     told = [
-        f"{name} {one['value']:.0f} %"
-        for name, one in summary["answer"]["headline"].items()
-        if one["value"] is not None
+        f"{name} {measure['value']:.0f} %"
+        for name, measure in summary["answer"]["headline"].items()
+        if measure["value"] is not None
     ]
     finding = "Shares of sets with their 95 % intervals: " + (", ".join(told) or "none") + "."
     return Dots(finding, "share of sets [%]", tuple(rows), high=100.0)
@@ -299,7 +303,9 @@ def _share_dots(summary: Mapping[str, Any]) -> Dots:
 def _effects(summary: Mapping[str, Any]) -> Rows:
     """Effects by sizes, a cell for each share."""
     effects = summary["effects"]
-    sizes = sorted({size for one in effects.values() for size in one["right_first"]}, key=float)
+    sizes = sorted(
+        {size for effect in effects.values() for size in effect["right_first"]}, key=float
+    )
     columns = [
         Heading("effect", number=False),
         Heading("1 is", number=False, meaning="least size that is worth a finding"),
@@ -308,10 +314,10 @@ def _effects(summary: Mapping[str, Any]) -> Rows:
         Heading("remark", number=False),
     ]
     rows = []
-    for name, one in effects.items():
-        cells = [Cell(with_unit(one["size"], one["unit"]))]
-        cells += [_share(one["right_first"].get(size)) for size in sizes]
-        cells += [_share(one["coverage"]), Cell("hidden" if one["hidden"] else "")]
+    for name, effect in effects.items():
+        cells = [Cell(with_unit(effect["size"], effect["unit"]))]
+        cells += [_share(effect["right_first"].get(size)) for size in sizes]
+        cells += [_share(effect["coverage"]), Cell("hidden" if effect["hidden"] else "")]
         rows.append((name, tuple(cells)))
     caption = (
         "Share of sets in which the planted effect, or a group that it is in, is named first, by "
@@ -394,15 +400,17 @@ def _curves(effects: Mapping[str, Any]) -> Figure:
     panels = sheet.subplots(rows, columns, sharey=True, squeeze=False)
     for axes in panels.flat[len(effects) :]:
         axes.set_visible(False)
-    for axes, (name, one) in zip(panels.flat, effects.items(), strict=False):
-        shares = list(one["right_first"].values())
+    for axes, (name, effect) in zip(panels.flat, effects.items(), strict=False):
+        shares = list(effect["right_first"].values())
         places = range(len(shares))
         low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
         axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
         axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
-        hidden = ", hidden" if one["hidden"] else ""
-        axes.set_title(f"{name}\n1 = {with_unit(one['size'], one['unit'])}{hidden}", fontsize=6.5)
-        axes.set_xticks(places, list(one["right_first"]))
+        hidden = ", hidden" if effect["hidden"] else ""
+        axes.set_title(
+            f"{name}\n1 = {with_unit(effect['size'], effect['unit'])}{hidden}", fontsize=6.5
+        )
+        axes.set_xticks(places, list(effect["right_first"]))
         axes.set_ylim(-5.0, 105.0)
     for row in panels:
         row[0].set_ylabel("[%]")
@@ -438,17 +446,17 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
 
 def _coverage(summary: Mapping[str, Any]) -> Figure:
     """Share of the 95 % intervals that hold the truth, by effect."""
-    rows = {name: one["coverage"] for name, one in summary["effects"].items()}
-    rows = {name: one for name, one in rows.items() if one["of"]} | {"all": summary["coverage"]}
+    rows = {name: effect["coverage"] for name, effect in summary["effects"].items()}
+    rows = {name: row for name, row in rows.items() if row["of"]} | {"all": summary["coverage"]}
     sheet = Figure(figsize=(7.5, 1.2 + 0.22 * len(rows)), layout="constrained")
     axes = sheet.subplots()
     heights = range(len(rows))
-    low, high = ([100.0 * one[key] for one in rows.values()] for key in ("low", "high"))
+    low, high = ([100.0 * row[key] for row in rows.values()] for key in ("low", "high"))
     axes.hlines(heights, low, high, color=LIGHT["raw"], linewidth=2.0)
-    values = [np.nan if one["share"] is None else 100.0 * one["share"] for one in rows.values()]
+    values = [np.nan if row["share"] is None else 100.0 * row["share"] for row in rows.values()]
     axes.plot(values, heights, "o", color=_LINE)
     axes.axvline(95.0, color=_MARK, linewidth=0.8)
-    axes.set_yticks(heights, [f"{name} ({one['of']})" for name, one in rows.items()])
+    axes.set_yticks(heights, [f"{name} ({row['of']})" for name, row in rows.items()])
     axes.invert_yaxis()
     axes.set_xlim(0.0, 101.0)
     axes.set_xlabel("95 % intervals that hold the planted value [%]")
@@ -458,7 +466,7 @@ def _coverage(summary: Mapping[str, Any]) -> Figure:
 def format_power(summary: Mapping[str, Any]) -> str:
     """Table for the terminal."""
     effects, outside = summary["effects"], summary["outside"]
-    sizes = sorted({float(s) for one in effects.values() for s in one["right_first"]})
+    sizes = sorted({float(s) for effect in effects.values() for s in effect["right_first"]})
     header = f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
     lines = [
         f"{summary['sets']} sets of recordings, {len(summary['failed'])} failed",
@@ -476,10 +484,10 @@ def format_power(summary: Mapping[str, Any]) -> str:
         header + f"{'coverage':>11}",
         "-" * (len(header) + 11),
     ]
-    for name, one in effects.items():
-        row = f"{name:<30}{with_unit(one['size'], one['unit']):>18}"
-        row += "".join(f"{_count(one['right_first'].get(f'{size:g}')):>8}" for size in sizes)
-        lines.append(row + f"{_count(one['coverage']):>11}" + "  hidden" * one["hidden"])
+    for name, effect in effects.items():
+        row = f"{name:<30}{with_unit(effect['size'], effect['unit']):>18}"
+        row += "".join(f"{_count(effect['right_first'].get(f'{size:g}')):>8}" for size in sizes)
+        lines.append(row + f"{_count(effect['coverage']):>11}" + "  hidden" * effect["hidden"])
     for name, one in outside.items():
         said = (
             f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
@@ -511,7 +519,7 @@ def powered(summary: Mapping[str, Any]) -> Answer:
         "intervals that hold the truth": summary["coverage"],
     }
     headline = {"false alarms on clean sets": share_measure(summary["false_alarms"], "lower")}
-    headline |= {name: share_measure(one, "higher") for name, one in shares.items()}
+    headline |= {name: share_measure(share, "higher") for name, share in shares.items()}
     details = {
         f"{effect} x {size}: named right": share_measure(one, "higher")
         for effect, values in summary["effects"].items()

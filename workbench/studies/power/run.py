@@ -99,7 +99,7 @@ def diagnose_sets(
         if journal.damaged:
             numbers = ", ".join(map(str, journal.damaged))
             report(f"warning: {_JOURNAL}, lines {numbers} are damaged; these sets are made again")
-        known = {one.planting.options for one in journal.results}
+        known = {result.planting.options for result in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
         interrupted = _run([one for one in left if one], setup, workers, journal, report)
         return journal.results, interrupted
@@ -123,7 +123,7 @@ def _run(
             done += 1
             left = (time.perf_counter() - begin) / done * (total - done)
             name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
-            said = ", ".join(one.effect for one in result.causes) or result.verdict
+            said = ", ".join(cause.effect for cause in result.causes) or result.verdict
             report(f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left")
 
     # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
@@ -135,7 +135,7 @@ def _run(
         except KeyboardInterrupt:
             report("interrupted, finishing the sets that are under way")
             pool.finish()
-            for task in [one for one in open_tasks if not one.cancelled()]:
+            for task in [open_task for open_task in open_tasks if not open_task.cancelled()]:
                 collect(task)
             return True
     return False

@@ -64,21 +64,21 @@ class Varied:
     changed: tuple[Changed, ...]
 
 
-def values(one: Thresholds) -> dict[str, float]:
+def values(thresholds: Thresholds) -> dict[str, float]:
     """Each threshold by its name."""
-    found = dataclasses.asdict(one)
+    found = dataclasses.asdict(thresholds)
     samples = found.pop(_SAMPLES)
     return {**found, **samples}
 
 
-def changed(one: Thresholds, name: str, factor: float) -> Thresholds:
+def changed(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
     """The same with one threshold times a factor; what is counted stays a whole number, above 0."""
-    old = values(one)[name]
+    old = values(thresholds)[name]
     new = max(1, round(factor * old)) if isinstance(old, int) else factor * old
     change: dict[str, Any] = {name: new}
     if name in {field.name for field in dataclasses.fields(Soundness)}:
-        change = {_SAMPLES: dataclasses.replace(one.samples, **change)}
-    return dataclasses.replace(one, **change)
+        change = {_SAMPLES: dataclasses.replace(thresholds.samples, **change)}
+    return dataclasses.replace(thresholds, **change)
 
 
 class Remembering(Simulations):
@@ -106,7 +106,7 @@ class Remembering(Simulations):
     ) -> list[Matrix]:
         """Derivatives of every recording's errors by the columns."""
         point = _key(points)
-        keys = [(point, one.variables, _key([one.setting])) for one in columns]
+        keys = [(point, column.variables, _key([column.setting])) for column in columns]
         new = [i for i, key in enumerate(keys) if key not in self._columns]
         if new:
             made = super().derivatives(points, [columns[i] for i in new], sizes)
@@ -117,7 +117,7 @@ class Remembering(Simulations):
 
 
 def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, float]], ...]:
-    return tuple(frozenset(one.items()) for one in points)
+    return tuple(frozenset(point.items()) for point in points)
 
 
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
@@ -128,15 +128,15 @@ def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
         (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
     }
     said = _said(setup, cases, usual.samples, [usual, *variants.values()])
-    for samples in {one.samples for one in variants.values()} - {usual.samples}:
+    for samples in {variant.samples for variant in variants.values()} - {usual.samples}:
         said |= _said(setup, cases, samples, variants.values())
     return Varied(
         planting,
         said[usual],
         tuple(
-            Changed(name, factor, values(one)[name], said[one])
-            for (name, factor), one in variants.items()
-            if said[one][:2] != said[usual][:2]
+            Changed(name, factor, values(variant)[name], said[variant])
+            for (name, factor), variant in variants.items()
+            if said[variant][:2] != said[usual][:2]
         ),
     )
 

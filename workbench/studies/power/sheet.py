@@ -18,12 +18,12 @@ def summarise_sheet(results: Sequence[Diagnosed]) -> list[dict[str, Any]]:
     """What was said of each set, as it is written to sheet_error.json."""
     return [
         {
-            "rig": one.planting.options,
-            "wrong": dict(one.planting.gains),
-            "verdict": one.verdict,
-            "causes": [[cause.effect, *cause.confusable_with] for cause in one.causes],
-            "wrong_name": named_wrong(one),
-            "error": one.error,
+            "rig": result.planting.options,
+            "wrong": dict(result.planting.gains),
+            "verdict": result.verdict,
+            "causes": [[cause.effect, *cause.confusable_with] for cause in result.causes],
+            "wrong_name": named_wrong(result),
+            "error": result.error,
         }
-        for one in results
+        for result in results
     ]

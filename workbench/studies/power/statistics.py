@@ -86,16 +86,16 @@ def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str,
         by_name.setdefault(next(iter(result.planting.gains)), []).append(result)
     visible = [
         result
-        for one in repertoire.plantables
-        if one.effect and one.effect not in repertoire.hidden
-        for result in _large(by_name.get(one.name, []))
+        for plantable in repertoire.plantables
+        if plantable.effect and plantable.effect not in repertoire.hidden
+        for result in _large(by_name.get(plantable.name, []))
     ]
     return {
         "sets": len(results),
         "failed": [
-            {"rig": one.planting.options, "error": one.error}
-            for one in results
-            if one.verdict == "failed"
+            {"rig": result.planting.options, "error": result.error}
+            for result in results
+            if result.verdict == "failed"
         ],
         "false_alarms": share(one.verdict != "nothing" for one in kinds["clean"]),
         "right_first": share(map(named_right, visible)),
@@ -111,50 +111,50 @@ def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str,
             for row, some in _confused(kinds["clean"], by_name, repertoire).items()
         },
         "wrong": [
-            {"rig": one.planting.options, "said": [cause.effect for cause in one.causes]}
-            for one in results
-            if one.causes and not named_right(one)
+            {"rig": result.planting.options, "said": [cause.effect for cause in result.causes]}
+            for result in results
+            if result.causes and not named_right(result)
         ],
     }
 
 
 def _coverage(results: Iterable[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
     """Share of intervals that hold what was planted."""
-    return share(held for one in results for held in intervals_cover(one, repertoire))
+    return share(held for result in results for held in intervals_cover(result, repertoire))
 
 
 def _by_effect(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
     """What was said of each effect of the library that was planted."""
     return {
-        one.effect: {
-            "rig": one.name,
-            "size": repertoire.size(one),
-            "unit": one.unit,
-            "hidden": one.effect in repertoire.hidden,
+        plantable.effect: {
+            "rig": plantable.name,
+            "size": repertoire.size(plantable),
+            "unit": plantable.unit,
+            "hidden": plantable.effect in repertoire.hidden,
             "right_first": {
                 size: share(map(named_right, some))
-                for size, some in _by_size(by_name[one.name]).items()
+                for size, some in _by_size(by_name[plantable.name]).items()
             },
-            "coverage": _coverage(by_name[one.name], repertoire),
+            "coverage": _coverage(by_name[plantable.name], repertoire),
         }
-        for one in repertoire.plantables
-        if one.effect and one.name in by_name
+        for plantable in repertoire.plantables
+        if plantable.effect and plantable.name in by_name
     }
 
 
 def _outside(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
     """What was said of each effect that the library does not have."""
     return {
-        one.name: {
-            "size": repertoire.size(one),
-            "unit": one.unit,
+        plantable.name: {
+            "size": repertoire.size(plantable),
+            "unit": plantable.unit,
             "verdicts": {
                 size: dict(Counter(result.verdict for result in some))
-                for size, some in _by_size(by_name[one.name]).items()
+                for size, some in _by_size(by_name[plantable.name]).items()
             },
         }
-        for one in repertoire.plantables
-        if not one.effect and one.name in by_name
+        for plantable in repertoire.plantables
+        if not plantable.effect and plantable.name in by_name
     }
 
 
@@ -163,9 +163,9 @@ def _confused(
 ) -> dict[str, list[Diagnosed]]:
     """Sets of each row of the confusion matrix."""
     rows = {
-        one.effect or one.name: _large(by_name[one.name])
-        for one in repertoire.plantables
-        if one.name in by_name
+        plantable.effect or plantable.name: _large(by_name[plantable.name])
+        for plantable in repertoire.plantables
+        if plantable.name in by_name
     }
     return {"none": clean, **rows}
 
@@ -180,17 +180,17 @@ def _pairs(pairs: Sequence[Diagnosed], by_name: dict[str, list[Diagnosed]]) -> d
     return {
         "both": share(map(named_all, pairs)),
         "both_seen_alone": share(
-            named_all(one)
-            for one in pairs
-            if all(seen(name, one.planting.multiple) for name in one.planting.gains)
+            named_all(pair)
+            for pair in pairs
+            if all(seen(name, pair.planting.multiple) for name in pair.planting.gains)
         ),
     }
 
 
 def _large(results: Sequence[Diagnosed]) -> list[Diagnosed]:
-    return [one for one in results if one.planting.multiple >= VISIBLE]
+    return [result for result in results if result.planting.multiple >= VISIBLE]
 
 
 def _by_size(results: Sequence[Diagnosed]) -> dict[str, list[Diagnosed]]:
-    sizes = sorted({one.planting.multiple for one in results})
+    sizes = sorted({result.planting.multiple for result in results})
     return {f"{size:g}": [r for r in results if r.planting.multiple == size] for size in sizes}

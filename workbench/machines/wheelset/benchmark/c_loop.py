@@ -38,9 +38,9 @@ class CLoop:
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         assert fmu.states == ("omegaW", "omegaR")
         assert system.fading is not None
-        nominal = np.array([fmu.defaults[one.name] for one in system.estimated])
-        low = np.array([one.low for one in system.estimated]) - nominal
-        high = np.array([one.high for one in system.estimated]) - nominal
+        nominal = np.array([fmu.defaults[quantity.name] for quantity in system.estimated])
+        low = np.array([quantity.low for quantity in system.estimated]) - nominal
+        high = np.array([quantity.high for quantity in system.estimated]) - nominal
         rR, rW = (fmu.defaults[name] for name in ("rR", "rW"))
         tail = [rR, rR / rW, system.fading.half]
         effect = gains.design["effect"]

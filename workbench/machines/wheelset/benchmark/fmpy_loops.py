@@ -45,9 +45,9 @@ class FMPyModel:
         self.radius = float(variables["rR"].start)
         self.ratio = self.radius / float(variables["rW"].start)
         self.nominal = np.array([float(variables[name].start) for name in ("muWR", "muDC")])
-        self.low = np.array([one.low for one in system.estimated]) - self.nominal
-        self.high = np.array([one.high for one in system.estimated]) - self.nominal
-        self.spread = np.array([one.spread for one in system.estimated])
+        self.low = np.array([quantity.low for quantity in system.estimated]) - self.nominal
+        self.high = np.array([quantity.high for quantity in system.estimated]) - self.nominal
+        self.spread = np.array([quantity.spread for quantity in system.estimated])
         # What a good model leaves out of a state in a second, a share of its nominal value.
         self.walk = 2e-4 * np.array([abs(float(state.nominal or 1.0)) for state in states])
         self.measured = references("pB", "tauR")

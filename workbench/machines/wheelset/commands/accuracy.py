@@ -51,7 +51,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
                 {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
                 for fmu in models.values()
             ],
-            "gains": {name: one.source for name, one in gains.items() if one.names},
+            "gains": {name: gain.source for name, gain in gains.items() if gain.names},
         }
         output.stage("preparing the observers' loops (compiled once, up to a minute)")
         for case, truth in zip(cases, truths, strict=True):
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         summary = read_result(options.out / "accuracy.json")
         page = write_accuracy_page(system, summary, stops, options.out)
     output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
-    units = {name: one["unit"] for name, one in summary["quantities"].items()}
+    units = {name: quantity["unit"] for name, quantity in summary["quantities"].items()}
     return Done(summary, units, page=page)
 
 

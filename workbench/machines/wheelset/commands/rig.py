@@ -64,8 +64,10 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         output.result(_listed())
         return Done(
             {
-                "scenarios": {name: one.title for name, one in SCENARIOS.items()},
-                "effects": {one.name: dict(one.metadata) for one in dataclasses.fields(Effects)},
+                "scenarios": {name: scenario.title for name, scenario in SCENARIOS.items()},
+                "effects": {
+                    field.name: dict(field.metadata) for field in dataclasses.fields(Effects)
+                },
             }
         )
     scenarios = [proposed_stop(options.next, system)] if options.next else select(options.case)

@@ -140,7 +140,7 @@ class DiscObserver(DisturbanceObserver):
                 expected="the inertia of the wheelset, which tells the heat of the discs",
                 remedy="add JW to the model, or leave this estimator out",
             )
-        friction = [one.name for one in system.estimated].index("muDC")
+        friction = [quantity.name for quantity in system.estimated].index("muDC")
         self._disc = _DiscSettings(
             observer=self._settings,
             disc=disc or DiscModel(),

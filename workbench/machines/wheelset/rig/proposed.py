@@ -73,7 +73,7 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     changes = np.flatnonzero(np.diff(demand)) + 1
     steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
     direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
-    rail, *discs = (_SURFACES[one] for one in (said["wheel_rail"], *said["discs"]))
+    rail, *discs = (_SURFACES[disc] for disc in (said["wheel_rail"], *said["discs"]))
     if len(discs) != system.condition("discs").count:
         raise ValueError
     speed, pressure = float(said["initial_speed"]), float(demand[0])
@@ -81,7 +81,7 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     warm = float(said.get("disc_temperature", DISC_TEMPERATURE))
     conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load, warm)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
-    sensors = tuple(one.name for one in system.judged if one.name in FURTHER)
+    sensors = tuple(signal.name for signal in system.judged if signal.name in FURTHER)
     # A roller that stops as fast as no train does is a slide to the protection, which would vent.
     protected = imitated >= TRAIN_INERTIA
     return Scenario(

@@ -53,7 +53,7 @@ def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
         return [number[one] for one in said.get(name, names) if one in number]
 
     rates = [knowns(name) for name in fmu.description.rates]
-    fed = {j: knowns(one.name) for j, one in enumerate(system.outputs) if layout.seen[j] < 0}
+    fed = {j: knowns(output.name) for j, output in enumerate(system.outputs) if layout.seen[j] < 0}
     links = [(i, k) for i, row in enumerate(rates) for k in row]
     links += [(len(names) + j, k) for j, row in enumerate(fed.values()) for k in row]
     found, shared = divide(n, len(names), len(fed), links)

@@ -63,7 +63,7 @@ class Data:
         raise self._refused(place, f"{type(value).__name__}, which has no fixed size")
 
     def _several(self, values: Sequence[Any], place: str) -> Several:
-        types = [self.type_of(one, f"{place}[{k}]") for k, one in enumerate(values)]
+        types = [self.type_of(value, f"{place}[{k}]") for k, value in enumerate(values)]
         if not types or not isinstance(types[0], Record) or len(set(types)) > 1:
             raise self._refused(place, "a tuple that is not of named tuples of one type")
         return Several(types[0], len(types))
@@ -99,7 +99,7 @@ class Data:
         if key not in self._structs:
             base, taken = f"Law{name.lstrip('_')}", set(self._structs.values())
             names = [base, *(f"{base}{k}" for k in range(2, len(taken) + 3))]
-            self._structs[key] = next(one for one in names if one not in taken)
+            self._structs[key] = next(name for name in names if name not in taken)
         return self._structs[key]
 
     def definitions(self) -> str:

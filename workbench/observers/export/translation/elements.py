@@ -59,7 +59,7 @@ def view(array: Value, indices: Sequence[Value | Piece]) -> Value:
         offset = offset[1:-1]
     if not sizes:
         return Value(Number(type_.kind), f"{array.text}[{offset or '0'}]", reads=not type_.constant)
-    shape = tuple(int(one.known) if one.known is not None else None for one in sizes)
+    shape = tuple(int(size.known) if size.known is not None else None for size in sizes)
     left = Array(type_.kind, shape, tuple(strides), type_.constant)
     return Value(left, array.text, offset=offset, sizes=tuple(sizes))
 

@@ -288,7 +288,7 @@ class Expressions(ABC):
                 parts.append(expression(BOOL, text, left, right))
         if len(parts) == 1:
             return parts[0]
-        return expression(BOOL, " && ".join(one.text for one in parts), *parts)
+        return expression(BOOL, " && ".join(part.text for part in parts), *parts)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         test = self.test(node.test)
@@ -306,7 +306,7 @@ class Expressions(ABC):
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         """The operand that decides, as in Python."""
-        values = [self._apart(one) for one in node.values]
+        values = [self._apart(value) for value in node.values]
         kinds = {one.kind for one, _ in values}
         if DOUBLE in kinds:
             raise self.refused(node, "a number that is no whole one as a truth")
@@ -339,7 +339,7 @@ class Expressions(ABC):
 
     def apart(self, nodes: Sequence[ast.expr]) -> list[tuple[Value, list[str]]]:
         """Numbers, each with the statements that it needs before it."""
-        return [self._apart(one) for one in nodes]
+        return [self._apart(node) for node in nodes]
 
     def test(self, node: ast.expr) -> Value:
         """A truth; any whole number but zero is one."""
@@ -388,11 +388,11 @@ class Expressions(ABC):
             raise self.refused(node, "an argument by name")
         function = self.object(node.func)
         nodes = []
-        for one in node.args:
-            of = one.value if isinstance(one, ast.Starred) else None
+        for argument in node.args:
+            of = argument.value if isinstance(argument, ast.Starred) else None
             if of is not None and not isinstance(of, ast.Tuple):
                 raise self.refused(node, "an argument of several that are not written out")
-            nodes += of.elts if of is not None else [one]
+            nodes += of.elts if of is not None else [argument]
         given = self.operands(nodes)
         known = of_numbers(function, given)
         return known if known is not None else self.called(node, function, given)

@@ -233,7 +233,7 @@ def _commented(text: str) -> list[str]:
 
 def _open_sizes(value: Value) -> list[str]:
     """Sizes that a function must be told."""
-    return [one.text for one in value.sizes if one.known is None]
+    return [size.text for size in value.sizes if size.known is None]
 
 
 def _without_unused(lines: list[str]) -> list[str]:

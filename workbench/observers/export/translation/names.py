@@ -36,10 +36,10 @@ def names_of(function: ast.FunctionDef) -> Names:
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
             found.counters.add(node.target.id)
         elif isinstance(node, ast.Assign):
-            found.assigned.update(name for one in node.targets for name in _targets(one))
+            found.assigned.update(name for target in node.targets for name in _targets(target))
         elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
             found.assigned[node.target.id] += 1
-    parameters = [one.arg for one in function.args.args]
+    parameters = [argument.arg for argument in function.args.args]
     found.assigned.update(parameters)
     uses: dict[str, list[_Use]] = {}
     for name, use in _uses(function.body, (id(function),)):
@@ -63,8 +63,8 @@ def _targets(node: ast.expr) -> Iterator[str]:
     if isinstance(node, ast.Name):
         yield node.id
     elif isinstance(node, ast.Tuple):
-        for one in node.elts:
-            yield from _targets(one)
+        for elt in node.elts:
+            yield from _targets(elt)
 
 
 def _uses(block: list[ast.stmt], path: tuple[int, ...]) -> Iterator[tuple[str, _Use]]:
@@ -95,5 +95,5 @@ def _uses(block: list[ast.stmt], path: tuple[int, ...]) -> Iterator[tuple[str, _
 
 def _given(statement: ast.stmt) -> Iterator[str]:
     if isinstance(statement, ast.Assign):
-        for one in statement.targets:
-            yield from _targets(one)
+        for target in statement.targets:
+            yield from _targets(target)

@@ -130,7 +130,7 @@ class Statements(Expressions):
             raise self.refused(node, "a loop that is not over a range")
         if not isinstance(target, ast.Name) or target.id in {*self.names.assigned, *self.env}:
             raise self.refused(node, "a counter that has a value elsewhere, or no name")
-        ends = [self._index(one) for one in call.args]
+        ends = [self._index(argument) for argument in call.args]
         if len(ends) == 1:
             ends = [number(0), *ends]
         first, last = ends[0], self.temporary(ends[1]) if self._moves(ends[1]) else ends[1]
@@ -156,15 +156,15 @@ class Statements(Expressions):
     def _return(self, node: ast.Return) -> None:
         found = () if node.value is None else self.found(node.value)
         values = found if isinstance(found, tuple) else (found,)
-        if not all(isinstance(one.type, Number) for one in values):
+        if not all(isinstance(value.type, Number) for value in values):
             raise self.refused(node, "a result that is no number")
         if self.returned not in (None, len(values)):
             raise self.refused(node, "a result of another size than before")
         self.returned = len(values)
-        for k, one in enumerate(values):
-            self._widen(f"return {k}", one.kind)
+        for k, value in enumerate(values):
+            self._widen(f"return {k}", value.kind)
         if len(values) > 1:
-            listed = ", ".join(one.text for one in values)
+            listed = ", ".join(value.text for value in values)
             self.lines.append(f"return ({self.result.name}){{{listed}}};")
         else:
             self.lines.append(f"return {values[0].text};" if values else "return;")
@@ -228,13 +228,13 @@ class Statements(Expressions):
         values = list(found) if isinstance(found, tuple) else self._parts(node, found)
         if len(values) != len(target.elts):
             raise self.refused(node, "another number of values than of names")
-        written = {one.id for one in target.elts if isinstance(one, ast.Name)}
+        written = {elt.id for elt in target.elts if isinstance(elt, ast.Name)}
         read = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
         if len(written) < len(target.elts) or written & read:
             # A later value may stand where an earlier one goes.
-            values = [self.temporary(one) if self._is_open(one) else one for one in values]
-        for one, value in zip(target.elts, values, strict=True):
-            self._store(one, value)
+            values = [self.temporary(value) if self._is_open(value) else value for value in values]
+        for elt, value in zip(target.elts, values, strict=True):
+            self._store(elt, value)
 
     @staticmethod
     def _is_open(value: Value) -> bool:
