@@ -25,7 +25,8 @@ from workbench.diagnosis import Effect, read_effects
 from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, thresholds
 from workbench.models.modelica import Library, read_library
 from workbench.system.comparison import RATE
-from workbench.system.registry import load_system, system_files
+from workbench.system.installed import system_files
+from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
 
 _WIDE = 90  # characters of a line of code on a page

@@ -11,7 +11,7 @@ pytest.importorskip("rumoca")
 from workbench.__main__ import main
 from workbench.models.compiler import source_hash
 from workbench.runtime.resources import fmus
-from workbench.system.registry import built_models
+from workbench.system.installed import built_models
 
 
 def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources() -> None:

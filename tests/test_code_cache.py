@@ -16,10 +16,10 @@ ROOT = Path(__file__).parents[1]
 
 PROGRAM = """
 import numpy as np
-from workbench import kernel
+from workbench.models import native
 a = np.array([[2.0, 0.0, 2.0], [0.0, 4.0, 2.0]])
-assert kernel.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
-print(sum(kernel.solve.entry.stats.cache_hits.values()), "kept")
+assert native.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
+print(sum(native.solve.entry.stats.cache_hits.values()), "kept")
 """
 
 # One that does not end what it compiles, while a test may wait.
@@ -67,7 +67,7 @@ def solved(home: str | Path | None, program: str = PROGRAM, **more: str) -> str:
 
 
 def files(home: Path) -> list[Path]:
-    return sorted(home.rglob("kernel.solve*.code"))
+    return sorted(home.rglob("native.solve*.code"))
 
 
 def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
@@ -84,7 +84,7 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
     assert solved(home) == "1 kept"
 
 
-@pytest.mark.parametrize("name", ["observers/kalman.py", "kernel.py", "bundles.py", "linking.py"])
+@pytest.mark.parametrize("name", ["observers/estimators/kalman.py", "models/native.py", "models/jit.py"])
 def test_code_is_made_again_when_what_makes_it_changes(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

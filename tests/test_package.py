@@ -12,7 +12,7 @@ import pytest
 import workbench
 from workbench.__main__ import main
 from workbench.cli import COMMANDS
-from workbench.system.registry import built_models
+from workbench.system.installed import built_models
 
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 OWN = ("modelica", "fmus", "cases")  # at the top level of a checkout, in the wheel as data

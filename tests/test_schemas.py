@@ -13,7 +13,8 @@ import pytest
 import workbench.system.template
 from workbench.__main__ import main
 from workbench.cli.schemas import gains_schema, summaries, system_schema
-from workbench.system.registry import load_system, system_files
+from workbench.system.installed import system_files
+from workbench.system.registry import load_system
 
 from .schemas import check, validator
 

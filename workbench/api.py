@@ -38,7 +38,8 @@ from workbench.studies.design import next_stop as next_experiment
 from workbench.studies.distance import Distance, Effort, distance_of_stop
 from workbench.studies.monitoring import RATE, Monitored
 from workbench.studies.monitoring import monitor as watch_machine
-from workbench.system.registry import load_system, usual_system
+from workbench.system.installed import usual_system
+from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.tables import Table
 from workbench.system.units import quantity, si_factor

@@ -9,7 +9,7 @@ from workbench.benchmark.fmpy_loop import open_loop
 from workbench.models.fmu import FMU
 from workbench.observers import Gains
 from workbench.observers.estimators.open_loop import OpenLoop
-from workbench.system.registry import companion_part
+from workbench.system.installed import companion_part
 from workbench.system.system import System
 
 Loop = Callable[..., object]  # of time, u and y, as Estimator.run

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from workbench.runtime import resources
-from workbench.system.registry import usual_system
+from workbench.system.installed import usual_system
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 

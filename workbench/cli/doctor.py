@@ -21,7 +21,7 @@ from workbench.models.fmu import FMU
 from workbench.models.fmu_cache import cache_folder
 from workbench.runtime.files import prove_writable
 from workbench.runtime.resources import CHECKOUT, fmus, installing
-from workbench.system.registry import built_models
+from workbench.system.installed import built_models
 
 # dx/dt = -x: the smallest model that needs every part of the compiler.
 _MODEL = """package Small

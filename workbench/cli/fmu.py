@@ -15,7 +15,7 @@ from workbench.models.description import Description, read_description
 from workbench.models.trial import usual_limits
 from workbench.runtime.files import prove_writable
 from workbench.runtime.resources import CHECKOUT, fmus
-from workbench.system.registry import built_models
+from workbench.system.installed import built_models
 
 _OMC = Path("build/omc")
 

@@ -7,7 +7,7 @@ import argparse
 from importlib import import_module
 
 import workbench.cli
-from workbench.system.registry import companion_part, companions
+from workbench.system.installed import companion_part, companions
 
 
 def command_line(release: str, *asked: str) -> argparse.ArgumentParser:

@@ -19,8 +19,8 @@ from workbench.studies.distance.plain import PlainLevel
 from workbench.studies.power import following, left_out
 from workbench.studies.power.planned import Foreseen
 from workbench.studies.power.sensitivity import Changed
+from workbench.system.installed import companion_part, companions
 from workbench.system.parts import FIRST, LARGEST, Condition
-from workbench.system.registry import companion_part, companions
 from workbench.system.stopping import COMMAND, END, SPEED
 from workbench.system.system import System
 from workbench.tuning.validation import Fold

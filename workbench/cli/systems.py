@@ -4,7 +4,7 @@ import argparse
 
 from workbench.cli.arguments import nearby
 from workbench.cli.output import Done, Output
-from workbench.system.registry import system_files
+from workbench.system.installed import system_files
 from workbench.system.tables import read_table
 
 

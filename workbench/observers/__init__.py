@@ -12,7 +12,7 @@ from types import ModuleType
 from workbench.errors import InputError, closest
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
-from workbench.system.registry import companion_part
+from workbench.system.installed import companion_part
 from workbench.system.system import System
 
 __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators_of", "label"]

@@ -12,7 +12,7 @@ from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.system.registry import companion_part
+from workbench.system.installed import companion_part
 from workbench.system.system import System
 from workbench.system.tables import LARGEST, read_table, shown
 

@@ -13,7 +13,8 @@ from workbench.observers import Estimate, Estimator, Gains
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.run import Ending, Run
 from workbench.recordings.case import Case
-from workbench.system.registry import companion_part, open_model
+from workbench.system.installed import companion_part
+from workbench.system.registry import open_model
 from workbench.system.system import System
 
 if TYPE_CHECKING:

@@ -21,7 +21,8 @@ from workbench.recordings.case import KEYS, Case, read_case
 from workbench.recordings.csv import cell
 from workbench.runtime.files import claimed, write_json, write_whole
 from workbench.runtime.resources import commit
-from workbench.system.registry import companion_part, system_path
+from workbench.system.installed import companion_part
+from workbench.system.registry import system_path
 from workbench.system.system import System
 from workbench.system.tables import read_table
 

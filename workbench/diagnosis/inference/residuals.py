@@ -17,7 +17,7 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.recordings.case import Case, sign
-from workbench.system.registry import companion_part
+from workbench.system.installed import companion_part
 from workbench.system.system import Channel, System
 
 BEGINNING, DIRECTION = "time since the beginning", "direction"

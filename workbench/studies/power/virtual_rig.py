@@ -6,7 +6,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 from workbench.errors import InputError
 from workbench.studies.power.planting import Group, Plantable, SheetError
-from workbench.system.registry import companion_part
+from workbench.system.installed import companion_part
 from workbench.system.system import System
 
 
