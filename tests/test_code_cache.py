@@ -84,7 +84,9 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
     assert solved(home) == "1 kept"
 
 
-@pytest.mark.parametrize("name", ["observers/estimators/kalman.py", "models/native.py", "models/jit.py"])
+@pytest.mark.parametrize(
+    "name", ["observers/estimators/kalman.py", "models/native.py", "models/jit.py"]
+)
 def test_code_is_made_again_when_what_makes_it_changes(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
