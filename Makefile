@@ -9,14 +9,7 @@ COMPILER ?= workbench
 # prepares for itself takes longer. The slowest are listed.
 WORKERS := $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN))
 PYTEST := $(RUN) -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist worksteal --durations 10
-# The long tests, and all that their diagnoses are made of; what is left out are layers above, which
-# they cannot import.
-LONG := workbench modelica fmus tutorials constraints.txt pyproject.toml tests/conftest.py \
-	$(patsubst %,':(exclude)workbench/%',commands template report benchmark)
-LONG_STATE = git ls-files -z -- $(LONG) $$(grep -l 'mark\.long' tests/*.py) \
-	| xargs -0 sha256sum | sha256sum | cut -c 1-64
-
-.PHONY: help simulate tune diagnose power cases fmus bench docs figures figures-long fuzz chaos test test-long test-changed clean
+.PHONY: help simulate tune diagnose power cases fmus bench docs figures figures-long fuzz chaos test test-long clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -36,7 +29,7 @@ help:
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
 	@echo "make test       format, lint, types, import layers, FMUs against sources, tests"
 	@echo "make test-long  the tests that 'make test' leaves out, most diagnoses and claims on"
-	@echo "                multibody models; before a release, and by .ci/run when needed"
+	@echo "                multibody models; before a release, and by .ci/run"
 	@echo "make clean      remove the environment and results"
 
 INSTALL := $(RUN) -m pip install --quiet --constraint constraints.txt --editable
@@ -95,13 +88,8 @@ test: $(VENV)/dev.stamp
 	$(VENV)/bin/lint-imports
 	$(PYTEST) -m "not long"
 
-# Which state of all that they test has passed them is recorded, to be committed with it.
 test-long: $(VENV)/dev.stamp
 	$(PYTEST) -m long
-	$(LONG_STATE) > tests/long.sha256
-
-test-changed: test
-	test "$$($(LONG_STATE))" = "$$(cat tests/long.sha256)" || $(MAKE) test-long
 
 fuzz: $(VENV)/dev.stamp
 	$(RUN) -m tests.fuzz --count 100000
