@@ -21,10 +21,10 @@ from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
-from workbench.studies.monitoring import STATE, Monitored
+from workbench.studies.monitoring import STATE, MonitoringResult
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
 from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
-from workbench.studies.monitoring.report import write_monitored
+from workbench.studies.monitoring.report import write_monitoring
 from workbench.studies.monitoring.watch import Track, watch
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -201,19 +201,21 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def usual(history: Path, train: System, tmp_path_factory: pytest.TempPathFactory) -> Monitored:
+def usual(
+    history: Path, train: System, tmp_path_factory: pytest.TempPathFactory
+) -> MonitoringResult:
     """All at once."""
     return wb.monitor(train, history, out=tmp_path_factory.mktemp("usual"), workers=1)
 
 
-def same(monitored: Monitored, other: Monitored) -> None:
+def same(monitored: MonitoringResult, other: MonitoringResult) -> None:
     """Everything, to the last bit."""
     assert monitored.to_dict() == other.to_dict()
     pd.testing.assert_frame_equal(monitored.to_frame(), other.to_frame(), check_exact=True)
     pd.testing.assert_frame_equal(monitored.worked(), other.worked(), check_exact=True)
 
 
-def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: Monitored) -> None:
+def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: MonitoringResult) -> None:
     assert list(changed(usual.tracks)) == ["muDC[3] against"]
     track, change = usual.changes[0]
     assert usual.names[change.earliest] <= "08" <= usual.names[change.latest]
@@ -224,7 +226,7 @@ def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: Monitored)
     assert "pad friction of axle 3" in sentence
 
 
-def test_work_of_friction_is_what_pads_take_from_the_train(usual: Monitored) -> None:
+def test_work_of_friction_is_what_pads_take_from_the_train(usual: MonitoringResult) -> None:
     """Of 96 t at 20 m/s, 19.2 MJ; resistances and bearings take some 3 %, wheelsets hold 4 %."""
     sums = usual.work[:8].sum(axis=1)
     assert_allclose(sums, 0.5 * 96e3 * 20.0**2, rtol=0.08)
@@ -233,7 +235,7 @@ def test_work_of_friction_is_what_pads_take_from_the_train(usual: Monitored) -> 
 
 
 def test_recordings_that_come_later_twice_or_damaged_change_nothing(
-    history: Path, train: System, usual: Monitored, tmp_path: Path
+    history: Path, train: System, usual: MonitoringResult, tmp_path: Path
 ) -> None:
     """In parts and out of order; then a copy, a damaged one and one that is no recording."""
     inbox, out = tmp_path / "inbox", tmp_path / "out"
@@ -329,10 +331,10 @@ then = () => {
 
 
 def test_the_page_shows_what_has_changed_and_where(
-    usual: Monitored, tmp_path: Path, probe: Callable[[Path, str], dict[str, Any]]
+    usual: MonitoringResult, tmp_path: Path, probe: Callable[[Path, str], dict[str, Any]]
 ) -> None:
     provenance = {"run": run_of("monitor", usual.system, {})}
-    page = write_monitored(usual, provenance, tmp_path)
+    page = write_monitoring(usual, provenance, tmp_path)
     told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
     # Of eight axles, the third is marked, with its loss.
     (mark,) = told.xpath("//ol[@class='strip']/li[contains(@class, 'wrong')]")
@@ -352,16 +354,16 @@ def test_the_page_shows_what_has_changed_and_where(
     assert found["read"] == "recording 9"
 
 
-def test_a_machine_that_has_not_changed_says_so(usual: Monitored, tmp_path: Path) -> None:
+def test_a_machine_that_has_not_changed_says_so(usual: MonitoringResult, tmp_path: Path) -> None:
     sound = replace(usual, tracks=tuple(replace(track, changes=()) for track in usual.tracks))
-    page = write_monitored(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
+    page = write_monitoring(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
     told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
     assert "nothing has changed" in told.xpath("string(//h2[@id='shown'])")
     assert not told.xpath("//ol[@class='strip']")
 
 
 def test_the_command_writes_what_it_says(
-    history: Path, usual: Monitored, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    history: Path, usual: MonitoringResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["monitor", str(history), "--system", "train", "--workers", "2"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
@@ -394,7 +396,9 @@ def test_a_slow_loss_over_months_is_told_before_it_has_reached_a_tenth(train: Sy
     assert abs(size + 0.12 * 0.30) < 3.0 * known
 
 
-def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(usual: Monitored) -> None:
+def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(
+    usual: MonitoringResult,
+) -> None:
     assert recordings_after(usual) == [f"{k:02d}" for k in range(9, 17)]
     system = known_from_before(usual)
     nominal = usual.system

@@ -20,7 +20,13 @@ from workbench.diagnosis.inference.rivals import read_rivals
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.recordings.case import Case
-from workbench.studies.design import NextStop, RankedExperiment, candidates, foreseen, next_stop
+from workbench.studies.design import (
+    NextStop,
+    RankedExperiment,
+    candidates,
+    next_stop,
+    predict_experiments,
+)
 from workbench.studies.design.candidates import (
     Profile,
     drawn,
@@ -29,7 +35,7 @@ from workbench.studies.design.candidates import (
     other_settings,
     some_settings,
 )
-from workbench.studies.design.separation import precision, refitted, told_apart
+from workbench.studies.design.separation import discrimination_chance, precision, refitted
 from workbench.studies.power.diagnosing import distance
 from workbench.system.experiments import (
     RELEASE,
@@ -139,7 +145,7 @@ def test_the_chance_is_the_share_of_simulated_decisions() -> None:
     left = [np.sum(y**2, axis=1) - (y @ one) ** 2 for one in (wrong, right)]
     share = np.mean(left[0] - left[1] > decides.form)
     # Four standard deviations of a share of 4000, and 0.01 for the noise that the right one leaves.
-    expected = told_apart(apart, 0.0, decides)
+    expected = discrimination_chance(apart, 0.0, decides)
     assert abs(share - expected) < 4.0 * np.sqrt(expected * (1.0 - expected) / count) + 0.01
     assert 0.6 < expected < 0.9
 
@@ -334,7 +340,7 @@ def test_the_separation_is_what_recordings_then_show(
 ) -> None:
     """Of every experiment, within 20 %: noise moves it by one standard deviation."""
     for one in proposed.tried:
-        expected = np.sqrt(one.prediction.apart[0, 1])
+        expected = np.sqrt(one.prediction.pairwise[0, 1])
         shown = parted(block, [*mild, *named_anew(made(block, one))], "Draught", "Radiation")
         assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
 
@@ -358,8 +364,8 @@ def test_a_rival_cannot_use_what_its_recordings_so_far_hold(
             for model in rivals.models
         ]
         plan = [proposed.tried[0].prediction.candidate]
-        (found,) = foreseen(block, replace(rivals, models=tuple(models)), plan, 1)
-        apart.append(found.prediction.apart[0, 1])
+        (found,) = predict_experiments(block, replace(rivals, models=tuple(models)), plan, 1)
+        apart.append(found.prediction.pairwise[0, 1])
     # Within five standard deviations nothing is held here, and what is held parts more.
     assert_allclose(apart[1], apart[0], rtol=1e-6)
     assert apart[2] > 1.1 * apart[1]

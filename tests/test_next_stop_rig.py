@@ -21,7 +21,7 @@ from workbench.machines.wheelset.rig import (
     stop_of,
 )
 from workbench.recordings.case import Case, read_case
-from workbench.studies.design import NextStop, RankedExperiment, foreseen, next_stop
+from workbench.studies.design import NextStop, RankedExperiment, next_stop, predict_experiments
 from workbench.studies.design.candidates import Experiment, every_setting
 from workbench.system.experiments import Setting
 from workbench.system.system import System
@@ -95,7 +95,7 @@ def test_the_separation_is_what_the_stop_then_shows(
     """Of the best stop and of the last, within 20 %; noise moves it by one standard deviation."""
     one = proposed.tried[rank]
     true, other = (proposed.names.index(name) for name in EFFECTS)
-    expected = np.sqrt(one.prediction.apart[true, other])
+    expected = np.sqrt(one.prediction.pairwise[true, other])
     shown = parted(one_speed, [*alike, made(one, one_speed, tmp_path)], *EFFECTS)
     assert shown == pytest.approx(expected, rel=0.2, abs=2.0)
     assert (one.prediction.right > 0.5) == (rank == 0)
@@ -108,12 +108,12 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
     rivals = undecided.rivals
     assert rivals is not None
     plan = [one.prediction.candidate for one in proposed.tried[1::2]]
-    ended = foreseen(one_speed, rivals, plan, workers=1)
+    ended = predict_experiments(one_speed, rivals, plan, workers=1)
     least = Fit.least
     monkeypatch.setattr(Fit, "least", lambda *given: least(*given[:4]))
-    further = foreseen(one_speed, rivals, plan, workers=1)
+    further = predict_experiments(one_speed, rivals, plan, workers=1)
     at, then = (
-        {one.text: np.sqrt(np.abs(one.prediction.apart)) for one in some}
+        {one.text: np.sqrt(np.abs(one.prediction.pairwise)) for one in some}
         for some in (ended, further)
     )
     assert at.keys() == then.keys()
@@ -191,9 +191,9 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
     """
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     cases, rivals, effects = of_two(system, planted, names, tmp_path)
-    (one,) = foreseen(system, rivals, [other_surface(system, rail, imitated)], 1)
+    (one,) = predict_experiments(system, rivals, [other_surface(system, rail, imitated)], 1)
     true, other = ([model.effects for model in rivals.models].index((name,)) for name in names)
-    expected = np.sqrt(max(0.0, one.prediction.apart[true, other]))
+    expected = np.sqrt(max(0.0, one.prediction.pairwise[true, other]))
     stop = stop_of(one.to_dict(), system)
     record(stop, 30, effects, tmp_path / stop.name)
     shown = parted(system, [*cases, read_case(tmp_path / stop.name, system)], *names)

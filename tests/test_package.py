@@ -56,6 +56,14 @@ def test_each_public_name_is_what_its_module_defines() -> None:
         assert getattr(workbench, name).__name__ == name
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("Monitored", "MonitoringResult"), ("Tuned", "TuningResult")]
+)
+def test_a_former_name_works_and_says_what_it_is_called_now(old: str, new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"workbench.{old} is now workbench.{new}"):
+        assert getattr(workbench, old) is getattr(workbench, new)
+
+
 def test_a_name_that_is_not_public_is_refused() -> None:
     with pytest.raises(AttributeError, match="'workbench' has no attribute 'read_case_s'"):
         _ = workbench.read_case_s

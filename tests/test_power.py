@@ -30,18 +30,18 @@ from workbench.machines.wheelset.rig import (
 from workbench.models.fmu import FMU
 from workbench.pages.provenance import run_of
 from workbench.studies.power import (
-    Diagnosed,
     Journal,
     NamedCause,
     Planting,
     Repertoire,
+    SetVerdict,
     diagnose_sets,
     plan,
     share,
     summarise,
 )
 from workbench.studies.power.diagnosing import build_everything, library_effects
-from workbench.studies.power.planned import SURE, clear, foresee
+from workbench.studies.power.planned import SURE, clear, predict_campaign
 from workbench.studies.power.planting import Group, Kind
 from workbench.studies.power.report import format_plan, format_power, write_plan, write_power
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
@@ -77,11 +77,11 @@ STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
 
 def said(
     gains: dict[str, float], *causes: NamedCause, kind: Kind = "single", other: str = ""
-) -> Diagnosed:
+) -> SetVerdict:
     """A verdict on a set: causes, or other words, or nothing."""
     verdict = other or ("found" if causes else "nothing")
     effects = tuple(REPERTOIRE.plantable(name).effect for name in gains)
-    return Diagnosed(Planting(kind, 1, 4.0, gains, effects), verdict, causes, None, None, 1.0)
+    return SetVerdict(Planting(kind, 1, 4.0, gains, effects), verdict, causes, None, None, 1.0)
 
 
 def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> NamedCause:
@@ -285,7 +285,7 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
-def test_run_that_ended_early_is_reported(results: list[Diagnosed], tmp_path: Path) -> None:
+def test_run_that_ended_early_is_reported(results: list[SetVerdict], tmp_path: Path) -> None:
     found = summarise(results, REPERTOIRE)
     write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
     assert f"{len(results)} sets" in format_power(found)
@@ -347,7 +347,7 @@ _GROUPS = [
 ]
 
 
-def run(out: Path, report: Callable[[str], None]) -> tuple[list[Diagnosed], bool]:
+def run(out: Path, report: Callable[[str], None]) -> tuple[list[SetVerdict], bool]:
     rig = PlantedStops(tuple(STOPS), REFERENCE)
     effects = library_effects(SYSTEM)
     return diagnose_sets(
@@ -389,7 +389,7 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     """Of the two short stops above: a gain of 1.6 % is plain in them, one of 0.05 % is not."""
     rig, effects = PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM)
     sizes = (0.25, 8.0)
-    rows = foresee(SYSTEM, rig, effects, PLANTABLE, sizes, 1)
+    rows = predict_campaign(SYSTEM, rig, effects, PLANTABLE, sizes, 1)
     by_name = {row.effect: row for row in rows}
     (faint, small), (plain, large) = by_name["FxGain"].chances
     assert (faint, plain) == pytest.approx((0.0005, 0.016))

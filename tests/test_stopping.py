@@ -18,7 +18,7 @@ from workbench.recordings.case import Case
 from workbench.recordings.datasets import write_cases
 from workbench.studies.distance import Distance, Effort
 from workbench.studies.distance.forecast import Forecaster, Question, dimension, forecasting
-from workbench.studies.distance.past import Known
+from workbench.studies.distance.past import MachineLevels
 from workbench.studies.distance.plain import quantile
 from workbench.studies.distance.rare_events import Tail
 from workbench.studies.distance.recorded import Stop, asked_stop, recorded
@@ -118,7 +118,7 @@ def test_a_stop_is_that_of_the_models_own_integrator(
 ) -> None:
     """Independent: the FMU's Co-Simulation, whose inputs are set every 20 ms."""
     stop = asked_stop({"speed": "100 km/h", "gradient": -0.005}, train, stopping)
-    found = forecaster.halt(stop, {})
+    found = forecaster.stop(stop, {})
     path, h = train.model(OBSERVER).path, 0.02
     assert path is not None
     with CoSimulation(path) as model:
@@ -146,7 +146,7 @@ def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(
     train: System, stopping: Stopping, forecaster: Forecaster
 ) -> None:
     def distance(**said: object) -> float:
-        return forecaster.halt(asked_stop(said, train, stopping), {}).distance
+        return forecaster.stop(asked_stop(said, train, stopping), {}).distance
 
     usual = distance()
     assert distance(speed="130 km/h") > usual > distance(pressure="4.2 bar")
@@ -160,7 +160,7 @@ def test_a_stop_that_does_not_end_is_told(
 ) -> None:
     stop = asked_stop({"gradient": -0.2}, train, stopping)
     with pytest.raises(wb.FMUError, match="not at rest after 200 s"):
-        forecaster.halt(stop, {})
+        forecaster.stop(stop, {})
 
 
 def test_corrected_stops_are_those_under_nominal_conditions(
@@ -169,12 +169,12 @@ def test_corrected_stops_are_those_under_nominal_conditions(
     """Made too fast, downhill and light; pads and air are not corrected for speed."""
     said = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
     stop, response = asked_stop(said, train, stopping), stopping.response
-    rate = equivalent_rate(stop.asked["speed"], response, forecaster.halt(stop, {}).distance)
+    rate = equivalent_rate(stop.asked["speed"], response, forecaster.stop(stop, {}).distance)
     made = StopConditions(mass=91e3, rotating=8.0 * 110.0 / 0.46**2, resistance=-0.006)
     fixed = stopping_distance(120.0 / 3.6, response, nominal_rate(rate, made, 96e3))
-    nominal = forecaster.halt(asked_stop({}, train, stopping), {}).distance
+    nominal = forecaster.stop(asked_stop({}, train, stopping), {}).distance
     assert_allclose(fixed, nominal, rtol=0.01)
-    assert abs(forecaster.halt(stop, {}).distance / nominal - 1.0) > 0.08
+    assert abs(forecaster.stop(stop, {}).distance / nominal - 1.0) > 0.08
 
 
 # --- what is drawn ---
@@ -184,7 +184,7 @@ def question(train: System, stop: Stop, left: float) -> Question:
     """Levels as the sheet says them, each unsure by a percent."""
     keys = tuple((name, "all") for name in train.comparison.levels)
     mean = np.array([train.values[name] for name, _ in keys])
-    return Question(stop, Known(keys, mean, np.diag((0.01 * mean) ** 2)), left, 5)
+    return Question(stop, MachineLevels(keys, mean, np.diag((0.01 * mean) ** 2)), left, 5)
 
 
 def test_a_distribution_is_that_of_its_parts(
@@ -211,7 +211,7 @@ def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.0)
     usual = np.zeros((1, dimension(asked, train, stopping)))
-    drawn, found = forecaster.distances(asked, usual), forecaster.halt(stop, {}).distance
+    drawn, found = forecaster.distances(asked, usual), forecaster.stop(stop, {}).distance
     assert_allclose(drawn, found, rtol=1e-4)
     assert drawn != found  # they are longer
 

@@ -16,12 +16,18 @@ from workbench.__main__ import main
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops
 from workbench.machines.wheelset.rig import SCENARIOS, Scenario
-from workbench.studies.power import Diagnosed, NamedCause, Planting, diagnose_sets, open_virtual_rig
+from workbench.studies.power import (
+    NamedCause,
+    Planting,
+    SetVerdict,
+    diagnose_sets,
+    open_virtual_rig,
+)
 from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
 from workbench.studies.power.planting import plan_sheet_errors, some
 from workbench.studies.power.report import format_sheet, format_thresholds
 from workbench.studies.power.run import Setup
-from workbench.studies.power.sensitivity import FACTORS, Varied, changed, values, vary
+from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity, changed, values, vary
 from workbench.studies.power.sheet import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
 from workbench.system.registry import load_system
@@ -121,7 +127,7 @@ def test_sets_are_of_all_kinds_alike() -> None:
 
 
 def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
-    varied = Varied(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
+    varied = ThresholdSensitivity(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
     assert "nothing changes by: significant" in format_thresholds([varied], {"significant": 4.0})
 
 
@@ -137,10 +143,10 @@ def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name() ->
     assert len({group[0].seed for group in groups}) == len(groups) == 3 * len(SHEET_ERRORS)
 
 
-def said(effect: str, *causes: tuple[str, ...]) -> Diagnosed:
+def said(effect: str, *causes: tuple[str, ...]) -> SetVerdict:
     planting = Planting("sheet", 1, 1.0, {"roller_inertia": 0.015}, (effect,))
     named = tuple(NamedCause(first, {}, tuple(twins)) for first, *twins in causes)
-    return Diagnosed(planting, "found" if named else "nothing", named, None, None, 1.0)
+    return SetVerdict(planting, "found" if named else "nothing", named, None, None, 1.0)
 
 
 def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:

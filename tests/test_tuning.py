@@ -26,7 +26,7 @@ from workbench.tuning import (
     Plan,
     Problem,
     Search,
-    Tuned,
+    TuningResult,
     cross_validate,
     evaluate_all,
     evaluate_gains,
@@ -223,7 +223,7 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
     members = np.tile(found.coordinates, (3, 1))
     members[:, 0] = 0.55, 0.65, 0.95
     last = Population(members, found.z * np.array([1.0, 1.009, 1.011]), found.last.z_k[:3])
-    tuned = Tuned(problem, plan, replace(found, last=last), found.z_k, interrupted=False)
+    tuned = TuningResult(problem, plan, replace(found, last=last), found.z_k, interrupted=False)
     told = summarise_tuning(tuned, 0)
     assert (told["work"]["as_good"], told["work"]["last"]) == (2, 3)
     assert_allclose(told["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])

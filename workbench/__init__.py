@@ -4,6 +4,7 @@ The flow: system, case -> FMU -> observer -> run -> score -> tuning, diagnosis -
 """
 
 import ast
+import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,10 +31,10 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.studies.design import NextStop as NextStop
     from workbench.studies.distance import Distance as Distance
     from workbench.studies.distance import Effort as Effort
-    from workbench.studies.monitoring import Monitored as Monitored
+    from workbench.studies.monitoring import MonitoringResult as MonitoringResult
     from workbench.system.registry import load_system as load_system
     from workbench.system.system import System as System
-    from workbench.tuning import Tuned as Tuned
+    from workbench.tuning import TuningResult as TuningResult
 
 _MODULES = {
     name.name: node.module
@@ -42,10 +43,15 @@ _MODULES = {
     for name in node.names
 }
 __all__ = list(_MODULES)
+_RENAMED = {"Monitored": "MonitoringResult", "Tuned": "TuningResult"}  # until the next version
 
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
+        if name in _RENAMED:
+            message = f"workbench.{name} is now workbench.{_RENAMED[name]}"
+            warnings.warn(message, DeprecationWarning, stacklevel=2)
+            return getattr(import_module(__name__), _RENAMED[name])
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = getattr(import_module(_MODULES[name]), name)

@@ -36,14 +36,14 @@ from workbench.runtime.files import claimed
 from workbench.studies.design import NextStop
 from workbench.studies.design import next_stop as next_experiment
 from workbench.studies.distance import Distance, Effort, distance_of_stop
-from workbench.studies.monitoring import RATE, Monitored
+from workbench.studies.monitoring import RATE, MonitoringResult
 from workbench.studies.monitoring import monitor as watch_machine
 from workbench.system.installed import usual_system
 from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.tables import Table
 from workbench.system.units import quantity, si_factor
-from workbench.tuning import Lines, Plan, Tuned, evaluators, pose
+from workbench.tuning import Lines, Plan, TuningResult, evaluators, pose
 from workbench.tuning import tune as tune_problem
 
 
@@ -208,7 +208,7 @@ def tune(
     judge_by: str | None = None,
     workers: int | None = None,
     report: Callable[[str], None] = print,
-) -> Tuned | None:
+) -> TuningResult | None:
     """Find the gains whose worst case is best; see `workbench.tuning.tune`.
 
     Parameters
@@ -319,7 +319,7 @@ def monitor(
     out: str | Path | None = None,
     false_alarms: float = RATE,
     workers: int | None = None,
-) -> Monitored:
+) -> MonitoringResult:
     """Say what has changed on a machine over many recordings; see `studies.monitoring.monitor`.
 
     Parameters

@@ -23,7 +23,7 @@ from workbench.observers.gains_file import read_gains
 from workbench.recordings.case import Case, read_case, read_file
 from workbench.recordings.channels import NamedChannel, Told
 from workbench.runtime import resources
-from workbench.studies.power.journal import Diagnosed, Journal
+from workbench.studies.power.journal import Journal, SetVerdict
 from workbench.studies.power.planting import Planting
 from workbench.system.reader import read_system
 from workbench.system.registry import load_system, open_model
@@ -192,7 +192,7 @@ def _journal(path: Path) -> Target:
     journal = Journal(path, identity, resume=False)
     for seed in range(4):
         planting = Planting("single", seed, 2.0, {"fade": 0.1}, ("BrakeFade",))
-        journal.append(Diagnosed(planting, "nothing", (), None, None, 1.5))
+        journal.append(SetVerdict(planting, "nothing", (), None, None, 1.5))
     written = journal.results
 
     def impossible(found: Journal) -> str:

@@ -15,9 +15,9 @@ from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.datasets import read_recorded
 from workbench.runtime.files import claimed
-from workbench.studies.monitoring import Monitored, monitor
+from workbench.studies.monitoring import MonitoringResult, monitor
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
-from workbench.studies.monitoring.report import write_monitored
+from workbench.studies.monitoring.report import write_monitoring
 from workbench.system.registry import load_system
 
 
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             step=partial(output.step, begin=begin),
         )
         provenance = provenance_of(system, history)
-        page = write_monitored(found, provenance, options.out)
+        page = write_monitoring(found, provenance, options.out)
         output.result(found.summary())
         output.result(f"to read: {page}, data and figure beside it")
         if found.interrupted:
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
 
 
 def _cause(
-    options: argparse.Namespace, output: Output, found: Monitored, provenance: dict[str, Any]
+    options: argparse.Namespace, output: Output, found: MonitoringResult, provenance: dict[str, Any]
 ) -> dict[str, Any]:
     """Diagnose what has changed; returns the summary of the diagnosis."""
     system, out = known_from_before(found), options.out / "cause"

@@ -17,9 +17,9 @@ from workbench.pages.provenance import models, run_of, software
 from workbench.recordings.datasets import read_recorded
 from workbench.runtime.files import claimed, write_json, write_whole
 from workbench.runtime.pool import Pool
-from workbench.studies.monitoring import Monitored
-from workbench.studies.monitoring.fleet import Fleet, Watched, serving, watch_fleet
-from workbench.studies.monitoring.report import write_monitored
+from workbench.studies.monitoring import MonitoringResult
+from workbench.studies.monitoring.fleet import Fleet, MachineResult, serving, watch_fleet
+from workbench.studies.monitoring.report import write_monitoring
 from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
 
@@ -76,9 +76,9 @@ def run_fleet(options: argparse.Namespace, output: Output) -> Done:
     return Done(summary, {"seconds": "s"}, 130 * interrupted)
 
 
-def _written(provenance: dict[str, Any], found: Monitored, out: Path) -> None:
+def _written(provenance: dict[str, Any], found: MonitoringResult, out: Path) -> None:
     """Write what was found of a machine, in a worker."""
-    write_monitored(found, provenance, out)
+    write_monitoring(found, provenance, out)
 
 
 def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet] | DaskPool[Fleet]":
@@ -88,7 +88,7 @@ def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet]
 
 
 def _summary(
-    found: list[Watched], provenance: dict[str, Any], seconds: float, interrupted: bool
+    found: list[MachineResult], provenance: dict[str, Any], seconds: float, interrupted: bool
 ) -> dict[str, Any]:
     raised = [one for one in found if one.alarms]
     refused = [one for one in found if one.refusal]

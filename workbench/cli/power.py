@@ -16,9 +16,9 @@ from workbench.models.modelica import read_library
 from workbench.pages.provenance import run_of
 from workbench.runtime.files import claimed
 from workbench.studies.power import (
-    Diagnosed,
     Plantable,
     Repertoire,
+    SetVerdict,
     VirtualRig,
     diagnose_sets,
     open_virtual_rig,
@@ -29,7 +29,7 @@ from workbench.studies.power import (
 from workbench.studies.power.diagnosing import library_effects
 from workbench.studies.power.following import follow_proposals, summarise_following
 from workbench.studies.power.left_out import propose_left_out, summarise_left_out
-from workbench.studies.power.planned import foresee
+from workbench.studies.power.planned import predict_campaign
 from workbench.studies.power.planting import Group, plan_sheet_errors, some
 from workbench.studies.power.report import (
     format_followed,
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "thresholds": _thresholds,
             "sheet_error": _sheet_error,
             "leave_out_effect": _left_out,
-            "plan": _foreseen,
+            "plan": _plan_campaign,
             "follow": _followed,
         }
         return checks[options.check](options, output, system, rig, effects)
@@ -190,7 +190,7 @@ def _thresholds(
     return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)
 
 
-def _foreseen(
+def _plan_campaign(
     options: argparse.Namespace,
     output: Output,
     system: System,
@@ -200,7 +200,7 @@ def _foreseen(
     out = options.out / "plan"
     sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, rig)
     output.stage("one set without any effect is made and diagnosed")
-    rows = foresee(system, rig, effects, wanted, sizes, options.seed)
+    rows = predict_campaign(system, rig, effects, wanted, sizes, options.seed)
     write_plan(rows, sizes, _provenance(options, system, rig, False), out)
     return _told(output, format_plan(rows, sizes), out / "plan.json", False)
 
@@ -244,7 +244,7 @@ def _diagnosed(
     rig: VirtualRig,
     effects: tuple[Effect, ...],
     out: Path,
-) -> tuple[list[Diagnosed], bool]:
+) -> tuple[list[SetVerdict], bool]:
     return diagnose_sets(
         groups,
         system,

@@ -8,7 +8,7 @@ from typing import Any
 from workbench.cli.output import Done, Output
 from workbench.errors import InputError
 from workbench.pages.runs import (
-    Ran,
+    RunRecord,
     compare_runs,
     differences,
     format_changes,
@@ -42,7 +42,9 @@ def _warn(error: InputError) -> None:
     print(f"warning: {error}", file=sys.stderr, flush=True)
 
 
-def _pairs(before: list[Ran], after: list[Ran], other: Path) -> list[tuple[Ran, Ran]]:
+def _pairs(
+    before: list[RunRecord], after: list[RunRecord], other: Path
+) -> list[tuple[RunRecord, RunRecord]]:
     """Runs of the same place; a single one of each, wherever they are."""
     if len(before) == len(after) == 1:
         return [(before[0], after[0])]

@@ -17,8 +17,8 @@ from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
 from workbench.studies.distance.plain import PlainLevel
 from workbench.studies.power import following, left_out
-from workbench.studies.power.planned import Foreseen
-from workbench.studies.power.sensitivity import Changed
+from workbench.studies.power.planned import EffectChance
+from workbench.studies.power.sensitivity import VerdictChange
 from workbench.system.installed import companion_part, companions
 from workbench.system.parts import FIRST, LARGEST, Condition
 from workbench.system.stopping import COMMAND, END, SPEED
@@ -491,7 +491,7 @@ def _power() -> Schema:
 
 def _thresholds() -> Schema:
     one = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
-    sets = listed(closed({**one, "changed": listed(declared(Changed))}))
+    sets = listed(closed({**one, "changed": listed(declared(VerdictChange))}))
     return summary("power --thresholds", _SETS, {"usual": by_name(NUMBER), "sets": sets})
 
 
@@ -538,7 +538,7 @@ def _followed() -> Schema:
 
 
 def _plan() -> Schema:
-    entries = {"sizes": listed(NUMBER), "effects": listed(declared(Foreseen))}
+    entries = {"sizes": listed(NUMBER), "effects": listed(declared(EffectChance))}
     return summary("power --plan", _SETS, entries)
 
 

@@ -31,7 +31,7 @@ from workbench.tuning import (
     Plan,
     Problem,
     Progress,
-    Tuned,
+    TuningResult,
     draw_cases,
     draw_convergence,
     evaluators,
@@ -41,8 +41,7 @@ from workbench.tuning import (
     tune,
     tuned_gains,
 )
-from workbench.tuning.report import format_tuned, headline, write_tuning_page
-from workbench.tuning.report import tuned as tuned_answer
+from workbench.tuning.report import format_tuned, headline, tuning_answer, write_tuning_page
 
 if TYPE_CHECKING:
     from workbench.runtime.cluster import DaskPool
@@ -95,7 +94,7 @@ def _run(
         return Done(status=130)
     content = summarise_tuning(tuned, options.folds)
     content["provenance"] |= {"run": run_of("tune", problem.job.system, sources(problem.cases))}
-    summary = with_answer(tuned_answer(headline(content), content), content)
+    summary = with_answer(tuning_answer(headline(content), content), content)
     if not (progress.kept and _written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
         return Done(status=1)
     draw_convergence(tuned.search.history, out / "convergence.png")
@@ -193,7 +192,7 @@ class _Printed(Progress):
             draw_convergence(history, self._out / "convergence.png")
             self._drawn = now
 
-    def found(self, tuned: Tuned) -> None:
+    def found(self, tuned: TuningResult) -> None:
         """Write the gains, first of all, so that nothing after them can lose them."""
         self.kept = _written(self._out / "gains.toml", tuned_gains(tuned))
 

@@ -16,7 +16,7 @@ _ANEW = "make the results anew with this version"
 
 
 @dataclass(frozen=True)
-class Ran:
+class RunRecord:
     """One run, as its summary tells it.
 
     Attributes
@@ -84,7 +84,7 @@ class Change:
         return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **told}
 
 
-def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) -> list[Ran]:
+def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) -> list[RunRecord]:
     """All runs in a folder and below, by their place.
 
     Parameters
@@ -125,7 +125,7 @@ def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) ->
     return found
 
 
-def _read(path: Path, folder: Path) -> Ran:
+def _read(path: Path, folder: Path) -> RunRecord:
     try:
         content = json.loads(read_text(path, _ANEW))
         run, answer = content["provenance"]["run"], content["answer"]
@@ -134,7 +134,7 @@ def _read(path: Path, folder: Path) -> Ran:
             for key in ("headline", "details")
         )
         _check(run, [*headline.values(), *details.values()])
-        return Ran(
+        return RunRecord(
             folder=path.parent,
             place=path.parent.relative_to(folder).as_posix(),
             summary=path.name,
@@ -179,7 +179,7 @@ def _files(folder: Path) -> dict[str, int]:
     return counts
 
 
-def compare_runs(before: Ran, after: Ran) -> list[Change]:
+def compare_runs(before: RunRecord, after: RunRecord) -> list[Change]:
     """All numbers of two runs of one command: the headline, then the details.
 
     Raises
@@ -227,7 +227,7 @@ def _overlap(measure: Measure, other: Measure) -> bool:
     return measure.low <= other.high and other.low <= measure.high
 
 
-def differences(before: Ran, after: Ran) -> list[str]:
+def differences(before: RunRecord, after: RunRecord) -> list[str]:
     """What else is not the same, so that a change may come from it."""
     found = []
     for key, text in (("system", "system"), ("workbench", "version"), ("commit", "commit")):
@@ -265,12 +265,12 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(entry, f"{path}.{key}" if path else key)
 
 
-def format_runs(found: list[Ran]) -> str:
+def format_runs(found: list[RunRecord]) -> str:
     """What a folder holds, for people."""
     return "\n\n".join("\n".join(_told(one)) for one in found)
 
 
-def _told(ran: Ran) -> Iterator[str]:
+def _told(ran: RunRecord) -> Iterator[str]:
     date = str(ran.run["date"]).replace("T", " ").replace("+00:00", " UTC")
     version = f"workbench {ran.run['workbench']}" + f" ({ran.commit})" * bool(ran.commit)
     count = len(ran.run["data"])
@@ -284,7 +284,7 @@ def _told(ran: Ran) -> Iterator[str]:
     yield f"  files: {kinds}"
 
 
-def format_changes(before: Ran, after: Ran, changes: list[Change]) -> str:
+def format_changes(before: RunRecord, after: RunRecord, changes: list[Change]) -> str:
     """Two runs side by side, for people: what got worse first, numbers of one unit together."""
     lines = [f"{before.run['command']}: {before.folder} -> {after.folder}"]
     lines += [f"not the same, {difference}" for difference in differences(before, after)]

@@ -57,7 +57,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Tuned:
+class TuningResult:
     """What a tuning came to.
 
     Attributes
@@ -128,7 +128,7 @@ class Progress:
     def evolved(self, history: Sequence[Generation]) -> None:
         """A generation is done."""
 
-    def found(self, tuned: Tuned) -> None:
+    def found(self, tuned: TuningResult) -> None:
         """Gains are found; what they are worth is not known yet."""
 
     def warn(self, message: str) -> None:
@@ -231,7 +231,7 @@ def tune(
     folds: int = 0,
     resume: bool = False,
     progress: Progress | None = None,
-) -> Tuned | None:
+) -> TuningResult | None:
     """Search on all cases, then find out what the gains are worth.
 
     Ctrl-C ends the search, or what follows it, and keeps what there is.
@@ -263,7 +263,7 @@ def tune(
     found = run.search(0, range(len(job.recordings)))
     if found is None:
         return None
-    tuned = Tuned(problem, plan, found, before, found.interrupted)
+    tuned = TuningResult(problem, plan, found, before, found.interrupted)
     run.progress.found(tuned)
     return tuned if found.interrupted else run.examine(tuned, folds)
 
@@ -294,7 +294,7 @@ class _Run:
             warn=self.progress.warn,
         )
 
-    def examine(self, tuned: Tuned, folds: int) -> Tuned:
+    def examine(self, tuned: TuningResult, folds: int) -> TuningResult:
         """Find out what gains are worth; Ctrl-C leaves out the rest."""
         pool, problem = self.pool, self.problem
         job, reasoned = problem.job, problem.job.gains.values
@@ -316,7 +316,7 @@ class _Run:
         return tuned
 
 
-def tuned_gains(tuned: Tuned) -> str:
+def tuned_gains(tuned: TuningResult) -> str:
     """The text of gains.toml, with what the gains come from."""
     job, found = tuned.problem.job, tuned.search
     at_bound = tuned.problem.space.at_bound(found.coordinates)
@@ -332,7 +332,7 @@ def tuned_gains(tuned: Tuned) -> str:
     return format_gains(job.gains.with_values(found.best), meaning, came_from)
 
 
-def summarise_tuning(tuned: Tuned, folds: int) -> dict[str, Any]:
+def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
     """All that is known of a tuning, as it is written to summary.json.
 
     Parameters
@@ -397,17 +397,17 @@ def summarise_tuning(tuned: Tuned, folds: int) -> dict[str, Any]:
     }
 
 
-def _provenance(tuned: Tuned) -> dict[str, Any]:
+def _provenance(tuned: TuningResult) -> dict[str, Any]:
     plan = tuned.plan
     return {**tuned.problem.provenance, "seed": plan.seed, "population": plan.population}
 
 
-def _by_case(tuned: Tuned, z_k: Vector) -> dict[str, float]:
+def _by_case(tuned: TuningResult, z_k: Vector) -> dict[str, float]:
     names = (recording.name for recording in tuned.problem.job.recordings)
     return dict(zip(names, z_k.tolist(), strict=True))
 
 
-def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
+def _gains(tuned: TuningResult) -> dict[str, dict[str, Any]]:
     job, space, found = tuned.problem.job, tuned.problem.space, tuned.search
     names, reasoned = job.gains.names, job.gains.values
     lower, upper = space.gains(np.array([np.zeros(len(names)), np.ones(len(names))]))
@@ -427,7 +427,7 @@ def _gains(tuned: Tuned) -> dict[str, dict[str, Any]]:
     }
 
 
-def _as_good(tuned: Tuned) -> Matrix:
+def _as_good(tuned: TuningResult) -> Matrix:
     """Gains of the last candidates whose z is the best but for what does not matter, (s, n)."""
     last = tuned.search.last
     return tuned.problem.space.gains(last.members[last.z <= (1.0 + NEGLIGIBLE) * last.z[0]])

@@ -277,7 +277,7 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def tuned(sentence: str, summary: Mapping[str, Any]) -> Answer:
+def tuning_answer(sentence: str, summary: Mapping[str, Any]) -> Answer:
     """The answer of `tune`.
 
     Parameters

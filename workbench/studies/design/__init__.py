@@ -24,9 +24,9 @@ from workbench.studies.design.candidates import (
     other_settings,
     some_settings,
 )
-from workbench.studies.design.foresight import Foresight, foresight, with_sensor
 from workbench.studies.design.outcome import PROPOSED, NextStop, RankedExperiment, chosen
-from workbench.studies.design.prediction import Outlook, Prediction
+from workbench.studies.design.prediction import DesignProblem, Prediction
+from workbench.studies.design.predictor import ExperimentPredictor, open_predictor, with_sensor
 from workbench.system.experiments import Experiments
 from workbench.system.parts import Signal
 from workbench.system.system import System
@@ -65,7 +65,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         every, plan = every_setting(experiments), some_settings(experiments)
         named = " with ".join(rivals.models[0].effects)
         report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
-        ranked = chosen(_foreseen(system, pool, plan))
+        ranked = chosen(_predict_all(system, pool, plan))
         near = [
             other_setting
             for best in ranked[:_SETTINGS]
@@ -74,7 +74,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         beside = [one for one in every if one in near and one not in plan]
         if beside:
             report(f"{len(beside)} others that differ from the best {_SETTINGS} in one setting")
-            ranked = chosen([*ranked, *_foreseen(system, pool, beside)])
+            ranked = chosen([*ranked, *_predict_all(system, pool, beside)])
         best = [one.candidate for one in ranked[:_SETTINGS]]
         more = [
             other_profile
@@ -83,7 +83,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         ]
         if more:
             report(f"{len(more)} profiles with the best {len(best)}")
-            ranked = chosen([*ranked, *_foreseen(system, pool, more)])
+            ranked = chosen([*ranked, *_predict_all(system, pool, more)])
         if len(rivals.models) > 1:
             report("the best, with the models fitted again in full")
             ranked = _confirmed(pool, ranked)
@@ -104,7 +104,7 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     )
 
 
-def foreseen(
+def predict_experiments(
     system: System, rivals: Rivals, plan: Sequence[Experiment], workers: int
 ) -> list[RankedExperiment]:
     """What experiments of one's own choice would tell, best first; those that would count.
@@ -115,14 +115,14 @@ def foreseen(
         As `next_stop`.
     """
     with _open(system, rivals, workers, lambda _: None) as (experiments, pool):
-        ranked = chosen(_foreseen(system, pool, plan, in_full=True))
+        ranked = chosen(_predict_all(system, pool, plan, in_full=True))
         return [_proposal(system, experiments, one) for one in ranked]
 
 
 @contextmanager
 def _open(
     system: System, rivals: Rivals, workers: int, report: Reporter
-) -> Iterator[tuple[Experiments, Pool[Foresight]]]:
+) -> Iterator[tuple[Experiments, Pool[ExperimentPredictor]]]:
     """What the system allows, and workers with its model."""
     experiments = system.experiments
     if experiments is None:
@@ -138,17 +138,21 @@ def _open(
         everything = Path(scratch) / "AllEffects.fmu"
         report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
-        outlook = Outlook(everything, system, experiments, rivals, effects)
-        with Pool(workers, foresight, outlook) as pool:
+        outlook = DesignProblem(everything, system, experiments, rivals, effects)
+        with Pool(workers, open_predictor, outlook) as pool:
             yield experiments, pool
 
 
-def _foreseen(
-    system: System, pool: Pool[Foresight], plan: Sequence[Experiment], *, in_full: bool = False
+def _predict_all(
+    system: System,
+    pool: Pool[ExperimentPredictor],
+    plan: Sequence[Experiment],
+    *,
+    in_full: bool = False,
 ) -> list[Prediction]:
     """What experiments would tell, those that would count."""
     tasks = [
-        pool.submit(Foresight.foresee, one, number, None, in_full)
+        pool.submit(ExperimentPredictor.predict_experiment, one, number, None, in_full)
         for number, one in enumerate(plan, 1)
     ]
     found = [one for task in tasks if (one := task.result()) is not None]
@@ -163,7 +167,10 @@ def _foreseen(
 
 
 def _sensed(
-    pool: Pool[Foresight], plan: Sequence[Experiment], sensors: Sequence[Signal], parted: int
+    pool: Pool[ExperimentPredictor],
+    plan: Sequence[Experiment],
+    sensors: Sequence[Signal],
+    parted: int,
 ) -> Iterator[tuple[Signal, Prediction]]:
     """The best of some experiments with each sensor more that parts more groups by it.
 
@@ -172,7 +179,7 @@ def _sensed(
 
     def tried(sensor: Signal, some: Sequence[Experiment], in_full: bool) -> list[_Task]:
         return [
-            pool.submit(Foresight.foresee, one, number, sensor, in_full)
+            pool.submit(ExperimentPredictor.predict_experiment, one, number, sensor, in_full)
             for number, one in enumerate(some, 1)
         ]
 
@@ -190,7 +197,7 @@ def _sensed(
             yield sensor, chosen(found)[0]
 
 
-def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Prediction]:
+def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) -> list[Prediction]:
     """The best first: rivals that bend far are known by full fits alone, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
@@ -204,7 +211,7 @@ def _confirmed(pool: Pool[Foresight], ranked: Sequence[Prediction]) -> list[Pred
         # A few ahead: no processor waits for the last one of a part.
         wanted = min(_TOGETHER + pool.workers - 1, _CONFIRMED - len(confirmed))
         some = enumerate(left[len(tasks) : wanted], len(tasks) + 1)
-        tasks += [pool.submit(Foresight.confirm, one, number) for number, one in some]
+        tasks += [pool.submit(ExperimentPredictor.confirm, one, number) for number, one in some]
         found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
         judged, left = left[: len(found)], left[len(found) :]
         doubtful += [signal for signal, well in zip(judged, found, strict=True) if well is None]

@@ -41,7 +41,7 @@ class RankedExperiment:
             "groups": [list(group) for group in found.groups],
             "separation": found.separation,
             "chance": found.right,
-            "separations": np.sqrt(np.maximum(0.0, found.apart)).tolist(),
+            "separations": np.sqrt(np.maximum(0.0, found.pairwise)).tolist(),
             "deviation": {"before": found.precision[0], "after": found.precision[1]},
             "cost": {"value": self.cost, "unit": self.unit},
             "duration": float(found.case.time[-1] - found.case.time[0]),
@@ -174,9 +174,9 @@ def _ratio(found: Prediction) -> float:
 def _told(experiment: RankedExperiment) -> str:
     found = experiment.prediction
     cost = f"cost {experiment.cost:.3g} {experiment.unit}"
-    if len(found.apart) == 1:
+    if len(found.pairwise) == 1:
         return f"{_ratio(found):.2g} times as sure, {cost}"
-    group = " or its group" if 1 < len(found.groups) < len(found.apart) else ""
+    group = " or its group" if 1 < len(found.groups) < len(found.pairwise) else ""
     return (
         f"separation {found.separation:.1f} standard deviations, chance {found.right:.0%} that the "
         f"right one{group} is then named, {cost}"

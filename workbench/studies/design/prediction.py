@@ -21,7 +21,7 @@ from workbench.recordings.case import Case
 from workbench.studies.design.candidates import Experiment
 from workbench.studies.design.recorded import start_of
 from workbench.studies.design.refit import Refit
-from workbench.studies.design.separation import precision, refitted, told_apart
+from workbench.studies.design.separation import discrimination_chance, precision, refitted
 from workbench.system.experiments import Experiments
 from workbench.system.system import System
 
@@ -35,8 +35,8 @@ class Prediction:
     Attributes
     ----------
     candidate, case : the experiment, and a recording of it as the first rival predicts it.
-    apart : (r, r) chi-squared that the second leaves beyond the first where the first is true, in
-        all recordings with this one.
+    pairwise : (r, r) chi-squared that the second rival leaves beyond the first where the first is
+        true, in all recordings with this one.
     chance : (r, r) that a diagnosis then tells them apart.
     precision : mean deviation of the sizes of the first rival, before and after.
     block_time : (b,) [s].
@@ -46,7 +46,7 @@ class Prediction:
 
     candidate: Experiment
     case: Case
-    apart: Matrix
+    pairwise: Matrix
     chance: Matrix
     precision: tuple[float, float]
     block_time: Vector
@@ -63,7 +63,7 @@ class Prediction:
     @property
     def _between(self) -> NDArray[np.bool_]:
         """(r, r) pairs that it parts; all of them where it parts none."""
-        count = len(self.apart)
+        count = len(self.pairwise)
         pairs = ~np.eye(count, dtype=bool)
         if len(self.groups) > 1:
             for group in self.groups:
@@ -73,7 +73,7 @@ class Prediction:
     @property
     def separation(self) -> float:
         """Least distance of two rivals that it parts [standard deviations]; of any, if none."""
-        least = self.apart[self._between].min(initial=np.inf)
+        least = self.pairwise[self._between].min(initial=np.inf)
         return float(np.sqrt(max(0.0, least))) if np.isfinite(least) else 0.0
 
     @property
@@ -88,7 +88,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Outlook:
+class DesignProblem:
     """What experiments are predicted with.
 
     Attributes
@@ -107,7 +107,7 @@ class Outlook:
 
 
 def predicted(
-    asked: Outlook, model: Opened, candidate: Experiment, case: Case, *, in_full: bool
+    asked: DesignProblem, model: Opened, candidate: Experiment, case: Case, *, in_full: bool
 ) -> Prediction:
     """What an experiment would tell.
 
@@ -175,7 +175,7 @@ def _begun(fit: Fit, start: Mapping[str, float]) -> Matrix:
     return deviations
 
 
-def _linearised(fit: Fit, asked: Outlook, rival: Rival, begun: Matrix) -> _Row:
+def _linearised(fit: Fit, asked: DesignProblem, rival: Rival, begun: Matrix) -> _Row:
     rivals, effects = asked.rivals, asked.effects
     start = fit.unknowns.start()
     levels = {key: rival.levels.get(key, usual) for key, usual in start.levels.items()}
@@ -212,7 +212,7 @@ def _prediction(
     leaves: Callable[[_Row, _Row], tuple[float, Matrix]],
 ) -> Prediction:
     count_, first = len(rows), rows[0]
-    apart, chance = np.zeros((count_, count_)), np.ones((count_, count_))
+    pairwise, chance = np.zeros((count_, count_)), np.ones((count_, count_))
     left = [np.zeros_like(first.own.errors(np.zeros(len(first.joint.shared))))]
     for i, (true, model) in enumerate(zip(rows, rivals.models, strict=True)):
         explained = model.explained + _explained(true)
@@ -220,8 +220,8 @@ def _prediction(
             if i == j:
                 continue
             total, errors = leaves(true, other)
-            apart[i, j] = total + rival.chi_squared - model.chi_squared
-            chance[i, j] = told_apart(apart[i, j], explained, fit.decides)
+            pairwise[i, j] = total + rival.chi_squared - model.chi_squared
+            chance[i, j] = discrimination_chance(pairwise[i, j], explained, fit.decides)
             if i == 0:
                 left.append(errors)
     at = [first.joint.shared.index(key) for key in rivals.models[0].sizes]
@@ -229,7 +229,7 @@ def _prediction(
     return Prediction(
         candidate=candidate,
         case=case,
-        apart=apart,
+        pairwise=pairwise,
         chance=chance,
         precision=precision(first.own.eliminated().N, first.information, at),
         block_time=samples.time[samples.blocks.mean(axis=1).astype(int)],

@@ -135,7 +135,7 @@ def write_next_stop(found: NextStop, provenance: Mapping[str, Any], out: Path) -
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    told = with_answer(proposed(summary), summary)
+    told = with_answer(design_answer(summary), summary)
     write_json(out / "next.json", told)
     write_whole(out / "experiments.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
     figure = out / "responses.png"
@@ -184,7 +184,7 @@ def responses_figure(found: NextStop) -> Figure:
     return sheet
 
 
-def proposed(summary: Mapping[str, Any]) -> Answer:
+def design_answer(summary: Mapping[str, Any]) -> Answer:
     """The answer of `next`."""
     best = summary["tried"][0]
     several = len(summary["rivals"]) > 1

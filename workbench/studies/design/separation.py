@@ -47,20 +47,20 @@ def refitted(new: Quadratic, information: Matrix) -> tuple[float, Vector]:
     return total.at(z), z
 
 
-def told_apart(apart: float, explained: float, decides: Thresholds) -> float:
+def discrimination_chance(chi_squared: float, explained: float, decides: Thresholds) -> float:
     """Probability that a diagnosis tells a rival from the true cause.
 
     It says that they cannot be told apart while the rival leaves less chi-squared beyond the best
     than laws may owe to their form. What the true cause takes away, put beside the rival, follows a
-    non-central chi-squared of one degree of freedom, with `apart` as non-centrality.
+    non-central chi-squared of one degree of freedom, with `chi_squared` as non-centrality.
 
     Parameters
     ----------
-    apart : see `refitted`; of all recordings.
+    chi_squared : see `refitted`; of all recordings.
     explained : chi-squared that the true cause explains in all recordings.
     """
     form = max(decides.form, decides.form_share * explained)
-    return float(ncx2.sf(form, 1, max(apart, 0.0)))
+    return float(ncx2.sf(form, 1, max(chi_squared, 0.0)))
 
 
 def precision(new: Matrix, information: Matrix, at: Sequence[int]) -> tuple[float, float]:

@@ -25,8 +25,8 @@ from workbench.studies.distance.forecast import (
     stopping_of,
 )
 from workbench.studies.distance.outcome import Distance, Forecast, PastStop, Safety
-from workbench.studies.distance.past import Past, fitted, places
-from workbench.studies.distance.plain import Plain
+from workbench.studies.distance.past import PastFit, fitted, places
+from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Descent, Tail
 from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, recorded
 from workbench.system.stopping import SPEED, Stopping
@@ -113,7 +113,7 @@ class _Forecasts:
         system: System,
         stopping: Stopping,
         made: Sequence[RecordedStop],
-        past: Past,
+        past: PastFit,
         effort: Effort,
         pool: Pool[Forecaster],
         report: Reporter,
@@ -125,11 +125,11 @@ class _Forecasts:
         for one, values in zip(made, past.own, strict=True):
             at = places(past.joint.shared, system, one.stop.conditions)
             own.append({**{name: float(past.mean[j]) for name, j in at.items()}, **values})
-        halts = [
-            pool.submit(Forecaster.halt, one.stop, values)
+        tasks = [
+            pool.submit(Forecaster.stop, one.stop, values)
             for one, values in zip(made, own, strict=True)
         ]
-        self._model = np.array([halt.result().distance for halt in halts])
+        self._model = np.array([task.result().distance for task in tasks])
         measured = np.array([one.distance for one in made])
         self._left = np.log(measured / self._model)
 
@@ -145,7 +145,7 @@ class _Forecasts:
         for one in drawn:
             one.add_done_callback(counted)
         *each, ahead = [_forecast(one.result()) for one in drawn]
-        nominal = self._pool.submit(Forecaster.halt, stop, {}).result().distance
+        nominal = self._pool.submit(Forecaster.stop, stop, {}).result().distance
         safety, interrupted = self._safety(asked, nominal)
         plain, short = self._plain(asked, nominal)
         return Distance(
@@ -202,7 +202,7 @@ class _Forecasts:
         speed, response = question.stop.asked[SPEED], self._stopping.response
         return Safety.of(tail, effort.decades, speed, response, nominal, spent), interrupted
 
-    def _plain(self, question: Question, nominal: float) -> tuple[Plain | None, bool]:
+    def _plain(self, question: Question, nominal: float) -> tuple[PlainSampling | None, bool]:
         """Plain samples; and whether Ctrl-C left some out."""
         effort = self._effort
         sizes = [_PART] * (effort.plain // _PART) + [effort.plain % _PART]
@@ -224,7 +224,7 @@ class _Forecasts:
         done = [task.result() for task in under_way if task.done() and not task.cancelled()]
         shortness = np.concatenate([np.empty(0), *done])
         speed, response = question.stop.asked[SPEED], self._stopping.response
-        return Plain.of(shortness, effort.decades, speed, response, nominal), interrupted
+        return PlainSampling.of(shortness, effort.decades, speed, response, nominal), interrupted
 
 
 def _forecast(drawn: tuple[Matrix, float]) -> Forecast:

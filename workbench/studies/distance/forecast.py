@@ -16,10 +16,10 @@ from scipy.stats import norm, t
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
-from workbench.studies.distance.past import Known, places
+from workbench.studies.distance.past import MachineLevels, places
 from workbench.studies.distance.rare_events import Descent, descend
 from workbench.studies.distance.recorded import Stop, beyond
-from workbench.studies.distance.way import DrivingInputs, Halt, Stops
+from workbench.studies.distance.simulation import DrivingInputs, StopResult, StopSimulation
 from workbench.system.registry import open_model
 from workbench.system.stopping import Difference, Stopping
 from workbench.system.system import System
@@ -41,7 +41,7 @@ class Question:
     """
 
     stop: Stop
-    known: Known
+    known: MachineLevels
     left: float
     freedom: int
 
@@ -66,12 +66,12 @@ class Forecaster:
 
     def __init__(self, fmu: FMU, system: System, stopping: Stopping) -> None:
         self._fmu, self._system, self._stopping = fmu, system, stopping
-        self._stops = Stops(fmu, system, stopping)
+        self._stops = StopSimulation(fmu, system, stopping)
         self._stepped: tuple[Question, int] | None = None
 
-    def halt(self, stop: Stop, values: Mapping[str, float]) -> Halt:
+    def stop(self, stop: Stop, values: Mapping[str, float]) -> StopResult:
         """Stop with values of parameters, SI, and nothing that differs."""
-        return self._stops.halt(self._drive(stop), {**self._begun(stop), **values})
+        return self._stops.run(self._drive(stop), {**self._begun(stop), **values})
 
     def drawn(self, question: Question, points: Matrix) -> tuple[Matrix, float]:
         """Distances, those of a machine that is known, and the share that nothing claims.
@@ -88,9 +88,9 @@ class Forecaster:
         names = [output.name for output in self._system.outputs]
         distances, outside = [], []
         for drive, values, factor in self._draws(question, points):
-            halt = self._stops.halt(drive, values)
-            readings = dict(zip(names, halt.outputs.T, strict=True))
-            distances.append(halt.distance * factor)
+            result = self._stops.run(drive, values)
+            readings = dict(zip(names, result.outputs.T, strict=True))
+            distances.append(result.distance * factor)
             outside.append(beyond(readings, self._system, self._stopping))
         certain = self.distances(question.certain(), points)
         return np.array([distances, certain]), float(np.mean(outside))
@@ -100,10 +100,10 @@ class Forecaster:
         every, distances = self._samples(question), []
         for drive, values, factor in self._draws(question, points):
             try:
-                halt = self._stops.halt(drive, values, every)
+                result = self._stops.run(drive, values, every)
             except FMUError:  # this one does not bear what serves the others
-                halt = self._stops.halt(drive, values)
-            distances.append(halt.distance * factor)
+                result = self._stops.run(drive, values)
+            distances.append(result.distance * factor)
         return np.array(distances)
 
     def plainly(self, question: Question, samples: int, seed: Sequence[int]) -> Vector:
@@ -151,13 +151,13 @@ class Forecaster:
     def _tried(self, question: Question, points: Matrix, every: int) -> Vector:
         """Distances by the model, NaN if it does not bear such a step."""
         try:
-            halts = [
-                self._stops.halt(drive, values, every)
+            results = [
+                self._stops.run(drive, values, every)
                 for drive, values, _ in self._draws(question, points)
             ]
         except FMUError:
             return np.full(len(points), np.nan)
-        return np.array([halt.distance for halt in halts])
+        return np.array([result.distance for result in results])
 
     def _draws(
         self, question: Question, points: Matrix

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from workbench.arrays import Vector
 from workbench.pages.figures import LIGHT, STYLE
 from workbench.studies.distance.forecast import stopping_of
-from workbench.studies.distance.plain import Plain
+from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Tail, plain_runs
 from workbench.studies.distance.recorded import RecordedStop, Stop
 from workbench.studies.distance.standard import (
@@ -69,7 +69,7 @@ class Forecast:
 
 
 @dataclass(frozen=True)
-class Corrected:
+class NominalStop:
     """A stop as it would be under nominal conditions.
 
     Attributes
@@ -194,7 +194,7 @@ class Distance:
     nominal: float
     past: tuple[PastStop, ...]
     safety: Safety | None
-    plain: Plain | None
+    plain: PlainSampling | None
     interrupted: bool
 
     @property
@@ -211,7 +211,7 @@ class Distance:
         """Equivalent deceleration by which the stop has a distance [m/s2]."""
         return equivalent_rate(self.stop.asked[SPEED], self.response, distance)
 
-    def corrected(self, stop: RecordedStop) -> Corrected | None:
+    def corrected(self, stop: RecordedStop) -> NominalStop | None:
         """A past stop under nominal conditions; None where no nominal speed is near."""
         stopping = stopping_of(self.system)
         nominal, asked = stopping.nominal, stop.stop.asked
@@ -233,7 +233,7 @@ class Distance:
             known = stopping.rating.constants.items()
             constants = next((c for v, c in known if math.isclose(v, speed)), None)
         rating = None if constants is None else percentage(distance, constants)
-        return Corrected(speed, rate, distance, rating)
+        return NominalStop(speed, rate, distance, rating)
 
     @property
     def warnings(self) -> list[str]:

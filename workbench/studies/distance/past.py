@@ -21,7 +21,7 @@ from workbench.system.system import OBSERVER, System
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class MachineLevels:
     """Levels of a machine, as past stops know them.
 
     Attributes
@@ -43,7 +43,7 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class PastFit:
     """A fit to past stops.
 
     Attributes
@@ -59,16 +59,16 @@ class Past:
     mean: Vector
     own: tuple[Mapping[str, float], ...]
 
-    def known(self, without: int | None = None) -> Known:
+    def known(self, without: int | None = None) -> MachineLevels:
         """Levels by all recordings, or by all but one, by one step from the fit to all."""
         stops = self.joint.stops()
         kept = [stop for k, stop in enumerate(stops) if k != without]
         total = add([*kept, self.joint.prior])
         step = minimum(Quadratic(total.N, total.g, total.c, 0))
-        return Known(self.joint.shared, self.mean + step, covariance(total.N))
+        return MachineLevels(self.joint.shared, self.mean + step, covariance(total.N))
 
 
-def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter) -> Past:
+def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter) -> PastFit:
     """Fit levels, and what differs between recordings, to past stops.
 
     Raises
@@ -86,7 +86,7 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
         joint = fit.quadratics(fit.linearise(best, []))
         values = fit.unknowns.values(best.point)
     tolerances = system.comparison.tolerances
-    return Past(
+    return PastFit(
         names=tuple(case.name for case in cases),
         joint=joint,
         mean=np.array([best.point.levels[key] for key in joint.shared]),

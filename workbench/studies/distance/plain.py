@@ -28,7 +28,7 @@ class PlainLevel:
 
 
 @dataclass(frozen=True)
-class Plain:
+class PlainSampling:
     """What plain samples show of a safety level.
 
     Attributes

@@ -12,7 +12,7 @@ from workbench.arrays import Vector
 from workbench.diagnosis.data.counting import excluded_by
 from workbench.errors import InputError
 from workbench.recordings.case import Case, Value, read_conditions
-from workbench.studies.distance.way import GRID
+from workbench.studies.distance.simulation import GRID
 from workbench.system.comparison import Exclusion
 from workbench.system.stopping import COMMAND, Driven, Stopping
 from workbench.system.system import Condition, System

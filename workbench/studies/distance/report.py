@@ -215,7 +215,7 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    told = with_answer(stopping(summary), summary)
+    told = with_answer(distance_answer(summary), summary)
     write_json(out / "distance.json", told)
     tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
     if found.safety is not None:
@@ -229,7 +229,7 @@ def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) ->
     return write_distance_page(found, told, out)
 
 
-def stopping(summary: Mapping[str, Any]) -> Answer:
+def distance_answer(summary: Mapping[str, Any]) -> Answer:
     """The answer of `distance`."""
     shares = summary["distance"]
     middle, low, high = (shares[share] for share in ("0.5", "0.025", "0.975"))

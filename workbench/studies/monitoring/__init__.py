@@ -15,15 +15,28 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case, read_case
 from workbench.runtime.pool import Pool
 from workbench.studies.monitoring.chart import LevelChange
-from workbench.studies.monitoring.estimate import Appraiser, RecordingEstimate, appraising, watched
-from workbench.studies.monitoring.folder import Delivery, deliveries
-from workbench.studies.monitoring.outcome import Monitored, concluded
-from workbench.studies.monitoring.state import Delivered, State, opened
+from workbench.studies.monitoring.estimate import (
+    RecordingEstimate,
+    RecordingEstimator,
+    open_estimator,
+    watched,
+)
+from workbench.studies.monitoring.folder import RecordingFolder, recording_folders
+from workbench.studies.monitoring.outcome import MonitoringResult, concluded
+from workbench.studies.monitoring.state import RecordingResult, State, opened
 from workbench.studies.monitoring.watch import Track
 from workbench.system.registry import open_model
 from workbench.system.system import OBSERVER, System
 
-__all__ = ["RATE", "LevelChange", "Monitored", "RecordingEstimate", "Track", "monitor", "watched"]
+__all__ = [
+    "RATE",
+    "LevelChange",
+    "MonitoringResult",
+    "RecordingEstimate",
+    "Track",
+    "monitor",
+    "watched",
+]
 
 RATE = 0.01
 """Alarms per recording of a sound machine, all quantities together: one in a hundred stops."""
@@ -42,7 +55,7 @@ def monitor(
     workers: int = os.cpu_count() or 1,
     read: Reader = read_case,
     step: Steps = lambda done, total, name: None,
-) -> Monitored:
+) -> MonitoringResult:
     """Estimate what is new in a folder of recordings, and say what has changed in all of them.
 
     A recording that came before is not estimated again, one that is there twice counts once, one
@@ -70,7 +83,7 @@ def monitor(
             remedy="name some parameters of the model there, with corrections",
         )
     with opened(out / STATE, _identity(system)) as state:
-        new = state.missing(deliveries(folder))
+        new = state.missing(recording_folders(folder))
         interrupted = _estimate(system, new, state, workers, read, step)
         told = state.all()
         if interrupted and not any(one.estimate for one in told):
@@ -89,12 +102,17 @@ def _identity(system: System) -> dict[str, Any]:
 
 
 def _estimate(
-    system: System, new: list[Delivery], state: State, workers: int, read: Reader, step: Steps
+    system: System,
+    new: list[RecordingFolder],
+    state: State,
+    workers: int,
+    read: Reader,
+    step: Steps,
 ) -> bool:
     """Estimate what is new; returns whether Ctrl-C ended it. What is done by then is kept."""
     if not new:
         return False
-    with Pool(min(workers, len(new)), appraising, system) as pool:
+    with Pool(min(workers, len(new)), open_estimator, system) as pool:
         try:
             told = pool.completed(partial(_told, read), new)
             for done, (number, one) in enumerate(told, 1):
@@ -105,7 +123,9 @@ def _estimate(
     return False
 
 
-def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Delivered:
+def _told(
+    read: Reader, appraiser: RecordingEstimator, delivery: RecordingFolder
+) -> RecordingResult:
     """What comes of one delivery, in a worker."""
     date, estimate, refusal = "", None, ""
     try:
@@ -115,4 +135,4 @@ def _told(read: Reader, appraiser: Appraiser, delivery: Delivery) -> Delivered:
         refusal = str(error)
     except Exception as error:  # one recording must not cost the others; it is listed
         refusal = f"{delivery.path}: found what no reader expects ({error!r})"
-    return Delivered(delivery.name, delivery.content, date, estimate, refusal)
+    return RecordingResult(delivery.name, delivery.content, date, estimate, refusal)

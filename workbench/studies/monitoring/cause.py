@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.studies.monitoring.outcome import Monitored
+from workbench.studies.monitoring.outcome import MonitoringResult
 from workbench.system.system import Level, System
 
 _MOST = 8  # recordings that are diagnosed: scatter from one to the next is small in their mean
 
 
-def recordings_after(found: Monitored) -> list[str]:
+def recordings_after(found: MonitoringResult) -> list[str]:
     """The last recordings, all of them after the last change, by name.
 
     After the range in which it may have been, where two are left then.
@@ -25,7 +25,7 @@ def recordings_after(found: Monitored) -> list[str]:
     return list((surely if len(surely) > 1 else found.names[last.last + 1 :])[-_MOST:])
 
 
-def known_from_before(found: Monitored) -> System:
+def known_from_before(found: MonitoringResult) -> System:
     """The system with levels of this machine, as recordings before the first change told them.
 
     Of quantities that are alike, only what differs between them; what is common to all is left as
@@ -54,7 +54,7 @@ def known_from_before(found: Monitored) -> System:
     return _with_levels(found.system, given, levels)
 
 
-def _alike(found: Monitored, name: str) -> int:
+def _alike(found: MonitoringResult, name: str) -> int:
     """How many entries the array of a quantity has."""
     array = name.partition("[")[0]
     return sum(track.against and track.name.partition("[")[0] == array for track in found.tracks)

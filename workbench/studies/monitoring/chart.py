@@ -272,6 +272,6 @@ def _gains(values: Vector, weight: Vector) -> Vector:
     """By how much chi-squared falls with another level from each estimate but the first on."""
     sums, weights = np.cumsum(weight * values), np.cumsum(weight)
     left, after = weights[:-1], weights[-1] - weights[:-1]
-    apart = sums[:-1] / left - (sums[-1] - sums[:-1]) / after
-    gains: Vector = apart**2 / (1.0 / left + 1.0 / after)
+    step = sums[:-1] / left - (sums[-1] - sums[:-1]) / after
+    gains: Vector = step**2 / (1.0 / left + 1.0 / after)
     return gains

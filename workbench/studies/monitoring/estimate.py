@@ -58,7 +58,7 @@ def reach(estimated: Estimated) -> float:
     return float((estimated.high - estimated.low) / np.sqrt(12.0))
 
 
-class Appraiser:
+class RecordingEstimator:
     """Estimates the quantities of recordings as constants, by the system's model.
 
     A Kalman filter whose quantities do not walk is recursive least squares on the linearised model,
@@ -137,10 +137,10 @@ class Appraiser:
 
 
 @contextmanager
-def appraising(system: System) -> Iterator[Appraiser]:
+def open_estimator(system: System) -> Iterator[RecordingEstimator]:
     """Open the system's model, and appraise with it."""
     with open_model(system) as model:  # which closes its variants
-        yield Appraiser(system, model)
+        yield RecordingEstimator(system, model)
 
 
 def _parameters(case: Case, system: System) -> dict[str, float]:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from workbench.errors import InputError
 from workbench.runtime.files import write_whole
-from workbench.studies.monitoring import STATE, Monitored, Reader, monitor
+from workbench.studies.monitoring import STATE, MonitoringResult, Reader, monitor
 from workbench.system.system import System
 
 
@@ -34,7 +34,7 @@ class Fleet:
     location: str
     rate: float
     read: Reader
-    write: Callable[[Monitored, Path], object]
+    write: Callable[[MonitoringResult, Path], object]
 
     @property
     def _remote(self) -> Any:
@@ -87,7 +87,7 @@ class Fleet:
 
 
 @dataclass(frozen=True)
-class Watched:
+class MachineResult:
     """What became of one machine.
 
     Attributes
@@ -108,8 +108,8 @@ class FleetWorkers(Protocol):
     """A pool of this machine, or of a cluster."""
 
     def submit(
-        self, function: Callable[[Fleet, str, bytes], Watched], name: str, state: bytes, /
-    ) -> "Future[Watched]":
+        self, function: Callable[[Fleet, str, bytes], MachineResult], name: str, state: bytes, /
+    ) -> "Future[MachineResult]":
         """Have a worker watch a machine."""
 
 
@@ -119,7 +119,7 @@ def serving(fleet: Fleet) -> Iterator[Fleet]:
     yield fleet
 
 
-def watch_machine(fleet: Fleet, machine: str, state: bytes) -> Watched:
+def watch_machine(fleet: Fleet, machine: str, state: bytes) -> MachineResult:
     """Watch one machine, in a worker.
 
     Parameters
@@ -136,16 +136,16 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> Watched:
             found = monitor(fleet.system, folder, out, rate=fleet.rate, workers=1, read=fleet.read)
             fleet.write(found, out)
         except InputError as error:
-            return Watched(machine, refusal=str(error))
+            return MachineResult(machine, refusal=str(error))
         except Exception as error:  # one machine must not cost the others; it is listed
-            return Watched(machine, refusal=f"{machine}: {error!r}")
+            return MachineResult(machine, refusal=f"{machine}: {error!r}")
         files = {path.name: path.read_bytes() for path in sorted(out.iterdir())}
-        return Watched(machine, len(found.names), len(found.changes), "", files)
+        return MachineResult(machine, len(found.names), len(found.changes), "", files)
 
 
 def watch_fleet(
     fleet: Fleet, out: Path, pool: FleetWorkers, step: Callable[[int, int, str], None]
-) -> tuple[list[Watched], bool]:
+) -> tuple[list[MachineResult], bool]:
     """Watch all machines, each into a folder of its own.
 
     Parameters
@@ -163,8 +163,8 @@ def watch_fleet(
     InputError
         If there are no machines.
     """
-    names, found, interrupted = fleet.machines(), list[Watched](), False
-    tasks: list[Future[Watched]] = []
+    names, found, interrupted = fleet.machines(), list[MachineResult](), False
+    tasks: list[Future[MachineResult]] = []
     try:
         for name in names:
             before = out / name / STATE

@@ -8,7 +8,7 @@ from workbench.errors import InputError
 
 
 @dataclass(frozen=True)
-class Delivery:
+class RecordingFolder:
     """One recording as it lies in a folder.
 
     Attributes
@@ -22,7 +22,7 @@ class Delivery:
     path: Path
 
 
-def deliveries(folder: Path) -> list[Delivery]:
+def recording_folders(folder: Path) -> list[RecordingFolder]:
     """All recordings in a folder, by name: each sub-folder is one, whole or not.
 
     Raises
@@ -36,7 +36,7 @@ def deliveries(folder: Path) -> list[Delivery]:
             key=lambda path: path.name,
         )
         if found:
-            return [Delivery(one.name, _content(one), one) for one in found]
+            return [RecordingFolder(one.name, _content(one), one) for one in found]
         reason = "a folder without folders"
     except OSError as error:
         reason = f"what cannot be read ({error.strerror or error})"

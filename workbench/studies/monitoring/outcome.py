@@ -13,7 +13,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.studies.monitoring.chart import LevelChange
 from workbench.studies.monitoring.estimate import watched
-from workbench.studies.monitoring.state import Delivered
+from workbench.studies.monitoring.state import RecordingResult
 from workbench.studies.monitoring.watch import Track, watch
 from workbench.system.system import System
 from workbench.system.units import BAND
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Monitored:
+class MonitoringResult:
     """One machine over its recordings, in the order of their dates.
 
     Attributes
@@ -208,8 +208,8 @@ class Monitored:
 
 
 def concluded(
-    system: System, told: Sequence[Delivered], rate: float, folder: Path, *, interrupted: bool
-) -> Monitored:
+    system: System, told: Sequence[RecordingResult], rate: float, folder: Path, *, interrupted: bool
+) -> MonitoringResult:
     """Watch all recordings that are known, in the order of their dates.
 
     Of a recording that came several times, the last one that could be used counts; of those with
@@ -247,7 +247,7 @@ def concluded(
     values = np.array([estimate.values for estimate in estimates])
     covariances = [estimate.covariance for estimate in estimates]
     tracks, threshold = watch(watched(system), values, covariances, rate)
-    return Monitored(
+    return MonitoringResult(
         system=system,
         names=tuple(one.name for one in counted),
         dates=tuple(one.date for one in counted),

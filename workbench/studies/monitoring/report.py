@@ -17,7 +17,7 @@ from workbench.pages.parts import Cell, Heading, Part, Rows, Strip, number, writ
 from workbench.pages.recordings import placed
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json, write_whole
-from workbench.studies.monitoring import Monitored, Track
+from workbench.studies.monitoring import MonitoringResult, Track
 from workbench.system.units import BAND
 
 _POINT, _LEVEL, _CHANGED = "2", "measured", "7"
@@ -26,7 +26,7 @@ _POINT, _LEVEL, _CHANGED = "2", "measured", "7"
 _ENTRY = re.compile(r"(.+)\[(\d+)\]")
 
 
-def write_monitoring_page(found: Monitored, summary: Mapping[str, Any], out: Path) -> Path:
+def write_monitoring_page(found: MonitoringResult, summary: Mapping[str, Any], out: Path) -> Path:
     """Write the page into the folder; returns its path.
 
     Parameters
@@ -86,7 +86,7 @@ def _first_told(track: Track) -> tuple[float, float]:
     return float(told), -float(surprises.max(initial=0.0))
 
 
-def _warnings(found: Monitored) -> list[str]:
+def _warnings(found: MonitoringResult) -> list[str]:
     said = []
     if found.interrupted:
         said.append("Interrupted: the same command goes on from here.")
@@ -95,7 +95,7 @@ def _warnings(found: Monitored) -> list[str]:
     return said
 
 
-def _strips(tracks: Sequence[Track], found: Monitored) -> list[Strip]:
+def _strips(tracks: Sequence[Track], found: MonitoringResult) -> list[Strip]:
     """Quantities that are entries of one array, in its order: which of them have changed."""
     arrays: dict[str, dict[int, Track]] = {}
     for track in tracks:
@@ -112,7 +112,7 @@ def _strips(tracks: Sequence[Track], found: Monitored) -> list[Strip]:
     return strips
 
 
-def _moved(track: Track, found: Monitored) -> str:
+def _moved(track: Track, found: MonitoringResult) -> str:
     """By how much a quantity is off its first level; empty where it is not."""
     if not track.changes:
         return ""
@@ -122,7 +122,7 @@ def _moved(track: Track, found: Monitored) -> str:
     return f"{size:+.3g} {track.unit}".removesuffix(" 1")
 
 
-def _figure(track: Track, found: Monitored) -> CaseFigure:
+def _figure(track: Track, found: MonitoringResult) -> CaseFigure:
     """Estimates of a quantity and its levels, over the recordings."""
     count = len(found.names)
     scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
@@ -158,7 +158,7 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
     return sound, changed
 
 
-def _said(track: Track, found: Monitored) -> str:
+def _said(track: Track, found: MonitoringResult) -> str:
     if not track.changes:
         return "It has not changed."
     first = track.changes[0]
@@ -258,7 +258,7 @@ _COLUMNS = 4  # of panels
 _POINT_COLOUR, _LEVEL_COLOUR, _ALARM_COLOUR = LIGHT["2"], LIGHT["measured"], LIGHT["7"]
 
 
-def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) -> Path:
+def write_monitoring(found: MonitoringResult, provenance: Mapping[str, Any], out: Path) -> Path:
     """Write all files; returns the page.
 
     Parameters
@@ -266,7 +266,7 @@ def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) 
     provenance : what was run.
     """
     summary = {**found.to_dict(), "provenance": provenance}
-    told = with_answer(watched(summary), summary)
+    told = with_answer(monitoring_answer(summary), summary)
     write_json(out / "summary.json", told)
     for name, frame in (
         ("estimates", found.to_frame()),
@@ -279,7 +279,7 @@ def write_monitored(found: Monitored, provenance: Mapping[str, Any], out: Path) 
     return write_monitoring_page(found, told, out)
 
 
-def history_figure(found: Monitored) -> Figure:
+def history_figure(found: MonitoringResult) -> Figure:
     """Draw each quantity over the recordings: estimates, levels, changes and alarms."""
     tracks = [track for track in found.tracks if np.isfinite(track.values).any()]
     rows = -(-len(tracks) // _COLUMNS)
@@ -319,7 +319,7 @@ def _half(track: Track) -> Vector:
     return half
 
 
-def _draw(axes: Axes, track: Track, found: Monitored) -> None:
+def _draw(axes: Axes, track: Track, found: MonitoringResult) -> None:
     numbers = np.arange(1, len(found.names) + 1)
     axes.errorbar(
         numbers,
@@ -343,7 +343,7 @@ def _draw(axes: Axes, track: Track, found: Monitored) -> None:
         axes.hlines(track.level[0], begin, numbers[-1] + 0.5, color=_LEVEL_COLOUR)
 
 
-def watched(summary: Mapping[str, Any]) -> Answer:
+def monitoring_answer(summary: Mapping[str, Any]) -> Answer:
     """The answer of `monitor`."""
     said, count = summary["sentences"], recordings(summary["recordings"])
     headline = {"alarms": Measure(len(summary["alarms"]), "1", "lower")}

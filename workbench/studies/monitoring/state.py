@@ -16,7 +16,7 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.studies.monitoring.estimate import RecordingEstimate
-from workbench.studies.monitoring.folder import Delivery
+from workbench.studies.monitoring.folder import RecordingFolder
 
 _TABLES = """
 CREATE TABLE IF NOT EXISTS identity (said TEXT NOT NULL);
@@ -28,7 +28,7 @@ CREATE TABLE IF NOT EXISTS deliveries (
 
 
 @dataclass(frozen=True, eq=False)
-class Delivered:
+class RecordingResult:
     """What came of one delivery: an estimate, or why there is none."""
 
     name: str
@@ -44,13 +44,13 @@ class State:
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._connection = connection
 
-    def missing(self, found: list[Delivery]) -> list[Delivery]:
+    def missing(self, found: list[RecordingFolder]) -> list[RecordingFolder]:
         """Those that are not known by name and content."""
         rows = self._connection.execute("SELECT name, content FROM deliveries")
         known = set(rows)
         return [one for one in found if (one.name, one.content) not in known]
 
-    def add(self, told: Delivered) -> None:
+    def add(self, told: RecordingResult) -> None:
         """Keep what came of a delivery; it is on the disk when this returns."""
         estimate = None if told.estimate is None else json.dumps(_plain(told.estimate))
         with self._connection:
@@ -60,13 +60,13 @@ class State:
                 (told.name, told.content, told.date, estimate, told.refusal),
             )
 
-    def all(self) -> list[Delivered]:
+    def all(self) -> list[RecordingResult]:
         """All deliveries, as they came."""
         rows = self._connection.execute(
             "SELECT name, content, date, estimate, refusal FROM deliveries ORDER BY number"
         )
         return [
-            Delivered(name, content, date, _estimate(text) if text else None, refusal)
+            RecordingResult(name, content, date, _estimate(text) if text else None, refusal)
             for name, content, date, text, refusal in rows
         ]
 

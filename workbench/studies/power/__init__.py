@@ -3,7 +3,7 @@
 plan -> sets of recordings by the virtual rig -> verdicts -> statistics
 """
 
-from workbench.studies.power.journal import Diagnosed, Journal, NamedCause
+from workbench.studies.power.journal import Journal, NamedCause, SetVerdict
 from workbench.studies.power.planting import Findable, Plantable, Planting, Repertoire, plan
 from workbench.studies.power.run import diagnose_sets
 from workbench.studies.power.statistics import CLEAR, VISIBLE, share, summarise
@@ -17,7 +17,6 @@ from workbench.studies.power.virtual_rig import (
 __all__ = [
     "CLEAR",
     "VISIBLE",
-    "Diagnosed",
     "Findable",
     "Journal",
     "NamedCause",
@@ -25,6 +24,7 @@ __all__ = [
     "Planting",
     "RecordedSets",
     "Repertoire",
+    "SetVerdict",
     "VirtualRig",
     "diagnose_sets",
     "open_virtual_rig",

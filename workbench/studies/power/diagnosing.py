@@ -97,9 +97,9 @@ def distances_in_set(
         return found, {name: distance(c - least[true]) for name, c in least.items() if name != true}
 
 
-def distance(apart: float) -> float:
+def distance(chi_squared: float) -> float:
     """Standard deviations of a difference of chi-squared, with its sign."""
-    return float(np.sign(apart) * np.sqrt(abs(apart)))
+    return float(np.sign(chi_squared) * np.sqrt(abs(chi_squared)))
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from workbench.diagnosis.inference.rivals import Rivals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
-from workbench.studies.design import RankedExperiment, foreseen, next_stop, with_sensor
+from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
 from workbench.studies.design.candidates import drawn
 from workbench.studies.power.diagnosing import (
     build_everything,
@@ -188,7 +188,7 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
                 fitted = replace(setup, system=with_sensor(setup.system, sensor))
                 row["sensed"] = {"sensor": sensor.label, **_made(sensed, fitted, *rest[1:])}
                 break
-    row["drawn"] = [_made(one, *rest) for one in foreseen(setup.system, rivals, plan, 1)]
+    row["drawn"] = [_made(one, *rest) for one in predict_experiments(setup.system, rivals, plan, 1)]
 
 
 def _made(
@@ -219,7 +219,7 @@ def _made(
         "separations": [
             {
                 "from": name,
-                "predicted": distance(float(experiment.prediction.apart[at, j])),
+                "predicted": distance(float(experiment.prediction.pairwise[at, j])),
                 "shown": shown.get(name),
             }
             for j, name in enumerate(names)

@@ -38,7 +38,7 @@ class NamedCause:
 
 
 @dataclass(frozen=True)
-class Diagnosed:
+class SetVerdict:
     """What was said of one set of recordings.
 
     Attributes
@@ -69,7 +69,7 @@ class Diagnosed:
 
 def diagnosed(
     planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire, seconds: float
-) -> Diagnosed:
+) -> SetVerdict:
     """Keep what statistics need of a diagnosis."""
     causes = tuple(
         NamedCause(
@@ -85,7 +85,7 @@ def diagnosed(
     gain = diagnosis.gain
     before, after = (None, None) if gain is None else (gain.before, gain.after)
     clearness = _clearness(planting, diagnosis, repertoire)
-    return Diagnosed(
+    return SetVerdict(
         planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
     )
 
@@ -126,7 +126,7 @@ class Journal:
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any], *, resume: bool) -> None:
-        self.results: list[Diagnosed] = []
+        self.results: list[SetVerdict] = []
         self.damaged: list[int] = []
         self._path = path
         if path.exists():
@@ -137,7 +137,7 @@ class Journal:
         lines = [sealed(identity), *(sealed(asdict(result)) for result in self.results)]
         write_whole(path, "".join(f"{line}\n" for line in lines))
 
-    def append(self, result: Diagnosed) -> None:
+    def append(self, result: SetVerdict) -> None:
         """Add a verdict; it is on the disk when this returns."""
         self.results.append(result)
         append_line(self._path, sealed(asdict(result)))
@@ -173,7 +173,7 @@ class Journal:
                 self.damaged.append(number)
 
 
-def _result(content: dict[str, Any]) -> Diagnosed:
+def _result(content: dict[str, Any]) -> SetVerdict:
     causes = tuple(
         NamedCause(
             cause["effect"],
@@ -184,4 +184,4 @@ def _result(content: dict[str, Any]) -> Diagnosed:
     )
     planted = content["planting"]
     planting = Planting(**{**planted, "effects": tuple(planted["effects"])})
-    return Diagnosed(**{**content, "planting": planting, "causes": causes})
+    return SetVerdict(**{**content, "planting": planting, "causes": causes})

@@ -21,7 +21,7 @@ SURE = 0.95  # chance from which on a size is called found
 
 
 @dataclass(frozen=True)
-class Foreseen:
+class EffectChance:
     """What a campaign would show of one effect.
 
     Attributes
@@ -41,14 +41,14 @@ class Foreseen:
     least: float | None
 
 
-def foresee(
+def predict_campaign(
     system: System,
     rig: VirtualRig,
     effects: Sequence[Effect],
     wanted: Sequence[Plantable],
     sizes: Sequence[float],
     seed: int,
-) -> list[Foreseen]:
+) -> list[EffectChance]:
     """Chances that effects are named, from one set of recordings without any.
 
     Parameters
@@ -72,29 +72,29 @@ def foresee(
     decides = of_system(system.comparison, len(effects))
     known = {effect.name: effect for effect in effects}
     return [
-        _foreseen(known[one.effect], one, found, sizes, decides)
+        _effect_chance(known[one.effect], one, found, sizes, decides)
         for one in wanted
         if one.effect in known
     ]
 
 
-def _foreseen(
+def _effect_chance(
     effect: Effect,
     planted: Plantable,
     found: Diagnosis,
     sizes: Sequence[float],
     decides: Thresholds,
-) -> Foreseen:
+) -> EffectChance:
     asked = [factor * effect.matters for factor in sizes]
     for score in found.scores:
         if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
             unknowns = 1 + len(score.phases) * effect.order_locked
-            return Foreseen(
+            return EffectChance(
                 *(effect.name, planted.unit, effect.matters, score.sigma),
                 chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in asked),
                 least=max(effect.matters, score.sigma * clear(unknowns, decides)),
             )
-    return Foreseen(effect.name, planted.unit, effect.matters, None, (), None)
+    return EffectChance(effect.name, planted.unit, effect.matters, None, (), None)
 
 
 def chance(distance: float, unknowns: int, decides: Thresholds) -> float:

@@ -16,13 +16,13 @@ from workbench.pages.measures import share_measure, share_with_interval
 from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
 from workbench.runtime.files import write_json
 from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
-from workbench.studies.power.planned import SURE, Foreseen
-from workbench.studies.power.sensitivity import FACTORS, Varied
+from workbench.studies.power.planned import SURE, EffectChance
+from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
 
 
 def write_thresholds(
-    results: Sequence[Varied],
+    results: Sequence[ThresholdSensitivity],
     usual: Mapping[str, float],
     provenance: Mapping[str, Any],
     out: Path,
@@ -52,7 +52,7 @@ def write_thresholds(
     write_json(out / "thresholds.json", with_answer(Answer(sentence, headline), content))
 
 
-def format_thresholds(results: Sequence[Varied], usual: Mapping[str, float]) -> str:
+def format_thresholds(results: Sequence[ThresholdSensitivity], usual: Mapping[str, float]) -> str:
     """Table of what changes, and the thresholds that change nothing."""
     lines = [f"{len(results)} sets, each threshold times {' and '.join(map(str, FACTORS))}", ""]
     idle = []
@@ -195,7 +195,7 @@ def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]
 
 
 def write_plan(
-    rows: Sequence[Foreseen], sizes: Sequence[float], provenance: Mapping[str, Any], out: Path
+    rows: Sequence[EffectChance], sizes: Sequence[float], provenance: Mapping[str, Any], out: Path
 ) -> None:
     """Write plan.json and the figure of chances.
 
@@ -215,7 +215,7 @@ def write_plan(
         save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
 
 
-def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
+def format_plan(rows: Sequence[EffectChance], sizes: Sequence[float]) -> str:
     """Table of chances, by size."""
     lines = [f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
     lines[0] += f"{f'found by {SURE:.0%} from':>24}"
@@ -229,7 +229,7 @@ def format_plan(rows: Sequence[Foreseen], sizes: Sequence[float]) -> str:
     return "\n".join(lines)
 
 
-def _chances(rows: Sequence[Foreseen], sizes: Sequence[float]) -> Figure:
+def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Figure:
     """Chance that an effect is named [%], by effect and size."""
     table = np.array(
         [[100.0 * c for _, c in row.chances] or [0.0] * len(sizes) for row in rows]
@@ -379,7 +379,7 @@ def write_power(
     effects : of the library, in whose order they stand.
     """
     content = {"provenance": provenance, **summary}
-    told = with_answer(powered(summary), content)
+    told = with_answer(power_answer(summary), content)
     write_json(out / "power.json", told)
     write_power_page(told, out)
     names = [effect.name for effect in effects]
@@ -508,7 +508,7 @@ def _text(one: Mapping[str, Any]) -> str:
     return f"{100.0 * one['share']:6.1f} % ({low:.1f} to {high:.1f} %, {_count(one)})"
 
 
-def powered(summary: Mapping[str, Any]) -> Answer:
+def power_answer(summary: Mapping[str, Any]) -> Answer:
     """The answer of `power`."""
     shares = {
         "right cause or its group first": summary["right_first"],

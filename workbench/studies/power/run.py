@@ -16,7 +16,7 @@ from workbench.errors import WorkerError
 from workbench.recordings.case import Case, read_cases
 from workbench.runtime.pool import Pool
 from workbench.studies.power.diagnosing import build_everything, diagnose_set
-from workbench.studies.power.journal import Diagnosed, Journal, diagnosed
+from workbench.studies.power.journal import Journal, SetVerdict, diagnosed
 from workbench.studies.power.planting import Group, Planting, Repertoire
 from workbench.studies.power.virtual_rig import VirtualRig
 from workbench.system.system import System
@@ -63,7 +63,7 @@ def diagnose_sets(
     workers: int,
     resume: bool,
     report: Callable[[str], None],
-) -> tuple[list[Diagnosed], bool]:
+) -> tuple[list[SetVerdict], bool]:
     """Make and diagnose sets of recordings.
 
     Parameters
@@ -116,7 +116,7 @@ def _run(
     total = sum(map(len, groups))
     begin, done = time.perf_counter(), 0
 
-    def collect(task: Future[list[Diagnosed]]) -> None:
+    def collect(task: Future[list[SetVerdict]]) -> None:
         nonlocal done
         for result in _results(task, open_tasks.pop(task)):
             journal.append(result)
@@ -141,17 +141,17 @@ def _run(
     return False
 
 
-def _results(task: "Future[list[Diagnosed]]", group: Group) -> list[Diagnosed]:
+def _results(task: "Future[list[SetVerdict]]", group: Group) -> list[SetVerdict]:
     """What became of a group; a crash must not end a run of hours, and is counted."""
     try:
         return task.result()
     except WorkerError as error:
-        return [Diagnosed(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
+        return [SetVerdict(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
 
 
-def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
+def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:
     """Simulate once, then record and diagnose each set of a group, in a process of its own."""
-    results: list[Diagnosed] = []
+    results: list[SetVerdict] = []
     simulated: Any = None
     for planting in group:
         begin = time.perf_counter()
@@ -162,7 +162,7 @@ def _evaluate(setup: Setup, group: Group) -> list[Diagnosed]:
             found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
         except Exception as error:  # one set must not end a run of hours; it is counted
             seconds = time.perf_counter() - begin
-            results.append(Diagnosed(planting, "failed", (), None, None, seconds, repr(error)))
+            results.append(SetVerdict(planting, "failed", (), None, None, seconds, repr(error)))
         else:
             seconds = time.perf_counter() - begin
             results.append(diagnosed(planting, found, setup.repertoire, seconds))

@@ -34,7 +34,7 @@ _SAMPLES = "samples"
 
 
 @dataclass(frozen=True)
-class Changed:
+class VerdictChange:
     """What another threshold makes of a set.
 
     Attributes
@@ -50,7 +50,7 @@ class Changed:
 
 
 @dataclass(frozen=True)
-class Varied:
+class ThresholdSensitivity:
     """What was said of one set, by the usual thresholds and by others.
 
     Attributes
@@ -61,7 +61,7 @@ class Varied:
 
     planting: Planting
     said: tuple[str, ...]
-    changed: tuple[Changed, ...]
+    changed: tuple[VerdictChange, ...]
 
 
 def values(thresholds: Thresholds) -> dict[str, float]:
@@ -120,7 +120,7 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
     return tuple(frozenset(point.items()) for point in points)
 
 
-def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
+def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> ThresholdSensitivity:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
     usual = of_system(setup.system.comparison, len(setup.effects))
@@ -130,11 +130,11 @@ def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> Varied:
     said = _said(setup, cases, usual.samples, [usual, *variants.values()])
     for samples in {variant.samples for variant in variants.values()} - {usual.samples}:
         said |= _said(setup, cases, samples, variants.values())
-    return Varied(
+    return ThresholdSensitivity(
         planting,
         said[usual],
         tuple(
-            Changed(name, factor, values(variant)[name], said[variant])
+            VerdictChange(name, factor, values(variant)[name], said[variant])
             for (name, factor), variant in variants.items()
             if said[variant][:2] != said[usual][:2]
         ),
@@ -170,7 +170,7 @@ def vary_sets(
     *,
     workers: int,
     report: Callable[[str], None],
-) -> tuple[list[Varied], bool]:
+) -> tuple[list[ThresholdSensitivity], bool]:
     """Diagnose sets of recordings by half and twice of each threshold.
 
     Parameters
@@ -190,7 +190,7 @@ def vary_sets(
     InputError
         If a model is not what it should be.
     """
-    results: list[Varied] = []
+    results: list[ThresholdSensitivity] = []
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
         setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))

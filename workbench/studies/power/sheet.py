@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from workbench.studies.power.journal import Diagnosed
+from workbench.studies.power.journal import SetVerdict
 
 
-def named_wrong(result: Diagnosed) -> bool:
+def named_wrong(result: SetVerdict) -> bool:
     """Whether a cause was named that is not the error of the sheet, nor its stated twin."""
     return any(
         not any(effect and effect in cause.group for effect in result.planting.effects)
@@ -14,7 +14,7 @@ def named_wrong(result: Diagnosed) -> bool:
     )
 
 
-def summarise_sheet(results: Sequence[Diagnosed]) -> list[dict[str, Any]]:
+def summarise_sheet(results: Sequence[SetVerdict]) -> list[dict[str, Any]]:
     """What was said of each set, as it is written to sheet_error.json."""
     return [
         {

@@ -7,7 +7,7 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from workbench.studies.power.journal import Diagnosed
+from workbench.studies.power.journal import SetVerdict
 from workbench.studies.power.planting import Repertoire
 
 VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
@@ -32,14 +32,14 @@ def share(outcomes: Iterable[bool]) -> dict[str, Any]:
     return {"hits": hits, "of": of, "share": hits / of, "low": float(low), "high": float(high)}
 
 
-def named_right(result: Diagnosed) -> bool:
+def named_right(result: SetVerdict) -> bool:
     """Whether what was planted, or a group that it is in, is named first."""
     return bool(result.causes) and any(
         effect in result.causes[0].group for effect in result.planting.effects
     )
 
 
-def above_noise(result: Diagnosed) -> bool:
+def above_noise(result: SetVerdict) -> bool:
     """Whether anything was seen, or could have been: the planted size is clear of its scatter.
 
     The scatter is the least that any estimate from these stops has, by the noise of their sensors,
@@ -48,7 +48,7 @@ def above_noise(result: Diagnosed) -> bool:
     return result.verdict != "nothing" or (result.clearness or 0.0) > CLEAR
 
 
-def named_all(result: Diagnosed) -> bool:
+def named_all(result: SetVerdict) -> bool:
     """Whether each effect that was planted has a cause of its own that is it, or its group."""
     planted = result.planting.effects
     return any(
@@ -57,7 +57,7 @@ def named_all(result: Diagnosed) -> bool:
     )
 
 
-def intervals_cover(result: Diagnosed, repertoire: Repertoire) -> list[bool]:
+def intervals_cover(result: SetVerdict, repertoire: Repertoire) -> list[bool]:
     """For each interval of the planted effect, if it was named first: whether it holds the truth.
 
     A size within the interval of its twin is no claim, and is not judged.
@@ -72,16 +72,16 @@ def intervals_cover(result: Diagnosed, repertoire: Repertoire) -> list[bool]:
     return [low <= true[key] <= high for key, (_, low, high) in stated.items() if key in true]
 
 
-def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
+def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str, Any]:
     """All statistics of a run, as they are written to power.json.
 
     A share has `hits`, `of`, `share` and the 95 % interval `low` to `high`. Sizes are multiples of
     the size that matters. A diagnosis that failed counts as neither right nor "nothing".
     """
-    kinds: dict[str, list[Diagnosed]] = {"clean": [], "single": [], "pair": [], "outside": []}
+    kinds: dict[str, list[SetVerdict]] = {"clean": [], "single": [], "pair": [], "outside": []}
     for result in results:
         kinds[result.planting.kind].append(result)
-    by_name: dict[str, list[Diagnosed]] = {}
+    by_name: dict[str, list[SetVerdict]] = {}
     for result in kinds["single"] + kinds["outside"]:
         by_name.setdefault(next(iter(result.planting.gains)), []).append(result)
     visible = [
@@ -118,12 +118,12 @@ def summarise(results: Sequence[Diagnosed], repertoire: Repertoire) -> dict[str,
     }
 
 
-def _coverage(results: Iterable[Diagnosed], repertoire: Repertoire) -> dict[str, Any]:
+def _coverage(results: Iterable[SetVerdict], repertoire: Repertoire) -> dict[str, Any]:
     """Share of intervals that hold what was planted."""
     return share(held for result in results for held in intervals_cover(result, repertoire))
 
 
-def _by_effect(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
     """What was said of each effect of the library that was planted."""
     return {
         plantable.effect: {
@@ -142,7 +142,7 @@ def _by_effect(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> d
     }
 
 
-def _outside(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dict[str, Any]:
+def _outside(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
     """What was said of each effect that the library does not have."""
     return {
         plantable.name: {
@@ -159,8 +159,8 @@ def _outside(by_name: dict[str, list[Diagnosed]], repertoire: Repertoire) -> dic
 
 
 def _confused(
-    clean: list[Diagnosed], by_name: dict[str, list[Diagnosed]], repertoire: Repertoire
-) -> dict[str, list[Diagnosed]]:
+    clean: list[SetVerdict], by_name: dict[str, list[SetVerdict]], repertoire: Repertoire
+) -> dict[str, list[SetVerdict]]:
     """Sets of each row of the confusion matrix."""
     rows = {
         plantable.effect or plantable.name: _large(by_name[plantable.name])
@@ -170,7 +170,7 @@ def _confused(
     return {"none": clean, **rows}
 
 
-def _pairs(pairs: Sequence[Diagnosed], by_name: dict[str, list[Diagnosed]]) -> dict[str, Any]:
+def _pairs(pairs: Sequence[SetVerdict], by_name: dict[str, list[SetVerdict]]) -> dict[str, Any]:
     """Shares of pairs; those `seen_alone` have effects that mostly are found alone, as large."""
 
     def seen(name: str, multiple: float) -> bool:
@@ -187,10 +187,10 @@ def _pairs(pairs: Sequence[Diagnosed], by_name: dict[str, list[Diagnosed]]) -> d
     }
 
 
-def _large(results: Sequence[Diagnosed]) -> list[Diagnosed]:
+def _large(results: Sequence[SetVerdict]) -> list[SetVerdict]:
     return [result for result in results if result.planting.multiple >= VISIBLE]
 
 
-def _by_size(results: Sequence[Diagnosed]) -> dict[str, list[Diagnosed]]:
+def _by_size(results: Sequence[SetVerdict]) -> dict[str, list[SetVerdict]]:
     sizes = sorted({result.planting.multiple for result in results})
     return {f"{size:g}": [r for r in results if r.planting.multiple == size] for size in sizes}

@@ -40,7 +40,7 @@ class DrivingInputs:
 
 
 @dataclass(frozen=True, eq=False)
-class Halt:
+class StopResult:
     """One stop.
 
     Attributes
@@ -107,7 +107,7 @@ def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: igno
     return _MOVING
 
 
-class Stops:
+class StopSimulation:
     """A model that stops, again and again.
 
     Parameters
@@ -129,7 +129,7 @@ class Stops:
         # All states: how stiff one is changes on the way to standstill.
         self._work = steps(fmu, np.arange(len(fmu.states)), len(inputs))
 
-    def halt(self, drive: DrivingInputs, values: Mapping[str, float], every: int = 1) -> Halt:
+    def run(self, drive: DrivingInputs, values: Mapping[str, float], every: int = 1) -> StopResult:
         """Stop once.
 
         Parameters
@@ -159,4 +159,4 @@ class Stops:
         checked(status, self._fmu)
         assert status == OK
         distance, time, count = self._found
-        return Halt(float(distance), float(time), y[: int(count)].copy())
+        return StopResult(float(distance), float(time), y[: int(count)].copy())

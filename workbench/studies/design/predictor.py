@@ -12,20 +12,20 @@ from workbench.models.fmu import CoSimulation
 from workbench.recordings.case import Case
 from workbench.studies.design.candidates import Experiment
 from workbench.studies.design.claims import counts, left_claims
-from workbench.studies.design.prediction import Outlook, Prediction, predicted
+from workbench.studies.design.prediction import DesignProblem, Prediction, predicted
 from workbench.studies.design.recorded import recorded
 from workbench.system.expression import Expression
 from workbench.system.parts import Signal
 from workbench.system.system import Channel, System
 
 
-class Foresight:
+class ExperimentPredictor:
     """The model with all effects, at hand for one experiment after the other."""
 
-    def __init__(self, asked: Outlook, model: CoSimulation, derived: Opened) -> None:
+    def __init__(self, asked: DesignProblem, model: CoSimulation, derived: Opened) -> None:
         self._asked, self._model, self._derived = asked, model, derived
 
-    def foresee(
+    def predict_experiment(
         self, candidate: Experiment, number: int, sensor: Signal | None, in_full: bool
     ) -> Prediction | None:
         """What an experiment would tell; None where it would not count.
@@ -60,7 +60,9 @@ class Foresight:
                 return None
         return predicted(asked, self._derived, prediction.candidate, prediction.case, in_full=True)
 
-    def _recorded(self, asked: Outlook, candidate: Experiment, rival: Rival, number: int) -> Case:
+    def _recorded(
+        self, asked: DesignProblem, candidate: Experiment, rival: Rival, number: int
+    ) -> Case:
         """A recording of an experiment as a rival predicts it."""
         system, experiments = asked.system, asked.experiments
         added = {sensor.name for sensor in experiments.sensors}
@@ -72,14 +74,14 @@ class Foresight:
 
 
 @contextmanager
-def foresight(asked: Outlook) -> Iterator[Foresight]:
+def open_predictor(asked: DesignProblem) -> Iterator[ExperimentPredictor]:
     """What a worker is prepared with."""
     path, system, given = asked.everything, asked.system, asked.rivals.given
     with CoSimulation(path) as model, opened(path, system, given) as derived:
-        yield Foresight(asked, model, derived)
+        yield ExperimentPredictor(asked, model, derived)
 
 
-def _values(asked: Outlook, candidate: Experiment, rival: Rival) -> dict[str, float]:
+def _values(asked: DesignProblem, candidate: Experiment, rival: Rival) -> dict[str, float]:
     """Parameters of a rival in an experiment."""
     system, rivals, effects = asked.system, asked.rivals, asked.effects
     values = dict(rivals.given)
