@@ -47,7 +47,7 @@ def titled(name: str) -> str:
 
 def errors(summary: Summary) -> Table:
     """Error of the judged signal by case and estimator."""
-    key = f"{SYSTEM.objective.judged}_nrmse"
+    key = f"{SYSTEM.objective.signal}_nrmse"
     cases = summary["cases"]
     names = list(next(iter(cases.values()))["estimators"])
     rows: Table = [["case", *(titled(name) for name in names)]]
@@ -241,13 +241,13 @@ def _gain(options: str) -> str:
 
 def by_case(summary: Summary, name: str) -> dict[str, float]:
     """Error of the judged signal of an estimator by case [% of the mean]."""
-    key = f"{SYSTEM.objective.judged}_nrmse"
+    key = f"{SYSTEM.objective.signal}_nrmse"
     return {case: 100.0 * one["estimators"][name][key] for case, one in summary["cases"].items()}
 
 
 def tuned(untuned: Summary, *summaries: Summary) -> Table:
     """What each tuning gains on the stops that it was made on: itself, and a run with its gains."""
-    judged = SYSTEM.objective.judged
+    judged = SYSTEM.objective.signal
     texts = [f"{judged}, worst stop", f"{judged}, wet discs, mean", f"{judged}, dry discs, mean"]
     columns = [["", "z", *(f"error of {text}" for text in texts), "work saved by dropping"]]
     for name, tuning, after in zip(TUNED, summaries[::2], summaries[1::2], strict=True):
@@ -269,7 +269,7 @@ def tuned(untuned: Summary, *summaries: Summary) -> Table:
 
 def tuned_elsewhere(*summaries: Summary) -> Table:
     """Worst errors on recordings of others: of each set a run before, and one with each gains."""
-    rows: Table = [[f"worst error of {SYSTEM.objective.judged}", *map(titled, TUNED)]]
+    rows: Table = [[f"worst error of {SYSTEM.objective.signal}", *map(titled, TUNED)]]
     runs = 1 + len(TUNED)
     texts = ("fourteen stops of an independent simulator", "six of it, a radius 1.5 mm off")
     for text, (before, *after) in zip(texts, (summaries[:runs], summaries[runs:]), strict=True):
@@ -284,7 +284,7 @@ def tuned_elsewhere(*summaries: Summary) -> Table:
 def judged_by(*summaries: Summary) -> Table:
     """What gains are worth on all stops, by what judged them while they were tuned on four."""
     name = TUNED[0]
-    rows: Table = [["gains", "z", f"worst error of {SYSTEM.objective.judged}"]]
+    rows: Table = [["gains", "z", f"worst error of {SYSTEM.objective.signal}"]]
     texts = ("untuned", "tuned by the load cells", "tuned by the smoother")
     for text, summary in zip(texts, summaries, strict=True):
         z = max(case["estimators"][name]["z"] for case in summary["cases"].values())

@@ -107,7 +107,7 @@ def anything_goes(system: System) -> System:
         system,
         inputs=unknown(system.inputs),
         outputs=unknown(system.outputs),
-        judged=unknown(system.judged),
+        reference_signals=unknown(system.reference_signals),
         conditions=tuple(replace(condition, agrees=None) for condition in system.conditions),
         redundancies=(),
         sampling=Sampling(np.inf, np.inf, np.inf),

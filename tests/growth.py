@@ -18,7 +18,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.system.registry import load_system, open_model
-from workbench.system.system import OBSERVER, Estimated, System
+from workbench.system.system import OBSERVER, EstimatedQuantity, System
 
 from .built import build_here
 
@@ -96,7 +96,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
     speeds = [replace(speed, name=f"omega{i}", reading=f"omega{i}") for i in axles]
     known = {quantity.name: quantity for quantity in system.estimated}
 
-    def estimated(name: str) -> list[Estimated]:
+    def estimated(name: str) -> list[EstimatedQuantity]:
         one = known[f"{name}[1]"]
         return [
             replace(one, name=f"{name}[{i}]", correction=f"d{name}{i}", acts_on=f"omega{i}")
@@ -108,7 +108,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
         models={OBSERVER: replace(system.models[OBSERVER], path=fmu)},
         inputs=(*pressures, *vehicle, given["curve"]),
         outputs=(*speeds, accelerometer),
-        aids=(),
+        intermittent=(),
         estimated=(*estimated("muDC"), *estimated("r"), known["bias"]),
         reported={"force": system.reported["force"]},
         states=(),

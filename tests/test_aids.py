@@ -130,7 +130,7 @@ def test_an_aid_that_is_never_there_changes_nothing(name: str, stop: tuple[Case,
         observe(system, case, name)
         for system, case in (
             (TRAIN, replace(short.without(["vGNSS"]))),
-            (replace(TRAIN, aids=()), replace(short, aids=())),
+            (replace(TRAIN, intermittent=()), replace(short, aids=())),
         )
     ]
     for column in runs[1].columns:
@@ -289,8 +289,10 @@ def test_satellites_tell_radii_that_axles_alone_do_not(tmp_path: Path) -> None:
         ((case, made),) = ridden("02_160_service_dry", seed, tmp_path / str(seed))
         true = 0.46 + made.fixed.radius
         at = int(np.searchsorted(case.time, made.command))
-        for label, system in (("with", TRAIN), ("without", replace(TRAIN, aids=()))):
-            run = observe(system, replace(case, aids=tuple(s.name for s in system.aids)), "ekf")
+        for label, system in (("with", TRAIN), ("without", replace(TRAIN, intermittent=()))):
+            run = observe(
+                system, replace(case, aids=tuple(s.name for s in system.intermittent)), "ekf"
+            )
             radii = np.array([run.signal(f"r[{i}]")[at] for i in range(1, 9)])
             apart[label].append(1e3 * (radii - true))
             common[label].append(float(apart[label][-1].mean()))

@@ -166,7 +166,9 @@ def test_outputs_of_one_unit_share_a_panel(boiler: System) -> None:
     """Where another signal is judged, which has a panel of its own."""
     judged = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
     other = replace(
-        boiler, judged=(judged,), objective=replace(boiler.objective, judged=judged.name)
+        boiler,
+        reference_signals=(judged,),
+        objective=replace(boiler.objective, signal=judged.name),
     )
     titles = [view.title for view in views(other)]
     assert titles[0] == "Temperature of the skin TSkin (solid), temperature of the water T (dashed)"

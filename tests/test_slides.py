@@ -117,8 +117,8 @@ def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
     )
     system = replace(SYSTEM, comparison=replace(SYSTEM.comparison, exclusions=exclusions))
     # No structure stands before these load cells.
-    judged = tuple(replace(signal, mode=None) for signal in system.judged)
-    system = replace(system, judged=judged)
+    judged = tuple(replace(signal, mode=None) for signal in system.reference_signals)
+    system = replace(system, reference_signals=judged)
     samples = ready(sliding(1.0), system)
     with simulating(Simulated(MINIMAL, system, (samples,))) as simulator:
         weighed = simulator.weighed(0, WET)

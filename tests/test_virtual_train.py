@@ -172,7 +172,7 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Pa
     samples = growth.stop(generated)
     same = {quantity.name for quantity in generated.estimated}
     estimated = tuple(quantity for quantity in SYSTEM.estimated if quantity.name in same)
-    for one in (replace(SYSTEM, estimated=estimated, aids=()), generated):
+    for one in (replace(SYSTEM, estimated=estimated, intermittent=()), generated):
         # Inputs of a system file stand in an order of its own.
         order = [[x.name for x in generated.inputs].index(x.name) for x in one.inputs]
         names = [x.name for x in one.estimated]

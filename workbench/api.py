@@ -165,7 +165,7 @@ def case_from_frame(
         signals=found,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.aids),
+        aids=tuple(aid.name for aid in system.intermittent),
         source=Path(name),
         doubts=doubts(time_, found, given, system, origin),
     )

@@ -94,7 +94,7 @@ def _run(
 
 def _units(system: System) -> dict[str, str]:
     """Of the numbers in a summary that are not plain; gains have those of their file."""
-    judged = system.objective.judged
+    judged = system.objective.signal
     unit = system.signals[judged].unit
     return {f"{judged}_rms_{unit}": unit, "seconds": "s"}
 

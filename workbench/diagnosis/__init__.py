@@ -303,7 +303,7 @@ def _observers(
     """Errors of the judged signal, with the gains of the nominal model in both."""
     system, cases = simulations.system, simulations.cases
     turning = any(effect.order_locked for effect in diagnosis.best.active)
-    judged = all(system.objective.judged in case for case in cases)
+    judged = all(system.objective.signal in case for case in cases)
     if extension is None or turning or not judged:
         return {}
     report("observers with both models")

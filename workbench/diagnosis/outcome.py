@@ -97,7 +97,7 @@ class Outcome:
     @property
     def missing(self) -> tuple[Signal, ...]:
         """What could be compared, if recordings had it."""
-        judged = self.system.judged
+        judged = self.system.reference_signals
         return tuple(
             signal for signal in judged if not any(signal.name in case for case in self.cases)
         )

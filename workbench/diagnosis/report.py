@@ -153,7 +153,9 @@ def _words(
 ) -> dict[str, Any]:
     """What the page calls signals, times and what is judged."""
     compare, objective = system.comparison, system.objective
-    judged = [signal for signal in system.judged if signal.name not in summary["channels"]]
+    judged = [
+        signal for signal in system.reference_signals if signal.name not in summary["channels"]
+    ]
     leading = compare.leading
     return {
         "inputs": " and ".join(one.label for one in system.inputs),
@@ -161,7 +163,7 @@ def _words(
         "missing": capital(" and ".join(named(system, signal.name) for signal in judged)),
         "block": duration(compare.block),
         "shown": duration(lasting_blocks(system) * compare.block),
-        "error": f"error of the {called(system, objective.judged)}, rms over mean "
+        "error": f"error of the {called(system, objective.signal)}, rms over mean "
         f"{objective.when}".rstrip(),
         # Balances stand below the errors of channels.
         "balances": figures[0].panels[-1].curves[0].style == "measured",

@@ -133,8 +133,8 @@ class Estimator(ABC):
     @classmethod
     def fed(cls, system: System) -> System:
         """A system as the estimator sees it: outputs are all that corrects its estimates."""
-        aids = system.aids if cls.aided else ()
-        return replace(system, outputs=(*system.outputs, *aids), aids=())
+        aids = system.intermittent if cls.aided else ()
+        return replace(system, outputs=(*system.outputs, *aids), intermittent=())
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:

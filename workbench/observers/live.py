@@ -31,7 +31,7 @@ class LiveWindow:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._signals = [system.objective.judged, *(quantity.name for quantity in system.estimated)]
+        self._signals = [system.objective.signal, *(quantity.name for quantity in system.estimated)]
         units = [shown_unit(system, name) for name in self._signals]
         self._titles = [
             f"{named(system, name)} [{unit}]"

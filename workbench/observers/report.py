@@ -53,7 +53,7 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     objective = system.objective
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
-    lines = [f"Error of {objective.judged}, rms / mean{when} ({limits})", header, "-" * len(header)]
+    lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})", header, "-" * len(header)]
     for result in results:
         cells = [_percent(result.scores[name].nrmse) for name in names]
         lines.append(f"{result.case.name:<{width}}" + "".join(f"{cell:>22}" for cell in cells))
@@ -153,7 +153,7 @@ def usual_error(errors: Sequence[float]) -> tuple[float | None, float | None, fl
 
 def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     """The answer of `simulate`."""
-    judged = system.objective.judged
+    judged = system.objective.signal
     ranking = standings(summary, judged)
     best = ranking[0]
     headline = {}
@@ -201,7 +201,7 @@ def write_page(
     figures : one per case of the summary.
     planned : number of cases that were asked for; more than there are after an interruption.
     """
-    judged = system.objective.judged
+    judged = system.objective.signal
     ranking = standings(summary, judged)
     best = ranking[0]
 

@@ -117,7 +117,7 @@ def score(case: Case, run: Run, system: System) -> Score:
     objective = system.objective
     if run.ending is not Ending.OK:
         return Score(None, None, None, f"{run.ending.value} {run.message}".strip())
-    if missing := [name for name in (objective.judged, *objective.weights) if name not in case]:
+    if missing := [name for name in (objective.signal, *objective.weights) if name not in case]:
         return Score(None, None, None, f"the recording has no {missing[0]} to judge by")
     # A method that takes a signal as measured makes no error in it.
     deviations = np.column_stack(
@@ -131,7 +131,7 @@ def score(case: Case, run: Run, system: System) -> Score:
     window = judged_window(case, system)
     if window.stop - window.start < 2:
         return Score(None, None, z, "the recording holds nothing that is judged")
-    error = run.signal(objective.judged) - case[objective.judged]
-    measured = low_pass(case.time, case[objective.judged], objective.bandwidth)
+    error = run.signal(objective.signal) - case[objective.signal]
+    measured = low_pass(case.time, case[objective.signal], objective.bandwidth)
     rms = float(np.sqrt(np.mean(low_pass(case.time, error, objective.bandwidth)[window] ** 2)))
     return Score(rms, rms / float(np.mean(np.abs(measured[window]))), z, "")

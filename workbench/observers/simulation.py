@@ -63,14 +63,14 @@ class CaseResult:
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
-        judged, bandwidth = self.system.objective.judged, self.system.objective.bandwidth
+        judged, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
         if judged not in self.case:
             return None
         return low_pass(self.case.time, self.case[judged], bandwidth)
 
     def error(self, name: str) -> Vector | None:
         """Estimated minus measured signal below the bandwidth, (n,); None if not measured."""
-        judged, bandwidth = self.system.objective.judged, self.system.objective.bandwidth
+        judged, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
         if judged not in self.case:
             return None
         error = self.runs[name].signal(judged) - self.case[judged]
@@ -93,7 +93,7 @@ class CaseResult:
         `sigma_...` are standard deviations, `..._claimed` is 1 where a quantity may be claimed.
         """
         system, case = self.system, self.case
-        judged, bandwidth = system.objective.judged, system.objective.bandwidth
+        judged, bandwidth = system.objective.signal, system.objective.bandwidth
         columns: dict[str, Any] = {"time [s]": case.time}
         for name, signal in system.signals.items():
             if name in case:
@@ -113,7 +113,7 @@ class CaseResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Title and doubts of the case, and scores by estimator, as plain numbers and texts."""
-        judged = self.system.objective.judged
+        judged = self.system.objective.signal
         unit = self.system.unit(judged)
         return {
             "title": self.case.title,
@@ -191,7 +191,7 @@ class Simulation:
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
         """The smoother's estimate, where a recording has nothing that is only there to judge by."""
         kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
-        if any(signal.name in case for signal in self.system.judged) or kept > _MOST:
+        if any(signal.name in case for signal in self.system.reference_signals) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoothed(case, self.system)
 
@@ -320,7 +320,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
     judged, panels = case.time[window], []
     for view in views(system):
         panels.append(_seen(result, chosen, view))
-        if system.objective.judged in view.signals:
+        if system.objective.signal in view.signals:
             panels.append(_residual(result, chosen, window))
     panels.append(_probabilities(result.runs.values()))
     return CaseFigure(
@@ -348,7 +348,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     curves: list[Curve] = []
     measured, here = None, system.under(case.conditions)
     for number, name in enumerate(view.signals):
-        factor, judged = per_shown(system, name, unit), name == system.objective.judged
+        factor, judged = per_shown(system, name, unit), name == system.objective.signal
         if judged or name not in fed:
             for style, run in known if name in fed else known + best:
                 curves += _estimated(run, style, name, factor)
@@ -374,7 +374,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
 
 def _is_fed(system: System, name: str) -> bool:
     """Whether a signal is derived from what is fed; a sensor that only judges has its own panel."""
-    judged = {signal.name for signal in system.judged}
+    judged = {signal.name for signal in system.reference_signals}
     return any(
         signal.name == name and not signal.formula.names & judged for signal in system.derived
     )
@@ -383,7 +383,7 @@ def _is_fed(system: System, name: str) -> bool:
 def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
     """Error of the judged signal by estimator."""
     system = result.system
-    judged = system.objective.judged
+    judged = system.objective.signal
     unit = shown_unit(system, judged)
     curves = [
         Curve(styles[name], error / per_shown(system, judged, unit))
@@ -417,7 +417,7 @@ def _reach(errors: Sequence[Vector]) -> float:
 
 def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]:
     """Style and text of each entry."""
-    system, judged = result.system, result.system.objective.judged
+    system, judged = result.system, result.system.objective.signal
     entries = [("measured", "measured")]
     if judged in result.case and below(system):
         entries = [
@@ -435,7 +435,7 @@ def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]
 
 def _finding(result: CaseResult) -> str:
     """Errors of the estimators, the least first."""
-    system, signal = result.system, result.system.objective.judged
+    system, signal = result.system, result.system.objective.signal
     judged = sorted(
         (score.nrmse, label(name, system), score.rms)
         for name, score in result.scores.items()

@@ -12,7 +12,7 @@ def views(system: System) -> tuple[View, ...]:
     """Panels that the system declares; else all its signals, those of one unit together."""
     if system.panels:
         return system.panels
-    judged = system.objective.judged
+    judged = system.objective.signal
     outputs: dict[str, list[str]] = {}
     for output in system.outputs:
         if output.name != judged:

@@ -288,7 +288,7 @@ def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.aids),
+        aids=tuple(aid.name for aid in system.intermittent),
         source=path,
         doubts=doubts(measured.time, signals, conditions, system, origin),
     )
@@ -331,7 +331,7 @@ def read_case(folder: Path, system: System) -> Case:
         signals=signals,
         inputs=tuple(one.name for one in system.inputs),
         outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.aids),
+        aids=tuple(aid.name for aid in system.intermittent),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         date=document.date("date"),
@@ -487,10 +487,12 @@ def _read_signals(
     source: Path, columns: dict[str, str], system: System
 ) -> tuple[Vector, dict[str, Vector]]:
     """Time and signals in SI units; what only judges or aids may be missing under its own name."""
-    spare = [signal.name for signal in (*system.judged, *system.aids)]
+    spare = [signal.name for signal in (*system.reference_signals, *system.intermittent)]
     optional = [name for name in spare if columns[name] == name]
     required = [column for signal, column in columns.items() if signal not in optional]
-    recorded = read_columns(source, required, optional, [columns[aid.name] for aid in system.aids])
+    recorded = read_columns(
+        source, required, optional, [columns[aid.name] for aid in system.intermittent]
+    )
     units = {"time": "s", **{name: signal.unit for name, signal in system.signals.items()}}
     signals = {}
     for signal, column in columns.items():

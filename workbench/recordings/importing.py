@@ -24,7 +24,7 @@ from workbench.recordings.formats.stamps import iso
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.runtime.files import write_json, write_whole
 from workbench.runtime.resources import commit
-from workbench.system.parts import Cutting
+from workbench.system.parts import RecordingSplit
 from workbench.system.system import System
 from workbench.system.tables import Table
 
@@ -69,7 +69,7 @@ def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut
 def _parts(
     time: Vector,
     signals: Mapping[str, Vector],
-    rule: Cutting,
+    rule: RecordingSplit,
     pieces: list[tuple[int, int]],
     system: System,
 ) -> list[Cut]:

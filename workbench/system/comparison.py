@@ -25,7 +25,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Leading:
+class LeadingOutput:
     """A slow motion that integrates the noise of inputs: a measured output leads it.
 
     Attributes
@@ -168,7 +168,7 @@ class Comparison:
     left: float
     false_alarms: float
     channels: tuple[Channel, ...]
-    leading: Leading | None
+    leading: LeadingOutput | None
     begins: Threshold | None
     rest: Rest | None
     tolerances: Mapping[str, float]

@@ -79,7 +79,7 @@ class Signal:
     plausible: tuple[float, float]
     possible: tuple[float, float]
     called: tuple[str, ...]
-    recorded_as: "Derived | None"
+    recorded_as: "DerivedSignal | None"
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
@@ -97,7 +97,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Derived:
+class DerivedSignal:
     """A signal made of measured ones and of parameters.
 
     Attributes
@@ -112,7 +112,7 @@ class Derived:
 
 
 @dataclass(frozen=True)
-class Estimated:
+class EstimatedQuantity:
     """A quantity that observers estimate: a parameter of the model, which an input corrects.
 
     Attributes
@@ -182,7 +182,7 @@ class Tolerance:
 
 
 @dataclass(frozen=True)
-class Cutting:
+class RecordingSplit:
     """Which parts of a long recording are recordings of their own.
 
     Attributes
@@ -252,7 +252,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Fading:
+class FeedbackFading:
     """Feedback fades out where a signal is small against `half`, at which half is left [unit]."""
 
     signal: str
@@ -260,7 +260,7 @@ class Fading:
 
 
 @dataclass(frozen=True)
-class Rolling:
+class RollingStates:
     """Two states in a fixed ratio while an output is zero, which saturates: one follows the other.
 
     Attributes
@@ -296,14 +296,14 @@ class Objective:
 
     Attributes
     ----------
-    judged : signal whose error counts.
+    signal : whose error counts.
     weights : of the mean absolute deviation by signal [1/unit].
     bandwidth : below which deviations count [Hz].
     begins, ends : of the time that is judged: from the first sample above to the last one above.
     when : what that time is, for people.
     """
 
-    judged: str
+    signal: str
     weights: Mapping[str, float]
     bandwidth: float
     begins: Threshold | None
@@ -312,7 +312,7 @@ class Objective:
 
 
 @dataclass(frozen=True)
-class Following:
+class StepTracking:
     """What tuned gains must do: find a step of a quantity within a time, but for a share."""
 
     quantity: str

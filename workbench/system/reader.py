@@ -15,7 +15,7 @@ from workbench.system.comparison import (
     Comparison,
     Exclusion,
     Influence,
-    Leading,
+    LeadingOutput,
     Level,
     Rest,
     Wander,
@@ -37,20 +37,20 @@ from workbench.system.parts import (
     LARGEST,
     Agreement,
     Condition,
-    Cutting,
-    Derived,
-    Estimated,
+    DerivedSignal,
+    EstimatedQuantity,
     Export,
-    Fading,
-    Following,
+    FeedbackFading,
     Mode,
     Model,
     Objective,
     OperatingPoint,
+    RecordingSplit,
     Redundancy,
-    Rolling,
+    RollingStates,
     Sampling,
     Signal,
+    StepTracking,
     Store,
     Threshold,
     Tolerance,
@@ -60,9 +60,9 @@ from workbench.system.stopping import (
     COMMAND,
     END,
     SPEED,
-    Asked,
+    AskedQuantity,
     Difference,
-    Driven,
+    DrivenInput,
     Nominal,
     Rating,
     Stopping,
@@ -168,14 +168,14 @@ def read_measured(file: Table, group: str) -> tuple[Signal, ...]:
     return tuple(found)
 
 
-def _recorded_as(signal: Table, name: str) -> Derived:
+def _recorded_as(signal: Table, name: str) -> DerivedSignal:
     """What recorders have in the place of a signal."""
     table = signal.table("recorded_as")
     table.refuse_unknown("is unit")
     formula = Expression(table.take("is", str), f"{table.where} is")
     if name not in formula.names:
         raise table.wrong("is", f"a formula of {name}")
-    return Derived(name, table.unit("unit"), formula.text, formula)
+    return DerivedSignal(name, table.unit("unit"), formula.text, formula)
 
 
 def _limits(table: Table, key: str, unit: str) -> tuple[float, float]:
@@ -196,7 +196,7 @@ def read_mode(table: Table) -> Mode:
     )
 
 
-def read_derived(table: Table, unit: str = "") -> tuple[Derived, ...]:
+def read_derived(table: Table, unit: str = "") -> tuple[DerivedSignal, ...]:
     """What is made of measured signals and of parameters; in one unit, or each in its own."""
     found = []
     for name in table.content:
@@ -206,11 +206,13 @@ def read_derived(table: Table, unit: str = "") -> tuple[Derived, ...]:
         else:
             own.refuse_unknown("is unit label")
         formula = Expression(own.take("is", str), f"{own.where} is")
-        found.append(Derived(name, unit or own.unit("unit"), own.text("label", name), formula))
+        found.append(
+            DerivedSignal(name, unit or own.unit("unit"), own.text("label", name), formula)
+        )
     return tuple(found)
 
 
-def read_estimated(table: Table) -> tuple[Estimated, ...]:
+def read_estimated(table: Table) -> tuple[EstimatedQuantity, ...]:
     """Estimated quantities."""
     found = []
     for name in table.content:
@@ -226,7 +228,7 @@ def read_estimated(table: Table) -> tuple[Estimated, ...]:
         prior = own.numbers("prior", unit, 2) if "prior" in own else (low, high)
         reach = (high - low) / math.sqrt(12.0)
         found.append(
-            Estimated(
+            EstimatedQuantity(
                 name=name,
                 correction=own.take("correction", str),
                 label=own.text("label", name),
@@ -373,15 +375,15 @@ def read_threshold(table: Table, system: System, side: str = "above") -> Thresho
 def read_objective(table: Table, system: System) -> Objective:
     """What is judged, and how it is weighed."""
     table.refuse_unknown("judged weights bandwidth begins ends when")
-    first = (*system.judged, *system.outputs)[0].name
+    first = (*system.reference_signals, *system.outputs)[0].name
     judged = table.text("judged", first)
-    compared = {signal.name: signal for signal in (*system.outputs, *system.judged)}
+    compared = {signal.name: signal for signal in (*system.outputs, *system.reference_signals)}
     weights = table.table("weights")
     weights.refuse_unknown(compared)
     if judged not in compared:
         raise table.wrong("judged", f"one of {', '.join(compared)}")
     return Objective(
-        judged=judged,
+        signal=judged,
         # Else each deviation counts by the size of its signal.
         weights={name: weights.number(name, "1") for name in weights.content}
         or {name: 1.0 / one.scale for name, one in compared.items()},
@@ -392,25 +394,27 @@ def read_objective(table: Table, system: System) -> Objective:
     )
 
 
-def read_fading(table: Table, system: System) -> Fading:
+def read_fading(table: Table, system: System) -> FeedbackFading:
     """A signal, a sum of outputs, with which feedback fades."""
     table.refuse_unknown("signal half")
     signal = table.take("signal", str)
     system.refuse_missing(signal, f"{table.where} signal")
-    return Fading(signal, table.number("half", system.unit(signal)))
+    return FeedbackFading(signal, table.number("half", system.unit(signal)))
 
 
-def read_rolling(table: Table) -> Rolling:
+def read_rolling(table: Table) -> RollingStates:
     """Two states that roll along."""
     table.refuse_unknown("follower leader zero")
-    return Rolling(table.take("follower", str), table.take("leader", str), table.take("zero", str))
+    return RollingStates(
+        table.take("follower", str), table.take("leader", str), table.take("zero", str)
+    )
 
 
-def read_following(table: Table) -> Following:
+def read_following(table: Table) -> StepTracking:
     """A quantity that gains must find in time."""
     table.refuse_unknown("quantity within left")
     quantity, within = table.take("quantity", str), table.number("within", "s")
-    return Following(quantity, within, table.number("left", "1"))
+    return StepTracking(quantity, within, table.number("left", "1"))
 
 
 def read_view(table: Table, system: System) -> View:
@@ -475,7 +479,7 @@ def _rate(table: Table) -> float:
 
 def read_channels(table: Table, system: System) -> tuple[Channel, ...]:
     """Channels as declared; else what is measured, one by one."""
-    measured = {signal.name: signal for signal in (*system.outputs, *system.judged)}
+    measured = {signal.name: signal for signal in (*system.outputs, *system.reference_signals)}
     if not table.content:
         usual = {n: {"is": n, "unit": one.unit, "shown": one.shown} for n, one in measured.items()}
         table = Table(usual, table.where)
@@ -506,11 +510,13 @@ def read_influences(table: Table) -> tuple[Influence, ...]:
     return tuple(found)
 
 
-def read_leading(table: Table) -> Leading:
+def read_leading(table: Table) -> LeadingOutput:
     """A slow motion that an output leads."""
     table.refuse_unknown("output together ripple")
     output = table.take("output", str)
-    return Leading(output, table.texts("together") or (output,), table.number("ripple", "1", 1.0))
+    return LeadingOutput(
+        output, table.texts("together") or (output,), table.number("ripple", "1", 1.0)
+    )
 
 
 def read_rest(table: Table, system: System) -> Rest:
@@ -630,7 +636,7 @@ def _formula(table: Table, key: str, known: Collection[str], expected: str) -> E
     return _known(Expression(table.take(key, str), f"{table.where} {key}"), known, expected)
 
 
-def _asked(table: Table, measured: Collection[str]) -> tuple[Asked, ...]:
+def _asked(table: Table, measured: Collection[str]) -> tuple[AskedQuantity, ...]:
     found = []
     for name in table.content:
         own = Table(table.take(name, dict), f"{table.where} {name}")
@@ -643,16 +649,16 @@ def _asked(table: Table, measured: Collection[str]) -> tuple[Asked, ...]:
             raise own.wrong("at", f"{COMMAND} or {END}")
         formula = _formula(own, "is", measured, "a measured signal, or a parameter")
         label, usual = own.text("label", name), own.number("usual", unit)
-        found.append(Asked(name, label, unit, shown, formula, place, usual))
+        found.append(AskedQuantity(name, label, unit, shown, formula, place, usual))
     return tuple(found)
 
 
-def _driven(inputs: Table, name: str, asked: Collection[str]) -> Driven:
+def _driven(inputs: Table, name: str, asked: Collection[str]) -> DrivenInput:
     own = Table(inputs.take(name, dict), f"{inputs.where} {name}")
     own.refuse_unknown("is delay lag along")
     formula = _formula(own, "is", asked, "an asked quantity")
     delay, lag = own.number("delay", "s", 0.0), own.number("lag", "s", 0.0)
-    return Driven(name, formula, delay, lag, "along" in own and own.take("along", bool))
+    return DrivenInput(name, formula, delay, lag, "along" in own and own.take("along", bool))
 
 
 def _difference(table: Table, system: System, states: Collection[str]) -> Difference:
@@ -840,10 +846,10 @@ def _store(table: Table) -> Store:
     return Store(formula, positive(table, "over"))
 
 
-def read_cutting(table: Table, system: System) -> Cutting:
+def read_cutting(table: Table, system: System) -> RecordingSplit:
     """Which parts of a long recording are recordings of their own."""
     table.refuse_unknown("begins ends released before after")
-    return Cutting(
+    return RecordingSplit(
         begins=read_threshold(table.table("begins"), system),
         ends=read_threshold(table.table("ends"), system, "below"),
         released=table.number("released", "s", 0.0),
@@ -1010,8 +1016,8 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         spreads=read_of_states(states, "spread", units),
         inputs=groups["inputs"],
         outputs=groups["outputs"],
-        judged=groups["judged"],
-        aids=groups["aids"],
+        reference_signals=groups["judged"],
+        intermittent=groups["aids"],
         derived=read_derived(file.table("derived")),
         estimated=read_estimated(file.table("estimated")),
         work=read_derived(file.table("work"), "W"),

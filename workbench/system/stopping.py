@@ -11,7 +11,7 @@ SPEED = "speed"  # the quantity that every stop is asked for: that at the comman
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedQuantity:
     """A quantity that a stop is asked for.
 
     Attributes
@@ -31,7 +31,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenInput:
     """An input of the model in a stop.
 
     Attributes
@@ -123,8 +123,8 @@ class Stopping:
     rest: float
     longest: float
     timed_by: str
-    asked: tuple[Asked, ...]
-    driven: tuple[Driven, ...]
+    asked: tuple[AskedQuantity, ...]
+    driven: tuple[DrivenInput, ...]
     start: Mapping[str, Expression]
     differences: tuple[Difference, ...]
     outside: tuple[Exclusion, ...]

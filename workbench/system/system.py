@@ -18,7 +18,7 @@ from workbench.system.comparison import (
     Comparison,
     Exclusion,
     Influence,
-    Leading,
+    LeadingOutput,
     Level,
     Rest,
 )
@@ -26,20 +26,20 @@ from workbench.system.experiments import Experiments
 from workbench.system.expression import Expression
 from workbench.system.parts import (
     Condition,
-    Cutting,
-    Derived,
-    Estimated,
+    DerivedSignal,
+    EstimatedQuantity,
     Export,
-    Fading,
-    Following,
+    FeedbackFading,
     Mode,
     Model,
     Objective,
     OperatingPoint,
+    RecordingSplit,
     Redundancy,
-    Rolling,
+    RollingStates,
     Sampling,
     Signal,
+    StepTracking,
     Threshold,
     View,
 )
@@ -52,25 +52,25 @@ __all__ = [
     "Channel",
     "Comparison",
     "Condition",
-    "Cutting",
-    "Derived",
-    "Estimated",
+    "DerivedSignal",
+    "EstimatedQuantity",
     "Exclusion",
     "Export",
-    "Fading",
-    "Following",
+    "FeedbackFading",
     "Influence",
-    "Leading",
+    "LeadingOutput",
     "Level",
     "Mode",
     "Model",
     "Objective",
     "OperatingPoint",
+    "RecordingSplit",
     "Redundancy",
     "Rest",
-    "Rolling",
+    "RollingStates",
     "Sampling",
     "Signal",
+    "StepTracking",
     "System",
     "Threshold",
     "View",
@@ -98,8 +98,8 @@ class System:
         nominal value.
     spreads : standard deviation of states at the start that no output shows, by name [unit].
     inputs, outputs : measured; inputs drive the models, outputs correct estimates.
-    judged : measured, but only there to judge by.
-    aids : measured at times, and missing in other samples: they correct Kalman filters alone.
+    reference_signals : measured, but only there to score estimates by.
+    intermittent : measured at times, and missing in others: they correct Kalman filters alone.
     reported : outputs of the model that estimates hold, with their units.
     export : estimators as FMUs.
     companion : Python package with a virtual rig and more estimators, or a module; empty: none.
@@ -134,19 +134,19 @@ class System:
     spreads: Mapping[str, float]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    judged: tuple[Signal, ...]
-    aids: tuple[Signal, ...]
-    derived: tuple[Derived, ...]
-    estimated: tuple[Estimated, ...]
+    reference_signals: tuple[Signal, ...]
+    intermittent: tuple[Signal, ...]
+    derived: tuple[DerivedSignal, ...]
+    estimated: tuple[EstimatedQuantity, ...]
     reported: Mapping[str, str]
     conditions: tuple[Condition, ...]
     design: OperatingPoint
     tested: OperatingPoint
     objective: Objective
     comparison: Comparison
-    fading: Fading | None = None
-    rolling: Rolling | None = None
-    following: Following | None = None
+    fading: FeedbackFading | None = None
+    rolling: RollingStates | None = None
+    following: StepTracking | None = None
     panels: tuple[View, ...] = ()
     export: Export = field(default_factory=lambda: Export({}, OperatingPoint({}, {}, {})))
     companion: str = ""
@@ -161,9 +161,9 @@ class System:
     sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))
     redundancies: tuple[Redundancy, ...] = ()
     experiments: Experiments | None = None
-    cutting: Cutting | None = None
+    cutting: RecordingSplit | None = None
     stopping: Stopping | None = None
-    work: tuple[Derived, ...] = ()
+    work: tuple[DerivedSignal, ...] = ()
     loggers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
@@ -181,7 +181,7 @@ class System:
         """All measured signals by name."""
         return {
             signal.name: signal
-            for signal in (*self.inputs, *self.outputs, *self.judged, *self.aids)
+            for signal in (*self.inputs, *self.outputs, *self.reference_signals, *self.intermittent)
         }
 
     @property
@@ -193,7 +193,7 @@ class System:
     def variables(self) -> dict[str, str]:
         """What is asked of a model, with units; one with other names is mapped onto these."""
         measured = {
-            signal.name: signal.unit for signal in (*self.inputs, *self.outputs, *self.aids)
+            signal.name: signal.unit for signal in (*self.inputs, *self.outputs, *self.intermittent)
         }
         corrected = {quantity.correction: quantity.unit for quantity in self.estimated}
         return {
@@ -208,7 +208,7 @@ class System:
     def constants(self) -> frozenset[str]:
         """Parameters of the model that formulas of derived signals use, of those that are fed."""
         known = {*self.signals, *(signal.name for signal in self.derived)}
-        judged = {signal.name for signal in self.judged}
+        judged = {signal.name for signal in self.reference_signals}
         fed = [signal.formula.names for signal in self.derived if not signal.formula.names & judged]
         return frozenset(name for names in fed for name in names if name not in known)
 
@@ -223,7 +223,7 @@ class System:
         }
 
     @property
-    def indirect(self) -> dict[str, tuple[Derived, str]]:
+    def indirect(self) -> dict[str, tuple[DerivedSignal, str]]:
         """Derived signals of one column of an estimate, with it: who estimates one knows both."""
         found = {}
         for signal in self.derived:

@@ -345,7 +345,7 @@ def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
     return {
         "estimator": job.estimator,
         "label": estimators_of(job.system)[job.estimator].label,
-        "judged": job.system.objective.judged,
+        "judged": job.system.objective.signal,
         "bandwidth": _finite(job.system.objective.bandwidth),
         "follows": None if following is None else vars(following),
         "z": found.z,

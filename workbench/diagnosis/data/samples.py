@@ -180,7 +180,11 @@ class Samples:
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
     """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
-    judged = [signal.name for signal in system.judged if any(signal.name in case for case in cases)]
+    judged = [
+        signal.name
+        for signal in system.reference_signals
+        if any(signal.name in case for case in cases)
+    ]
     return (*(output.name for output in system.outputs), *judged)
 
 

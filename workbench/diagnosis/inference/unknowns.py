@@ -48,7 +48,7 @@ class Unknowns:
         self.effects = {effect.name: effect for effect in effects}
         self.modes = {
             delay(signal.name): signal.mode
-            for signal in simulations.system.judged + simulations.system.outputs
+            for signal in simulations.system.reference_signals + simulations.system.outputs
             if signal.mode is not None and signal.name in simulations.recordings[0].signals
         }
         self.presence = Presence(simulations.cases, simulations.recordings, beside)

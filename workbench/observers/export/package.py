@@ -58,8 +58,10 @@ def wiring(system: System) -> Wiring:
         **{quantity.name: quantity.unit for quantity in system.estimated},
     }
     seen = {f"{output.name}Estimate": output.unit for output in system.outputs}
-    readings = {signal.reading: signal.unit for signal in (*system.outputs, *system.judged)}
-    shown = {signal.name: (signal.reading, signal.unit) for signal in system.judged}
+    readings = {
+        signal.reading: signal.unit for signal in (*system.outputs, *system.reference_signals)
+    }
+    shown = {signal.name: (signal.reading, signal.unit) for signal in system.reference_signals}
     shown |= {name: (name, unit) for name, unit in system.reported.items() if name not in shown}
     truth = {reading: unit for reading, unit in shown.values()}
     return Wiring(

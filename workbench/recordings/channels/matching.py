@@ -95,7 +95,7 @@ def match(
     assigned, doubts = dict(named), dict[str, str]()
     _by_name(assigned, doubts, places, system)
     assigned |= _by_unit((*system.inputs, *system.outputs), assigned, doubts, places, system)
-    for name, one in _by_unit(system.judged, assigned, doubts, places, system).items():
+    for name, one in _by_unit(system.reference_signals, assigned, doubts, places, system).items():
         doubts[name] = f"it may be '{one.label}'; {one.doubt}"
     return assigned, doubts
 

@@ -72,7 +72,7 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     ]
     outputs = {output.name for output in system.outputs}
     slowest = max((track for track in tracks if track.signal.name in outputs), key=lambda t: t.step)
-    asked = [track for track in tracks if track.signal not in system.aids]
+    asked = [track for track in tracks if track.signal not in system.intermittent]
     begin = max(float(one.times[0]) for one in asked)
     end = min(float(one.times[-1]) for one in asked)
     inside = (slowest.times >= begin) & (slowest.times <= end)

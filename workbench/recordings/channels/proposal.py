@@ -119,7 +119,7 @@ def propose(
     )
     unmatched = tuple(
         f"{signal.name}: {doubts[signal.name]}"
-        for signal in system.judged
+        for signal in system.reference_signals
         if signal.name in doubts and signal.name not in assigned
     )
     clocks = _clocks(assigned, files, given.get(TIME), step, system)

@@ -67,7 +67,7 @@ class ExperimentPredictor:
         system, experiments = asked.system, asked.experiments
         added = {sensor.name for sensor in experiments.sensors}
         named = {*asked.rivals.signals, *added}
-        judged = tuple(signal.name for signal in system.judged if signal.name in named)
+        judged = tuple(signal.name for signal in system.reference_signals if signal.name in named)
         values = _values(asked, candidate, rival)
         rest = (f"{number:03}", judged, number)
         return recorded(self._model, system, experiments, candidate, values, *rest)
@@ -124,4 +124,6 @@ def with_sensor(system: System, sensor: Signal) -> System:
         Expression(sensor.name, f"{system.source}, [next.sensors.{sensor.name}]"),
     )
     compared = replace(system.comparison, channels=(*system.comparison.channels, channel))
-    return replace(system, judged=(*system.judged, sensor), comparison=compared)
+    return replace(
+        system, reference_signals=(*system.reference_signals, sensor), comparison=compared
+    )

@@ -24,7 +24,7 @@ from workbench.studies.distance.standard import (
     percentage,
     stopping_distance,
 )
-from workbench.system.stopping import SPEED, Asked
+from workbench.system.stopping import SPEED, AskedQuantity
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
@@ -379,7 +379,7 @@ class Distance:
         return f"<p>{escape(self.sentence)}</p>{self.quantiles().to_html(index=False)}"
 
 
-def _shown(value: float, asked: Asked) -> str:
+def _shown(value: float, asked: AskedQuantity) -> str:
     """A quantity for people."""
     unit = f" {asked.shown}" * (asked.shown != "1")
     return f"{value / si_factor(asked.shown, asked.unit, asked.name):.4g}{unit}"

@@ -14,7 +14,7 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case, Value, read_conditions
 from workbench.studies.distance.simulation import GRID
 from workbench.system.comparison import Exclusion
-from workbench.system.stopping import COMMAND, Driven, Stopping
+from workbench.system.stopping import COMMAND, DrivenInput, Stopping
 from workbench.system.system import Condition, System
 from workbench.system.tables import Table
 
@@ -148,7 +148,7 @@ def _step(case: Case) -> float:
     return float(np.median(np.diff(case.time)))
 
 
-def _command(case: Case, rising: Driven) -> float:
+def _command(case: Case, rising: DrivenInput) -> float:
     """When the command was given, by the half of what it made rise [s]."""
     signal, time = case[rising.name], case.time
     low, high = float(np.median(signal[: time.size // 10])), float(np.median(signal[-10:]))

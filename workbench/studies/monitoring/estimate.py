@@ -18,7 +18,7 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending
 from workbench.recordings.case import UNKNOWN, Case
 from workbench.system.registry import open_model
-from workbench.system.system import Estimated, System
+from workbench.system.system import EstimatedQuantity, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class RecordingEstimate:
     counted: float
 
 
-def watched(system: System) -> tuple[Estimated, ...]:
+def watched(system: System) -> tuple[EstimatedQuantity, ...]:
     """Quantities of the machine that no condition sets to a value of its own."""
     set_by = {
         name
@@ -53,7 +53,7 @@ def watched(system: System) -> tuple[Estimated, ...]:
     )
 
 
-def reach(estimated: Estimated) -> float:
+def reach(estimated: EstimatedQuantity) -> float:
     """Standard deviation of what is known of a quantity before a recording: all of its range."""
     return float((estimated.high - estimated.low) / np.sqrt(12.0))
 
@@ -83,7 +83,9 @@ class RecordingEstimator:
             if quantity.watched
         ]
         # Recordings with an aid and without would be compared, and what wears as it should be told.
-        self._constant = replace(system, estimated=tuple(constant), learns=math.inf, aids=())
+        self._constant = replace(
+            system, estimated=tuple(constant), learns=math.inf, intermittent=()
+        )
         self._model = model
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
 

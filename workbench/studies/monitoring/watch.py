@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.studies.monitoring.chart import LARGEST, Chart, LevelChange, Scatter, threshold
 from workbench.studies.monitoring.estimate import reach
-from workbench.system.system import Estimated
+from workbench.system.system import EstimatedQuantity
 
 _FEWEST = 3  # of an array: of two, nothing tells which has moved
 _TOLD = 0.5  # of what was not known before, as a variance, that a recording must take away
@@ -66,7 +66,7 @@ class _Group:
     """
 
     name: str
-    members: tuple[Estimated, ...]
+    members: tuple[EstimatedQuantity, ...]
     columns: list[int]
     directions: Matrix = field(init=False)
     charts: list[Chart] = field(init=False)
@@ -162,7 +162,7 @@ class _Group:
         ]
 
 
-def grouped(estimated: Sequence[Estimated]) -> list[_Group]:
+def grouped(estimated: Sequence[EstimatedQuantity]) -> list[_Group]:
     """Entries of one array together, where there are enough; all others alone."""
     arrays: dict[str, list[int]] = {}
     for column, quantity in enumerate(estimated):
@@ -177,7 +177,10 @@ def grouped(estimated: Sequence[Estimated]) -> list[_Group]:
 
 
 def watch(
-    estimated: Sequence[Estimated], values: Matrix, covariances: Sequence[Matrix], rate: float
+    estimated: Sequence[EstimatedQuantity],
+    values: Matrix,
+    covariances: Sequence[Matrix],
+    rate: float,
 ) -> tuple[list[Track], float]:
     """Watch all quantities over recordings in their order.
 

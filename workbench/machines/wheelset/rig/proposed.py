@@ -81,7 +81,7 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     warm = float(said.get("disc_temperature", DISC_TEMPERATURE))
     conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load, warm)
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
-    sensors = tuple(signal.name for signal in system.judged if signal.name in FURTHER)
+    sensors = tuple(signal.name for signal in system.reference_signals if signal.name in FURTHER)
     # A roller that stops as fast as no train does is a slide to the protection, which would vent.
     protected = imitated >= TRAIN_INERTIA
     return Scenario(
