@@ -126,13 +126,13 @@ def test_limits_that_cannot_be_read_are_refused(
 def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the FMUs that were tried."""
     names: list[str] = []
-    original = trial.attempt
+    original = trial.run_trial
 
-    def attempt(description: Description, *rest: Any) -> str:
+    def run_trial(description: Description, *rest: Any) -> str:
         names.append(description.path.name)
         return original(description, *rest)
 
-    monkeypatch.setattr(trial, "attempt", attempt)
+    monkeypatch.setattr(trial, "run_trial", run_trial)
     return names
 
 
@@ -180,7 +180,7 @@ def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(
     """A refusal ends the trial, so that it must be none of the trial's own making."""
     description = read_description(root / "fmus" / version / "Reference.fmu")
     with trial.unpacked(description, interface) as folder:
-        assert trial.attempt(description, interface, folder, trial.Limits()) == ""
+        assert trial.run_trial(description, interface, folder, trial.Limits()) == ""
 
 
 def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
@@ -190,7 +190,7 @@ def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
     with trial.unpacked(description, "Model Exchange") as folder:
         for _ in range(5):
             begin = time.perf_counter()
-            trial.attempt(description, "Model Exchange", folder, trial.Limits())
+            trial.run_trial(description, "Model Exchange", folder, trial.Limits())
             times.append(time.perf_counter() - begin)
     assert min(times) < 0.3
 

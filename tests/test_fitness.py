@@ -16,7 +16,7 @@ from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.models.checks import Finding, check, is_fit
+from workbench.models.checks import CheckResult, check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.trial import Limits
 
@@ -131,11 +131,11 @@ def faulty(original: Path, path: Path, old: str, new: str) -> Path:
     return variant(original, path, change)
 
 
-def failed(findings: Iterable[Finding]) -> list[str]:
+def failed(findings: Iterable[CheckResult]) -> list[str]:
     return [finding.name for finding in findings if finding.passed is False]
 
 
-def by_name(findings: Iterable[Finding], name: str) -> Finding:
+def by_name(findings: Iterable[CheckResult], name: str) -> CheckResult:
     return next(finding for finding in findings if finding.name == name)
 
 

@@ -13,7 +13,14 @@ from scipy.integrate import solve_ivp
 
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation
-from workbench.models.native import OK, checked, do_step, read, set_inputs, stepping
+from workbench.models.native import (
+    OK,
+    co_simulation_instance,
+    do_step,
+    raise_on_failure,
+    read,
+    set_inputs,
+)
 
 INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
 
@@ -172,7 +179,7 @@ def test_compiled_loops_step_as_the_fmu_itself_does(root: Path, version: str) ->
         inputs, outputs = called.variables(["pB", "tauR"]), called.variables(read_)
         for one in (called, compiled):
             one.start({"omegaW": 60.0, "omegaR": 39.5})
-        running = stepping(compiled, inputs.names, read_)
+        running = co_simulation_instance(compiled, inputs.names, read_)
         for k in range(100):
             values = np.array([1e5 * np.sin(0.1 * k) ** 2, 50.0 * k])
             called.set(inputs, values)
@@ -185,7 +192,7 @@ def test_compiled_loops_step_as_the_fmu_itself_does(root: Path, version: str) ->
         # What the FMU refuses is a status there, and an error here.
         running.u[0] = np.nan
         with pytest.raises(FMUError, match="nan"):
-            checked(set_inputs(running, 0, 2), compiled)
+            raise_on_failure(set_inputs(running, 0, 2), compiled)
 
 
 def test_implicit_step_converges_with_order_one(

@@ -14,7 +14,12 @@ import pytest
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.runtime import files
-from workbench.runtime.files import claimed, prove_writable, spared, write_whole
+from workbench.runtime.files import (
+    locked_folder,
+    require_writable,
+    warning_if_unwritable,
+    write_whole,
+)
 
 COMMANDS = {
     "simulate": ["simulate", "cases/01_dry_80_1.5"],
@@ -74,7 +79,7 @@ def test_a_place_that_takes_no_results_is_refused_before_the_work(
     with at_most(4_900_000):  # less than is asked for, more than any part of an FMU has
         message = refused(command, tmp_path / "full", capsys)
     assert "File too large" in message
-    with claimed(tmp_path / "taken"):
+    with locked_folder(tmp_path / "taken"):
         message = refused(command, tmp_path / "taken", capsys)
     assert "another run that writes there" in message
     assert (tmp_path / "file").read_text() == "mine"
@@ -82,19 +87,20 @@ def test_a_place_that_takes_no_results_is_refused_before_the_work(
 
 def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
     script = (
-        "from pathlib import Path; import os, sys; from workbench.runtime.files import claimed\n"
-        "with claimed(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
+        "from pathlib import Path; import os, sys\n"
+        "from workbench.runtime.files import locked_folder\n"
+        "with locked_folder(Path(sys.argv[1])): os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=False)
-    with claimed(tmp_path):
+    with locked_folder(tmp_path):
         assert not list(tmp_path.iterdir())
 
 
 def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) -> None:
     script = (
         "from pathlib import Path; import os, sys, time\n"
-        "from workbench.runtime.files import claimed\n"
-        "with claimed(Path(sys.argv[1])):\n"
+        "from workbench.runtime.files import locked_folder\n"
+        "with locked_folder(Path(sys.argv[1])):\n"
         "    if os.fork(): time.sleep(60)\n"
         "    print(os.getpid(), flush=True); os.kill(os.getppid(), 9)\n"
         "    os.close(1); os.close(2); time.sleep(60)"
@@ -103,7 +109,7 @@ def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) 
     child = int(subprocess.run(command, check=False, capture_output=True, text=True).stdout)
     try:
         os.kill(child, 0)  # it lives
-        with claimed(tmp_path):
+        with locked_folder(tmp_path):
             pass
     finally:
         os.kill(child, signal.SIGKILL)
@@ -113,20 +119,20 @@ def test_where_folders_cannot_be_locked_results_are_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "fcntl", None)
-    with claimed(tmp_path / "new"):
+    with locked_folder(tmp_path / "new"):
         assert list((tmp_path / "new").iterdir()) == []
 
 
 def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> None:
     for name in ("page.html.123.part", "mine.part", "other"):
         (tmp_path / name).write_text("")
-    with claimed(tmp_path):
+    with locked_folder(tmp_path):
         assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.part", "other"]
 
 
 def test_the_rest_of_a_file_whose_worker_was_ended_is_removed(tmp_path: Path) -> None:
     """As SIGTERM does while workers draw."""
-    with suppress(SystemExit), claimed(tmp_path):
+    with suppress(SystemExit), locked_folder(tmp_path):
         (tmp_path / "figure.png.123.part").write_text("")
         raise SystemExit(143)
     assert not list(tmp_path.iterdir())
@@ -140,7 +146,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path
         (tmp_path / ("x" * 300), "File name too long"),
     ):
         with pytest.raises(InputError, match=match):
-            prove_writable(path)
+            require_writable(path)
     write_whole(tmp_path / ("x" * 255), "the longest name")
     assert sorted(len(path.name) for path in tmp_path.iterdir()) == [4, 255]
 
@@ -163,7 +169,7 @@ def test_a_figure_that_cannot_be_written_costs_no_numbers(
 
 def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path: Path) -> None:
     with at_most(1000):
-        with spared():
+        with warning_if_unwritable():
             write_whole(tmp_path / "figure.svg", "x" * 2000)
         with pytest.raises(InputError, match="File too large"):
             write_whole(tmp_path / "page.html", "x" * 2000)

@@ -16,7 +16,7 @@ import pytest
 
 from workbench.models.fmu import FMU
 from workbench.runtime import files
-from workbench.runtime.files import Scratch
+from workbench.runtime.files import TemporaryFolder
 
 from .hostile_fmus import ROOT, needs_compiler, running, workbench
 from .processes import comes_true, living
@@ -244,12 +244,12 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
     linked.symlink_to(other)
     lock = os.open(held, os.O_RDONLY)
     fcntl.flock(lock, fcntl.LOCK_EX)
-    Scratch().close()
+    TemporaryFolder().close()
     assert held.exists()
     assert (other / "file").exists()
     os.close(lock)
     files.sweep.cache_clear()
-    Scratch().close()
+    TemporaryFolder().close()
     assert not held.exists()
     assert (named / "file").exists()
     assert (other / "file").exists()
@@ -257,9 +257,9 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
 
 
 def test_folders_of_living_processes_stay(place: Path) -> None:
-    with closing(Scratch()) as mine:
+    with closing(TemporaryFolder()) as mine:
         files.sweep.cache_clear()
-        with closing(Scratch()) as second:
+        with closing(TemporaryFolder()) as second:
             assert mine.path.exists()
             assert second.path != mine.path
     assert list(place.iterdir()) == []

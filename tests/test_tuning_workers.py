@@ -21,7 +21,7 @@ from numpy.testing import assert_array_equal
 
 import workbench
 from workbench.errors import InputError
-from workbench.runtime.files import before_last
+from workbench.runtime.files import previous_path
 from workbench.runtime.pool import Pool
 from workbench.tuning import (
     Candidate,
@@ -421,7 +421,7 @@ def test_another_search_does_not_go_on_from_a_checkpoint(
     with pytest.raises(InputError, match="another search"):
         run(pool, problem, path, replace(SMALL, seed=4), resume=True)
     path.write_text(path.read_text()[:-100])
-    before_last(path).unlink()
+    previous_path(path).unlink()
     with pytest.raises(InputError, match="no checkpoint"):
         run(pool, problem, path, SMALL, resume=True)
 

@@ -32,7 +32,7 @@ from workbench.recordings.channels import Told, parse_named
 from workbench.recordings.csv import header
 from workbench.recordings.datasets import read_recorded, write_cases
 from workbench.recordings.plausibility import Origin, doubts
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.studies.design import NextStop
 from workbench.studies.design import next_stop as next_experiment
 from workbench.studies.distance import Distance, Effort, distance_of_stop
@@ -337,7 +337,7 @@ def monitor(
     """
     with tempfile.TemporaryDirectory(prefix="monitor-") as scratch:
         folder = Path(out) if out is not None else Path(scratch)
-        with claimed(folder):
+        with locked_folder(folder):
             return watch_machine(
                 *(system, Path(history), folder),
                 rate=false_alarms,

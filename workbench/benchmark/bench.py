@@ -18,7 +18,7 @@ from workbench.cli.output import Done, Output
 from workbench.pages.answer import Answer, Measure
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed, write_json
+from workbench.runtime.files import locked_folder, write_json
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     require_compiler()
     system = load_system(options.system)
     cases = given_cases(options, system)
-    with claimed(options.out):
+    with locked_folder(options.out):
         return _run(output, system, cases, options.out / "bench.json")
 
 

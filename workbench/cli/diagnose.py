@@ -18,7 +18,7 @@ from workbench.errors import InputError, closest
 from workbench.models.modelica import Library, read_library
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import OBSERVER, System
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         return Done({"effects": [{"name": effect.name, "text": effect.text} for effect in effects]})
     require_compiler()
     cases, held_out = _parted(given_cases(options, system), options.held_out)
-    with claimed(options.out):
+    with locked_folder(options.out):
         return _run(options, output, system, library, effects, cases, held_out)
 
 

@@ -6,7 +6,7 @@ from workbench.cli.inputs import given_cases
 from workbench.cli.output import Done, Output, read_result
 from workbench.errors import InputError
 from workbench.pages.provenance import models, run_of, software, sources
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.studies.distance import Effort, distance_of_stop
 from workbench.studies.distance.report import write_distance
 from workbench.system.reader import with_model
@@ -24,7 +24,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     said = dict(_said(one) for one in options.ask)
     cases = given_cases(options, system)
     effort = Effort(options.samples, options.safety, options.seed, options.plain)
-    with claimed(options.out):
+    with locked_folder(options.out):
         found = distance_of_stop(system, cases, said, effort, options.workers, output.stage)
         provenance = {
             "run": run_of("distance", system, sources(cases)),

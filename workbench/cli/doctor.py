@@ -19,7 +19,7 @@ from workbench.cli.output import Done, Output
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.models.fmu_cache import cache_folder
-from workbench.runtime.files import prove_writable
+from workbench.runtime.files import require_writable
 from workbench.runtime.resources import CHECKOUT, fmus, installing
 from workbench.system.installed import built_models
 
@@ -140,7 +140,7 @@ def _kept() -> Inspection:
     """Whether what is compiled can be kept between runs; without that, commands begin slowly."""
     folder = cache_folder()
     try:
-        prove_writable(folder / "doctor")
+        require_writable(folder / "doctor")
     except InputError as error:
         remedy = "set XDG_CACHE_HOME to a folder that can be written"
         return Inspection("cache", "wrong", f"{folder}: {error.found}", remedy)

@@ -16,7 +16,7 @@ from workbench.cli.output import Done, Output
 from workbench.observers import Estimator, Gains, choose, estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
-from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.system.registry import load_system, model_path, open_model
 from workbench.system.system import REFERENCE, System
 
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     reference: Path | None = options.reference
     if reference is None and REFERENCE in system.models:
         reference = model_path(system, REFERENCE)
-    with claimed(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
+    with locked_folder(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
         platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
         model, make = _maker(stack, system, chosen, platforms)
         name = model.rpartition(".")[2]

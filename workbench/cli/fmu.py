@@ -10,10 +10,10 @@ from workbench.cli.arguments import nearby
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import Done, Output
 from workbench.errors import InputError
-from workbench.models.checks import Finding, check, is_fit, uses
+from workbench.models.checks import CheckResult, check, is_fit, uses
 from workbench.models.description import Description, read_description
 from workbench.models.trial import usual_limits
-from workbench.runtime.files import prove_writable
+from workbench.runtime.files import require_writable
 from workbench.runtime.resources import CHECKOUT, fmus
 from workbench.system.installed import built_models
 
@@ -48,7 +48,7 @@ def _build(options: argparse.Namespace, output: Output) -> Done:
         return Done({"fmus": [_built(output, built.path, built.sha256) for built in all_built]})
     _require_model(options)
     out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
-    prove_writable(out)
+    require_writable(out)
     built = compiler.build(options.package, options.model, out, fmi=options.fmi)
     return Done({"fmus": [_built(output, built.path, built.sha256)]})
 
@@ -164,7 +164,7 @@ def _format_description(description: Description) -> str:
     return "\n".join(lines)
 
 
-def _show_finding(output: Output, finding: Finding) -> None:
+def _show_finding(output: Output, finding: CheckResult) -> None:
     value, limit = (f"{n:.4g}" if n is not None else "" for n in (finding.value, finding.limit))
     if finding.passed is None:
         output.result(f"{finding.name:<38} -       {finding.reason}")

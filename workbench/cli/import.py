@@ -28,7 +28,7 @@ from workbench.recordings.importing import (
     write,
     write_record,
 )
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         known = replace(known, apart=options.apart)
     together = [options.files] if options.together else [[path] for path in options.files]
     refused: list[str] = []
-    with claimed(options.out):
+    with locked_folder(options.out):
         record = before = imported(options.out)
         for paths in together:
             try:

@@ -14,7 +14,7 @@ from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.datasets import read_recorded
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.studies.monitoring import MonitoringResult, monitor
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
 from workbench.studies.monitoring.report import write_monitoring
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     system, history = load_system(options.system), Path(options.history)
     if options.diagnose:
         require_compiler()
-    with claimed(options.out):
+    with locked_folder(options.out):
         begin = time.perf_counter()
         found = monitor(
             system,

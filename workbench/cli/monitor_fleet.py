@@ -15,7 +15,7 @@ from workbench.errors import InputError
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.provenance import models, run_of, software
 from workbench.recordings.datasets import read_recorded
-from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.pool import Pool
 from workbench.studies.monitoring import MonitoringResult
 from workbench.studies.monitoring.fleet import Fleet, MachineResult, serving, watch_fleet
@@ -55,7 +55,7 @@ def run_fleet(options: argparse.Namespace, output: Output) -> Done:
     write = partial(_written, provenance)
     fleet = Fleet(system, options.history, options.false_alarms, read_recorded, write)
     count = len(fleet.machines())  # wrong places are refused before workers start
-    with claimed(options.out):
+    with locked_folder(options.out):
         begin = time.perf_counter()
         pool = _pool(options, fleet, count)
         try:

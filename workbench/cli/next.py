@@ -11,7 +11,7 @@ from workbench.cli.output import Done, Output, read_result
 from workbench.diagnosis.inference.rivals import Rivals, read_rivals
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
-from workbench.runtime.files import claimed, read_text
+from workbench.runtime.files import locked_folder, read_text
 from workbench.studies.design import next_stop
 from workbench.studies.design.report import write_next_stop
 from workbench.system.registry import load_system
@@ -26,7 +26,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     rivals = _rivals(summary, file)
     system = load_system(options.system or str(summary["provenance"]["system"]))
     require_compiler()
-    with claimed(options.out):
+    with locked_folder(options.out):
         found = next_stop(system, rivals, options.workers, output.stage)
         provenance = {
             "run": run_of("next", system, {"diagnosis": file}),

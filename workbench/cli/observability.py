@@ -20,7 +20,7 @@ from workbench.observers.observability_report import (
 )
 from workbench.pages.provenance import models, run_of, software, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
 from workbench.system.registry import open_model
 from workbench.system.system import FULL, OBSERVER, System
@@ -29,7 +29,7 @@ from workbench.system.system import FULL, OBSERVER, System
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Show what the outputs of the recordings tell."""
     system, cases = chosen_system(options)
-    with claimed(options.out):
+    with locked_folder(options.out):
         return _run(options, output, system, cases)
 
 

@@ -14,7 +14,7 @@ from workbench.diagnosis.inference.thresholds import of_system
 from workbench.errors import InputError, closest
 from workbench.models.modelica import read_library
 from workbench.pages.provenance import run_of
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.studies.power import (
     Plantable,
     Repertoire,
@@ -60,12 +60,12 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     effects = library_effects(system)
     if options.recorded:
         sets = read_recorded_sets(system, options.recorded)
-        with claimed(options.out):
+        with locked_folder(options.out):
             output.progress(f"{len(sets.recordings)} recorded sets")
             return _usual(options, output, system, sets, effects, sets.groups)
     known = model_path(system, REFERENCE) if REFERENCE in system.models else None
     rig = open_virtual_rig(system, options.case, options.reference or known)
-    with claimed(options.out):
+    with locked_folder(options.out):
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if options.check is None:
             planned = _planned(options, rig, effects)

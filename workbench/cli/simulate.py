@@ -19,7 +19,7 @@ from workbench.observers.simulation import CaseResult, Simulation, case_figure, 
 from workbench.pages.figures import draw_case
 from workbench.pages.provenance import models, run_of, software, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed, write_json
+from workbench.runtime.files import locked_folder, write_json
 from workbench.system.system import OBSERVER, System
 
 
@@ -27,7 +27,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     """Run all estimators on the recordings."""
     system, cases = chosen_system(options)
     window = LiveWindow(system) if options.live else None
-    with claimed(options.out):
+    with locked_folder(options.out):
         return _run(options, output, system, cases, window)
 
 

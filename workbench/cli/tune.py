@@ -19,7 +19,7 @@ from workbench.errors import InputError, WorkerError
 from workbench.pages.answer import with_answer
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed, write_whole
+from workbench.runtime.files import locked_folder, write_whole
 from workbench.runtime.pool import Pool
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         share = options.scale_error / 100.0
         errors = {output.name: share for output in system.outputs if output.scale_error and share}
     problem = pose(system, options.estimator, cases, errors, options.judge_by)
-    with claimed(out):
+    with locked_folder(out):
         return _run(options, output, problem, len(cases), out)
 
 

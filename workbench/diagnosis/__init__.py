@@ -36,7 +36,7 @@ from workbench.observers.replay import replay
 from workbench.observers.score import score
 from workbench.recordings.case import Case
 from workbench.runtime.files import write_whole
-from workbench.runtime.progress import Pace
+from workbench.runtime.progress import ProgressReporter
 from workbench.system.reader import with_model
 from workbench.system.registry import open_model
 from workbench.system.system import OBSERVER, System
@@ -315,7 +315,7 @@ def _observers(
             except InputError as refused:  # a model may be fit for this, and for no observer
                 report(f"no {kind.label}: {refused.found}")
     errors: dict[str, dict[str, list[float]]] = {}
-    counted = Pace(report, "runs of observers").part(2 * len(gains) * len(cases))
+    counted = ProgressReporter(report, "runs of observers").part(2 * len(gains) * len(cases))
     sizes = diagnosis.best.point.sizes
     after = (
         with_model(system, OBSERVER, extension.fmu),

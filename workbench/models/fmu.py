@@ -29,8 +29,8 @@ from workbench.models.description import (
     Description,
     read_description,
 )
-from workbench.models.trial import prove
-from workbench.runtime.files import Scratch
+from workbench.models.trial import require_trial
+from workbench.runtime.files import TemporaryFolder
 
 _FUNCTIONS = {
     "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
@@ -62,7 +62,7 @@ _CLASSES = {
 }
 
 
-class Loaded:
+class FMUInstance:
     """An FMU that is unpacked and loaded, with one instance.
 
     Parameters
@@ -88,12 +88,12 @@ class Loaded:
         self._description = description
         self._interface = interface
         self._log: list[str] = []
-        self._scratch = Scratch()
+        self._scratch = TemporaryFolder()
         try:
             library = description.library(interface)
             folder = self._scratch.path
             unpack(description.path, folder, str(PurePosixPath(library).parent))
-            prove(description, interface, folder)
+            require_trial(description, interface, folder)
             self._library = str(folder / library)
             self._load(identifier)
         except BaseException:
@@ -331,7 +331,7 @@ class FMU:
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._state_variables = self.variables(self.states)
-        self._loaded = Loaded(self.description, self.interface)
+        self._loaded = FMUInstance(self.description, self.interface)
         self._variants: list[FMU] = []
 
     def __enter__(self) -> Self:

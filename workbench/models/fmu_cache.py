@@ -20,7 +20,7 @@ from pathlib import Path
 import platformdirs
 
 from workbench.models.modelica import files, packages
-from workbench.runtime.files import Scratch
+from workbench.runtime.files import TemporaryFolder
 
 _COMPILER = Path(__file__).parent / "compiler"
 _CODE = (".py", ".c", ".h")
@@ -127,8 +127,8 @@ def keep(name: str, make: Callable[[Path], object]) -> Path:
 
 
 @cache
-def _scratch() -> Scratch:
-    return Scratch()
+def _scratch() -> TemporaryFolder:
+    return TemporaryFolder()
 
 
 def fetch(name: str, path: Path, make: Callable[[Path], object]) -> None:

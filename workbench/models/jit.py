@@ -1,7 +1,13 @@
-"""Laws become machine code with the loops that take them up, once.
+"""Compiling with numba: functions that call one another become one piece of machine code.
 
 numba translates every function by itself, and again all that it calls, level by level. Here a
-function that compiled code calls stays LLVM code until Python calls one that holds it.
+function that compiled code calls stays LLVM code until Python calls one that holds it. Three
+things make that fast, in this order below:
+
+1. Code is kept between runs, compiled by one process while others that need it wait.
+2. Named tuples go to compiled functions by address (`TupleReference`), not field by field.
+3. `jit` makes functions that are linked into their callers; only those that Python calls get what
+   Python needs to call them.
 """
 
 import hashlib
@@ -37,140 +43,16 @@ from numba.extending import (
 
 from workbench.models.fmu_cache import cache_folder
 
-
-class Bundle(types.Type):  # type: ignore[misc]
-    """Address of a tuple.
-
-    Parameters
-    ----------
-    content : type of the tuple.
-    """
-
-    def __init__(self, content: types.BaseTuple) -> None:
-        self.content = content
-        super().__init__(f"Bundle({content})")
-
-    @property
-    def key(self) -> types.Type:
-        """What tells it from others: classes of one name may have other fields."""
-        return self.content
-
-
-def handed(kind: types.Type) -> types.Type:
-    """Type of what a law is given, by that of the value: named tuples and tuples of these."""
-    return Bundle(kind) if _is_named(kind) else kind
-
-
-def _is_named(kind: types.Type) -> bool:
-    if isinstance(kind, types.BaseNamedTuple):
-        return True
-    return isinstance(kind, types.BaseTuple) and any(_is_named(one) for one in kind.types)
-
-
-@register_model(Bundle)
-class _Address(models.PrimitiveModel):  # type: ignore[misc]
-    """A pointer."""
-
-    def __init__(self, manager: Any, kind: Bundle) -> None:
-        place = manager.lookup(kind.content).get_data_type().as_pointer()
-        super().__init__(manager, kind, place)
-
-
-@lower_cast(types.BaseTuple, Bundle)  # type: ignore[untyped-decorator]
-def _write_down(context: Any, builder: Any, kind: Any, bundle: Bundle, value: Any) -> Any:
-    """Address of a tuple on the stack of who hands it on."""
-    place = cgutils.alloca_once(builder, context.get_data_type(bundle.content))
-    _store(context, builder, kind, value, place)
-    # What is read by this address never changes (`_words`), which is true from here on only: no
-    # instruction, but LLVM moves nothing across it.
-    passed = ir.FunctionType(place.type, [place.type])
-    return builder.asm(passed, "", "=r,0,~{memory}", [place], side_effect=True)
-
-
-def _store(context: Any, builder: Any, kind: types.Type, value: Any, place: Any) -> None:
-    if isinstance(kind, types.BaseTuple):
-        for k, one in enumerate(kind.types):
-            at = cgutils.gep_inbounds(builder, place, 0, k)
-            _store(context, builder, one, builder.extract_value(value, k), at)
-    else:
-        builder.store(context.data_model_manager[kind].as_data(builder, value), place)
-
-
-def _member(context: Any, builder: Any, kind: types.Type, at: Any) -> Any:
-    """Member of a tuple at an address: what lies there, or the address if it goes by that."""
-    if isinstance(handed(kind), Bundle):
-        return at
-    value = _words(builder, at)
-    if isinstance(kind, types.Array):
-        return value
-    return context.data_model_manager[kind].from_data(builder, value)
-
-
-def _words(builder: Any, at: Any) -> Any:
-    """What lies at an address, word by word, so that LLVM leaves out what is not used."""
-    kind = at.type.pointee
-    if not isinstance(kind, ir.Aggregate):
-        word = builder.load(at)
-        word.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return word
-    value = ir.Constant(kind, ir.Undefined)
-    for k in range(len(kind)):
-        part = _words(builder, cgutils.gep_inbounds(builder, at, 0, k))
-        value = builder.insert_value(value, part, k)
-    return value
-
-
-@infer_getattr
-class _Field(AttributeTemplate):  # type: ignore[misc]
-    key = Bundle
-
-    def generic_resolve(self, bundle: Bundle, name: str) -> types.Type | None:
-        """Type of a field."""
-        content = bundle.content
-        if not isinstance(content, types.BaseNamedTuple) or name not in content.fields:
-            return None
-        return handed(content.types[content.fields.index(name)])
-
-
-@lower_getattr_generic(Bundle)  # type: ignore[untyped-decorator]
-def _field(context: Any, builder: Any, bundle: Bundle, place: Any, name: str) -> Any:
-    index = bundle.content.fields.index(name)
-    at = cgutils.gep_inbounds(builder, place, 0, index)
-    return _member(context, builder, bundle.content.types[index], at)
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _item(typing: Any, bundle: Any, index: Any) -> Any:
-    """Member of a tuple whose members are of one type, by its number."""
-    kind = bundle.content.dtype
-
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        place, number = given
-        at = builder.gep(place, [cgutils.intp_t(0), number], inbounds=True)
-        return _member(context, builder, kind, at)
-
-    return handed(kind)(bundle, types.intp), generate
-
-
-@overload(operator.getitem)
-def _get_item(bundle, index):  # type: ignore[no-untyped-def]
-    if isinstance(bundle, Bundle) and isinstance(bundle.content, types.UniTuple):
-        return lambda bundle, index: _item(bundle, index)
-    return None
-
-
 try:
     import fcntl
 except ImportError:  # Windows: there each process compiles for itself
     fcntl = None  # type: ignore[assignment]
 
-_DIGEST = hashlib.sha256().digest_size
-
-
 _PACKAGE = Path(__file__).parents[1]
-
-
+_DIGEST = hashlib.sha256().digest_size
 _PATIENCE = 120.0  # [s]: several times what any function here takes to compile
+
+# --- code that is kept between runs ---
 
 
 @cache
@@ -181,12 +63,8 @@ def _folder() -> Path:
     """
     files = sorted(_PACKAGE.rglob("*.py"))
     sources = (file.read_bytes() for file in files)
-    laws = [
-        source
-        for source in sources
-        if b"workbench.models.native import" in source or b"numba" in source
-    ]
-    state = hashlib.sha256(b"".join(laws)).hexdigest()[:16]
+    compiled = [s for s in sources if b"workbench.models.native import" in s or b"numba" in s]
+    state = hashlib.sha256(b"".join(compiled)).hexdigest()[:16]
     return cache_folder() / state
 
 
@@ -211,7 +89,7 @@ class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes: ClassVar = [_Locator]
 
 
-class _File:
+class _CodeFile:
     """The code of one function, by signature.
 
     Parameters
@@ -262,8 +140,8 @@ class _File:
 
 
 @cache
-def _turns() -> int:
-    """File of which a process holds a byte while it compiles; closing it would end all turns.
+def _lock_descriptor() -> int:
+    """File of which a process locks a byte while it compiles; closing it would end all locks.
 
     Raises
     ------
@@ -274,19 +152,19 @@ def _turns() -> int:
     return os.open(_folder() / "turns", os.O_RDWR | os.O_CREAT, 0o600)
 
 
-class _Turn:
-    """Compiling one function, one process at a time; the system ends it with the process."""
+class _CompileLock:
+    """Lock for compiling one function; the system releases it with the process."""
 
     def __init__(self, path: Path) -> None:
         # Functions that share a byte wait for each other, which costs time alone.
         self._byte = int.from_bytes(hashlib.sha256(str(path).encode()).digest()[:4], "little")
 
-    def take(self) -> None:
-        """Wait until no other process has it, or is stopped while it has."""
+    def acquire(self) -> None:
+        """Wait until no other process holds it, but not for one that is stopped while it does."""
         end = time.monotonic() + _PATIENCE
         while fcntl is not None and time.monotonic() < end:
             try:
-                fcntl.lockf(_turns(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte)
+                fcntl.lockf(_lock_descriptor(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte)
             except BlockingIOError:
                 time.sleep(0.02)
             except OSError:  # no place for the file, or one on which nothing can be locked
@@ -294,11 +172,11 @@ class _Turn:
             else:
                 return
 
-    def end(self) -> None:
+    def release(self) -> None:
         """Let the next one read what was compiled."""
         if fcntl is not None:
             with suppress(OSError):
-                fcntl.lockf(_turns(), fcntl.LOCK_UN, 1, self._byte)
+                fcntl.lockf(_lock_descriptor(), fcntl.LOCK_UN, 1, self._byte)
 
 
 class CodeCache(caching.FunctionCache):  # type: ignore[misc]
@@ -314,27 +192,158 @@ class CodeCache(caching.FunctionCache):  # type: ignore[misc]
         stamp = self._impl.locator.get_source_stamp()
         state = f"{numba.__version__} {llvmlite.__version__} {stamp}"
         path = Path(self._cache_path, f"{self._impl.filename_base}.code")
-        self._cache_file = _File(path, state)
-        self._turn = _Turn(path)
+        self._cache_file = _CodeFile(path, state)
+        self._lock = _CompileLock(path)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Code for a signature; None if this process has to compile it, until `compiled`."""
         code = super().load_overload(sig, target_context)
         if code is None:
-            self._turn.take()
+            self._lock.acquire()
             code = super().load_overload(sig, target_context)
         return code
 
     def compiled(self) -> None:
-        """What had to be compiled is, or cannot be."""
-        self._turn.end()
+        """Release the lock once the function is compiled, or cannot be."""
+        self._lock.release()
 
 
-class _Part(JITCodeLibrary):  # type: ignore[misc]
-    """Code without a life of its own: linked into what calls it, never run by itself."""
+# --- tuples by address ---
+
+
+class TupleReference(types.Type):  # type: ignore[misc]
+    """Address of a tuple.
+
+    Parameters
+    ----------
+    content : type of the tuple.
+    """
+
+    def __init__(self, content: types.BaseTuple) -> None:
+        self.content = content
+        super().__init__(f"TupleReference({content})")
+
+    @property
+    def key(self) -> types.Type:
+        """Identity among types: two classes of one name may have different fields."""
+        return self.content
+
+
+def argument_type(value_type: types.Type) -> types.Type:
+    """Type by which a value is passed: named tuples, and tuples of these, go by address."""
+    return TupleReference(value_type) if _is_named(value_type) else value_type
+
+
+def _is_named(value_type: types.Type) -> bool:
+    if isinstance(value_type, types.BaseNamedTuple):
+        return True
+    return isinstance(value_type, types.BaseTuple) and any(
+        _is_named(member) for member in value_type.types
+    )
+
+
+@register_model(TupleReference)
+class _Address(models.PrimitiveModel):  # type: ignore[misc]
+    """A pointer."""
+
+    def __init__(self, manager: Any, value_type: TupleReference) -> None:
+        place = manager.lookup(value_type.content).get_data_type().as_pointer()
+        super().__init__(manager, value_type, place)
+
+
+@lower_cast(types.BaseTuple, TupleReference)  # type: ignore[untyped-decorator]
+def _write_down(
+    context: Any, builder: Any, value_type: Any, reference: TupleReference, value: Any
+) -> Any:
+    """Address of a tuple on the stack of who hands it on."""
+    place = cgutils.alloca_once(builder, context.get_data_type(reference.content))
+    _store(context, builder, value_type, value, place)
+    # What is read by this address never changes (`_words`), which is true from here on only: no
+    # instruction, but LLVM moves nothing across it.
+    passed = ir.FunctionType(place.type, [place.type])
+    return builder.asm(passed, "", "=r,0,~{memory}", [place], side_effect=True)
+
+
+def _store(context: Any, builder: Any, value_type: types.Type, value: Any, place: Any) -> None:
+    if isinstance(value_type, types.BaseTuple):
+        for k, member in enumerate(value_type.types):
+            at = cgutils.gep_inbounds(builder, place, 0, k)
+            _store(context, builder, member, builder.extract_value(value, k), at)
+    else:
+        builder.store(context.data_model_manager[value_type].as_data(builder, value), place)
+
+
+def _member(context: Any, builder: Any, value_type: types.Type, at: Any) -> Any:
+    """Member of a tuple at an address: what lies there, or the address if it goes by that."""
+    if isinstance(argument_type(value_type), TupleReference):
+        return at
+    value = _words(builder, at)
+    if isinstance(value_type, types.Array):
+        return value
+    return context.data_model_manager[value_type].from_data(builder, value)
+
+
+def _words(builder: Any, at: Any) -> Any:
+    """What lies at an address, word by word, so that LLVM leaves out what is not used."""
+    value_type = at.type.pointee
+    if not isinstance(value_type, ir.Aggregate):
+        word = builder.load(at)
+        word.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return word
+    value = ir.Constant(value_type, ir.Undefined)
+    for k in range(len(value_type)):
+        part = _words(builder, cgutils.gep_inbounds(builder, at, 0, k))
+        value = builder.insert_value(value, part, k)
+    return value
+
+
+@infer_getattr
+class _Field(AttributeTemplate):  # type: ignore[misc]
+    key = TupleReference
+
+    def generic_resolve(self, reference: TupleReference, name: str) -> types.Type | None:
+        """Type of a field."""
+        content = reference.content
+        if not isinstance(content, types.BaseNamedTuple) or name not in content.fields:
+            return None
+        return argument_type(content.types[content.fields.index(name)])
+
+
+@lower_getattr_generic(TupleReference)  # type: ignore[untyped-decorator]
+def _field(context: Any, builder: Any, reference: TupleReference, place: Any, name: str) -> Any:
+    index = reference.content.fields.index(name)
+    at = cgutils.gep_inbounds(builder, place, 0, index)
+    return _member(context, builder, reference.content.types[index], at)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _item(typing: Any, reference: Any, index: Any) -> Any:
+    """Member of a tuple whose members are of one type, by its number."""
+    value_type = reference.content.dtype
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        place, number = given
+        at = builder.gep(place, [cgutils.intp_t(0), number], inbounds=True)
+        return _member(context, builder, value_type, at)
+
+    return argument_type(value_type)(reference, types.intp), generate
+
+
+@overload(operator.getitem)
+def _get_item(reference, index):  # type: ignore[no-untyped-def]
+    if isinstance(reference, TupleReference) and isinstance(reference.content, types.UniTuple):
+        return lambda reference, index: _item(reference, index)
+    return None
+
+
+# --- functions that are linked into their callers ---
+
+
+class _LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code that is linked into its callers and never run by itself."""
 
     def _optimize_final_module(self) -> None:
-        """Nothing: what takes it up is optimised as a whole."""
+        """Nothing: callers are optimised as a whole, with this code in them."""
 
     def _finalize_final_module(self) -> None:
         self._verify_declare_only_symbols()
@@ -345,31 +354,31 @@ class _Part(JITCodeLibrary):  # type: ignore[misc]
         return 0
 
     @property
-    def codegen(self) -> "_Part":
+    def codegen(self) -> "_LinkedLibrary":
         """Whom its environment is given to; see `set_env`."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Nothing: only what needs Python's objects needs one, and laws have none."""
+        """Nothing: only functions with Python objects need an environment."""
 
 
-class _PartCompiler(Compiler):  # type: ignore[misc]
+class _LinkedCompiler(Compiler):  # type: ignore[misc]
     """Compiles what other compiled code calls."""
 
     def __init__(self, typing: Any, target: Any, library: None, *rest: Any) -> None:
-        super().__init__(typing, target, _Part(target.codegen(), "part"), *rest)
+        super().__init__(typing, target, _LinkedLibrary(target.codegen(), "part"), *rest)
 
 
-class _Entry(CPUDispatcher):  # type: ignore[misc]
-    """What Python calls in place of a law, with its code, which is kept between runs."""
+class _PythonEntry(CPUDispatcher):  # type: ignore[misc]
+    """What Python calls in place of a linked function; its code is kept between runs."""
 
-    def __init__(self, law: "_Law", options: dict[str, Any]) -> None:
+    def __init__(self, function: "_LinkedFunction", options: dict[str, Any]) -> None:
         def entry(*given: Any) -> Any:
-            return law(*given)
+            return function(*given)
 
         super().__init__(entry, targetoptions=options)
         with suppress(RuntimeError):  # a function without a file is compiled in each process
-            self._cache = CodeCache(law.py_func)
+            self._cache = CodeCache(function.py_func)
 
     def compile(self, sig: Any) -> Any:
         """Code for a signature, kept or made."""
@@ -380,43 +389,44 @@ class _Entry(CPUDispatcher):  # type: ignore[misc]
                 self._cache.compiled()
 
 
-class _Law(CPUDispatcher):  # type: ignore[misc]
-    """A function that compiled code takes up, and Python calls by way of an entry.
+class _LinkedFunction(CPUDispatcher):  # type: ignore[misc]
+    """A function that is linked into compiled callers; Python calls it by way of an entry.
 
-    What an entry does, which takes named tuples apart, would take longer to compile than most laws
-    do, and most are called by others alone.
+    An entry takes named tuples apart, which would take longer to compile than most functions do,
+    and most are called by compiled code alone.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         bare = {**options, "no_cpython_wrapper": True}
-        super().__init__(function, targetoptions=bare, pipeline_class=_PartCompiler)
+        super().__init__(function, targetoptions=bare, pipeline_class=_LinkedCompiler)
         self._options = options
 
     @cached_property
-    def entry(self) -> _Entry:
+    def entry(self) -> _PythonEntry:
         """The function as Python calls it."""
-        return _Entry(self, self._options)
+        return _PythonEntry(self, self._options)
 
     def __call__(self, *given: Any) -> Any:
         return self.entry(*given)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """See numba's dispatcher: types of a call, whose bundles go by address."""
+        """See numba's dispatcher: types of a call, whose tuples go by address."""
         signature, folded = self._compiler.fold_argument_types(args, kws)
-        template, _, *rest = super().get_call_template([handed(one) for one in folded], {})
+        template, _, *rest = super().get_call_template(
+            [argument_type(value) for value in folded], {}
+        )
         return template, signature, *rest
 
 
-def law(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
-    """Make a decorator of laws and loops.
+def jit(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles functions which allocate no arrays.
 
-    Their arrays belong to the caller and they allocate none, so that references need not be
-    counted (`_nrt`), which took two thirds of a step. A wrapper for callers in C is compiled for
-    nobody.
+    All arrays belong to the caller, so that references need not be counted (`_nrt`), which took
+    two thirds of a step. No wrapper for callers in C is compiled.
 
     Parameters
     ----------
-    inline : whether LLVM puts them into what calls them, whatever they are.
+    inline : whether LLVM always inlines them into their callers.
     """
     options = {
         "nopython": True,
@@ -425,4 +435,4 @@ def law(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
         "no_cfunc_wrapper": True,
         "forceinline": inline,
     }
-    return lambda function: _Law(function, options)
+    return lambda function: _LinkedFunction(function, options)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU, CoSimulation, References
-from workbench.models.jit import law
+from workbench.models.jit import jit
 
-compiled = law()
-inlined = law(inline=True)
+compiled = jit()
+inlined = jit(inline=True)
 
 OK, REFUSED, SINGULAR = 0, 1, 2
 
@@ -32,14 +32,16 @@ def _call(typing, address, words):  # type: ignore[no-untyped-def]
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
         given = []
-        for kind, value in zip(words.types, cgutils.unpack_tuple(builder, values[1]), strict=True):
-            if isinstance(kind, types.Array):
-                data = context.make_array(kind)(context, builder, value).data
+        for word_type, value in zip(
+            words.types, cgutils.unpack_tuple(builder, values[1]), strict=True
+        ):
+            if isinstance(word_type, types.Array):
+                data = context.make_array(word_type)(context, builder, value).data
                 given.append(builder.ptrtoint(data, context.get_value_type(types.intp)))
-            elif isinstance(kind, types.Float):
+            elif isinstance(word_type, types.Float):
                 given.append(value)
             else:
-                given.append(context.cast(builder, value, kind, types.intp))
+                given.append(context.cast(builder, value, word_type, types.intp))
         function = ir.FunctionType(ir.IntType(32), [word.type for word in given])
         return builder.call(builder.inttoptr(values[0], function.as_pointer()), given)
 
@@ -116,7 +118,7 @@ def instance(
     )
 
 
-class Stepping(NamedTuple):
+class CoSimulationInstance(NamedTuple):
     """One instance of a Co-Simulation FMU, as `Instance`.
 
     Attributes
@@ -142,9 +144,11 @@ class Stepping(NamedTuple):
     reached: Vector
 
 
-def stepping(fmu: CoSimulation, inputs: Sequence[str], outputs: Sequence[str]) -> Stepping:
+def co_simulation_instance(
+    fmu: CoSimulation, inputs: Sequence[str], outputs: Sequence[str]
+) -> CoSimulationInstance:
     """Prepare an FMU that was started for compiled loops; it must outlive the result."""
-    return Stepping(
+    return CoSimulationInstance(
         address=fmu.instance_address,
         set_real=fmu.function_address("set"),
         get_real=fmu.function_address("get"),
@@ -333,14 +337,14 @@ def solve_part(a, n, columns):  # type: ignore[no-untyped-def]
     return OK
 
 
-def given(values: Matrix) -> Matrix:
+def read_only(values: Matrix) -> Matrix:
     """What a compiled loop reads of its caller, of one type, so that it is compiled once."""
     view = np.ascontiguousarray(values).view()
     view.flags.writeable = False
     return view
 
 
-def checked(status: int, fmu: FMU) -> None:
+def raise_on_failure(status: int, fmu: FMU) -> None:
     """Turn a status of a compiled loop into an exception.
 
     Raises

@@ -20,7 +20,7 @@ from workbench.errors import FMUError, InputError
 from workbench.models import fmu_cache, trial_calls
 from workbench.models.archive import unpack
 from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, Description
-from workbench.runtime.files import scratch_folder
+from workbench.runtime.files import temporary_folder
 from workbench.runtime.resources import fmus
 
 
@@ -92,7 +92,7 @@ def usual_limits() -> Limits:
     return Limits(**given)
 
 
-def prove(description: Description, interface: str, folder: Path) -> None:
+def require_trial(description: Description, interface: str, folder: Path) -> None:
     """Try an FMU in a process of its own, unless it is known to be sound.
 
     Parameters
@@ -112,13 +112,13 @@ def prove(description: Description, interface: str, folder: Path) -> None:
     """
     if description.sha256 in _packaged() or fmu_cache.is_known(*_marks(description, interface)):
         return
-    attempt(description, interface, folder, usual_limits())
+    run_trial(description, interface, folder, usual_limits())
 
 
 @contextmanager
 def unpacked(description: Description, interface: str) -> Iterator[Path]:
     """Folder with what of an FMU runs here, for as long as the context lasts."""
-    with scratch_folder() as scratch:
+    with temporary_folder() as scratch:
         folder = Path(scratch)
         unpack(description.path, folder, str(PurePosixPath(description.library(interface)).parent))
         yield folder
@@ -138,8 +138,8 @@ def _packaged() -> frozenset[str]:
     return frozenset(one["sha256"] for one in manifest["fmus"].values())
 
 
-def attempt(description: Description, interface: str, folder: Path, limits: Limits) -> str:
-    """Try an FMU in a process of its own, and remember it if it bears that; see `prove`.
+def run_trial(description: Description, interface: str, folder: Path, limits: Limits) -> str:
+    """Try an FMU in a process of its own, and remember it if it bears that; see `require_trial`.
 
     Returns
     -------

@@ -10,7 +10,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import Instance, checked, given, instance
+from workbench.models.native import Instance, instance, raise_on_failure, read_only
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
 from workbench.recordings.case import Value
@@ -287,9 +287,9 @@ class Estimator(ABC):
         """Rows of estimates, as laws write them."""
         rows = np.full((steps.size, self._width), np.nan)
         settings, memory = self._arguments()
-        y = given(self._measured(y))
-        status = self._loop(self._model, settings, memory, steps, given(u), y, rows)
-        checked(status, self.fmu)
+        y = read_only(self._measured(y))
+        status = self._loop(self._model, settings, memory, steps, read_only(u), y, rows)
+        raise_on_failure(status, self.fmu)
         return rows
 
     def _measured(self, y: Any) -> Any:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from workbench.arrays import Vector
-from workbench.runtime.files import replacing, spared
+from workbench.runtime.files import replacing, warning_if_unwritable
 
 # On white and near black: 3:1 to the ground or more, as WCAG 2.2 asks of graphics, differing in
 # lightness or in the blue-yellow axis, which colour-blind readers keep.
@@ -183,5 +183,5 @@ def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
         sheet.set_layout_engine(None)
     for path in paths:
         stamp = "Date" if path.suffix == ".svg" else "Software"
-        with spared(), replacing(path) as stream:
+        with warning_if_unwritable(), replacing(path) as stream:
             sheet.savefig(stream, format=path.suffix[1:], dpi=110, metadata={stamp: None})

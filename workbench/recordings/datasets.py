@@ -19,7 +19,7 @@ from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.case import KEYS, Case, read_case
 from workbench.recordings.csv import cell
-from workbench.runtime.files import claimed, write_json, write_whole
+from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.resources import commit
 from workbench.system.installed import companion_part
 from workbench.system.registry import system_path
@@ -173,7 +173,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
     _refuse_other_files(out)
     layout = _layout(known, source)
     recordings = list(layout.read(source))
-    with claimed(out):
+    with locked_folder(out):
         before = _written(out)
         written: dict[str, str] = {}
         for recording in recordings:

@@ -33,7 +33,7 @@ _PART = re.compile(r".*\.[0-9]+\.part")
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[None]:
+def locked_folder(folder: Path) -> Iterator[None]:
     """A folder for results that no other run writes to, proven before the work begins.
 
     It is made as needed. What a killed run, or a worker that is ended, left of a half-written file
@@ -106,7 +106,7 @@ def _prove_room(folder: Path) -> None:
         probe.write(bytes(_ROOM))
 
 
-def prove_writable(path: Path) -> None:
+def require_writable(path: Path) -> None:
     """Refuse a file that could not be written, before the work that leads to it.
 
     Raises
@@ -183,7 +183,7 @@ def _cut(path: Path) -> str:
 
 
 @contextmanager
-def spared() -> Iterator[None]:
+def warning_if_unwritable() -> Iterator[None]:
     """Let a file that cannot be written cost nothing but itself; the reason is printed."""
     try:
         yield
@@ -197,13 +197,13 @@ def write_whole(path: Path, content: str | bytes) -> None:
         stream.write(content.encode() if isinstance(content, str) else content)
 
 
-def sealed(content: Mapping[str, Any]) -> str:
-    """One line of JSON with a checksum of all that it says; `unsealed` reads it."""
+def with_checksum(content: Mapping[str, Any]) -> str:
+    """One line of JSON with a checksum of all that it says; `check_checksum` reads it."""
     return json.dumps({**content, _SEAL: _checksum(content)})
 
 
-def unsealed(text: str) -> dict[str, Any]:
-    """What `sealed` has written.
+def check_checksum(text: str) -> dict[str, Any]:
+    """What `with_checksum` has written.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def _checksum(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
-def before_last(path: Path) -> Path:
+def previous_path(path: Path) -> Path:
     """Where the file before the last of this name is kept."""
     return path.with_name(f"{path.stem}.before{path.suffix}")
 
@@ -252,7 +252,7 @@ _LONGEST = 104 - 52
 _SHORT = "/tmp"
 
 
-class Scratch:
+class TemporaryFolder:
     """A temporary folder, removed by `close` or with the process.
 
     Parameters
@@ -283,9 +283,9 @@ class Scratch:
 
 
 @contextmanager
-def scratch_folder() -> Iterator[str]:
+def temporary_folder() -> Iterator[str]:
     """Path of a temporary folder of ours, for as long as the context lasts."""
-    with closing(Scratch()) as scratch:
+    with closing(TemporaryFolder()) as scratch:
         yield str(scratch.path)
 
 
@@ -295,7 +295,7 @@ def own_temporary_files() -> Iterator[Path]:
     before = tempfile.tempdir, os.environ.get("TMPDIR")
     place = tempfile.gettempdir()
     short = len(place) > _LONGEST and os.path.isdir(_SHORT)
-    with closing(Scratch(_SHORT if short else place)) as scratch:
+    with closing(TemporaryFolder(_SHORT if short else place)) as scratch:
         tempfile.tempdir = os.environ["TMPDIR"] = str(scratch.path)
         try:
             yield scratch.path

@@ -31,7 +31,7 @@ from typing import Any, Generic, Self, TypeVar, TypeVarTuple
 from threadpoolctl import threadpool_limits
 
 from workbench.errors import WorkerError
-from workbench.runtime.files import scratch_folder
+from workbench.runtime.files import temporary_folder
 
 Given = TypeVar("Given")
 
@@ -114,7 +114,7 @@ class Pool(Generic[State]):
         self._prepare: Callable[[], State] = lambda: self._stack.enter_context(begin(given))
         if workers == 1 and limit == math.inf and not isolated:
             return
-        self._folder = self._stack.enter_context(scratch_folder())
+        self._folder = self._stack.enter_context(temporary_folder())
         self._stack.enter_context(threadpool_limits(1))
         # In a file, because handing so much to a process that dies as it starts waits for ever.
         Path(self._folder, _GIVEN).write_bytes(pickle.dumps((dict(os.environ), begin, given)))

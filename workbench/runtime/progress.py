@@ -7,7 +7,7 @@ from collections.abc import Callable
 _EVERY = 5.0  # [s] between two lines: seldom enough to be read, often enough to be seen alive
 
 
-class Pace:
+class ProgressReporter:
     """Says now and then how far work is, from any thread.
 
     Parameters

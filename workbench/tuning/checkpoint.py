@@ -9,7 +9,13 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.runtime.files import before_last, read_text, sealed, unsealed, write_whole
+from workbench.runtime.files import (
+    check_checksum,
+    previous_path,
+    read_text,
+    with_checksum,
+    write_whole,
+)
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,7 @@ def save(checkpoint: Checkpoint, path: Path) -> None:
     with suppress(FileNotFoundError, InputError):
         last = path.read_text()
         _parsed(last, path)  # a damaged one does not take the place of a sound one
-        write_whole(before_last(path), last)
+        write_whole(previous_path(path), last)
     population = checkpoint.population
     content = {
         "identity": checkpoint.identity,
@@ -100,7 +106,7 @@ def save(checkpoint: Checkpoint, path: Path) -> None:
         "converged": checkpoint.converged,
         "history": [vars(generation) for generation in checkpoint.history],
     }
-    write_whole(path, sealed(content))
+    write_whole(path, with_checksum(content))
 
 
 def load(
@@ -120,7 +126,7 @@ def load(
     try:
         found = _read(path)
     except InputError as damaged:
-        found = _read(before_last(path))
+        found = _read(previous_path(path))
         if found is None:
             raise
         warn(f"going on from the generation before the last: {damaged}")
@@ -143,7 +149,7 @@ def _read(path: Path) -> Checkpoint | None:
 
 def _parsed(text: str, path: Path) -> Checkpoint:
     try:
-        content = unsealed(text)
+        content = check_checksum(text)
         population = Population(*(np.array(content[name]) for name in ("members", "z", "z_k")))
         history = tuple(Generation(**generation) for generation in content["history"])
         return Checkpoint(content["identity"], population, content["converged"], history)

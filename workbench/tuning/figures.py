@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from workbench.runtime.files import replacing, spared
+from workbench.runtime.files import replacing, warning_if_unwritable
 from workbench.tuning.checkpoint import Generation
 
 
 def draw_convergence(history: Sequence[Generation], path: Path) -> None:
     """Draw `convergence` to a file."""
-    with spared(), replacing(path) as stream:
+    with warning_if_unwritable(), replacing(path) as stream:
         convergence(history).savefig(stream, format="png", dpi=120)
 
 
@@ -47,5 +47,5 @@ def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:
     axes.invert_yaxis()
     axes.set_xlabel("z_k [1]")
     axes.legend()
-    with spared(), replacing(path) as stream:
+    with warning_if_unwritable(), replacing(path) as stream:
         figure.savefig(stream, format="png", dpi=120)

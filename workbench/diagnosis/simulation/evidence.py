@@ -31,7 +31,7 @@ from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
-from workbench.runtime.progress import Pace
+from workbench.runtime.progress import ProgressReporter
 from workbench.system.system import System
 
 Item = TypeVar("Item")
@@ -71,7 +71,7 @@ class Simulations:
         restarting: bool = True,
         model: Opened | None = None,
     ) -> None:
-        self._pace = Pace(report, "simulations")
+        self._pace = ProgressReporter(report, "simulations")
         self.system, self.given, self.cases = system, dict(given), list(cases)
         self._sound, self._workers = sound, min(workers, len(cases))
         self._alone = self._workers == 1

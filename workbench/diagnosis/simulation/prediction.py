@@ -22,11 +22,11 @@ from workbench.diagnosis.simulation.tangent import Tangent, advance, renew, shar
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.models.native import (
-    checked,
     compiled,
     inlined,
     instance,
     place,
+    raise_on_failure,
     read,
     set_inputs,
     set_states,
@@ -265,7 +265,7 @@ class Predictor:
             work,
             along,
         )
-        checked(status, fmu)
+        raise_on_failure(status, fmu)
         if not np.isfinite(along.states).all():  # once lost, they stay so
             raise FMUError(f"{fmu.path.name}: derivatives of {samples.name} grow beyond all bounds")
         return errors, along

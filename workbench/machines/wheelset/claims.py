@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
-from workbench.models.native import checked, compiled, instance, place, read
+from workbench.models.native import compiled, instance, place, raise_on_failure, read
 from workbench.system.system import System
 
 # From here on 0.01 in muWR changes the force of a wheel by some 100 N, the noise of a load cell.
@@ -65,7 +65,7 @@ class PeakForce:
         self._radii = np.array([fmu.defaults[name] for name in ("rW", "rR")])
         peaks = np.zeros((self._speeds.size, self._frictions.size, 2))
         grid = (self._speeds, self._frictions, _CREEPAGES)
-        checked(_scan(model, order, self._radii, fmu.defaults["muWR"], grid, peaks), fmu)
+        raise_on_failure(_scan(model, order, self._radii, fmu.defaults["muWR"], grid, peaks), fmu)
         self._peaks = RegularGridInterpolator(
             (np.log(self._speeds), self._frictions), peaks, bounds_error=False
         )

@@ -7,6 +7,6 @@ tried, so that a fault is named once, where it is.
 """
 
 from workbench.models.checks.checks import check
-from workbench.models.checks.finding import Finding, is_fit, uses
+from workbench.models.checks.result import CheckResult, is_fit, uses
 
-__all__ = ["Finding", "check", "is_fit", "uses"]
+__all__ = ["CheckResult", "check", "is_fit", "uses"]

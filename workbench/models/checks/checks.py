@@ -22,7 +22,8 @@ from workbench.models.checks.excitation import (
     start_co_simulation,
     walk,
 )
-from workbench.models.checks.finding import (
+from workbench.models.checks.isolation import isolated
+from workbench.models.checks.result import (
     DERIVATIVES,
     EVENTS,
     INJECTION,
@@ -39,9 +40,8 @@ from workbench.models.checks.finding import (
     TIME_GET,
     TIME_SET,
     TIME_STEP,
-    Finding,
+    CheckResult,
 )
-from workbench.models.checks.isolation import isolated
 from workbench.models.description import (
     CO_SIMULATION,
     MODEL_EXCHANGE,
@@ -53,7 +53,7 @@ from workbench.models.trial import (
     ContainedError,
     Limits,
     NoAnswerError,
-    attempt,
+    run_trial,
     unpacked,
     usual_limits,
 )
@@ -64,8 +64,8 @@ def check(
     instantiations: int = 2000,
     limits: Limits | None = None,
     begin: Callable[[str], None] = lambda name: None,
-    report: Callable[[Finding], None] = lambda finding: None,
-) -> list[Finding]:
+    report: Callable[[CheckResult], None] = lambda finding: None,
+) -> list[CheckResult]:
     """Check whether an FMU is fit for observers.
 
     Parameters
@@ -84,7 +84,7 @@ def check(
     description = read_description(path)
     description.require(MODEL_EXCHANGE)
     limits = limits or usual_limits()
-    findings: dict[str, Finding] = {}
+    findings: dict[str, CheckResult] = {}
     for attempted, questions, needs in _CHECKS:
         failed = next((n.name for n in needs if not findings[n.name].passed), None)
         obstacle = f"needs '{failed}'" if failed else _obstacle(questions[0], description)
@@ -105,11 +105,11 @@ def check(
     return list(findings.values())
 
 
-def _unproved(description: Description, limits: Limits) -> Finding | None:
+def _unproved(description: Description, limits: Limits) -> CheckResult | None:
     """What keeps an FMU from being started at all: it ends its process, or does not return."""
     with unpacked(description, MODEL_EXCHANGE) as folder:
         try:
-            attempt(description, MODEL_EXCHANGE, folder, limits)
+            run_trial(description, MODEL_EXCHANGE, folder, limits)
         except NoAnswerError as error:
             return replace(START, unknown=True, reason=f"not measured: {error}")
         except ContainedError as error:
@@ -117,7 +117,7 @@ def _unproved(description: Description, limits: Limits) -> Finding | None:
     return None
 
 
-def _obstacle(question: Finding, description: Description) -> str:
+def _obstacle(question: CheckResult, description: Description) -> str:
     """Say why a check cannot be made; empty if it can."""
     exchange = description.interfaces[MODEL_EXCHANGE]
     simulation = description.interfaces.get(CO_SIMULATION)
@@ -140,7 +140,7 @@ def _obstacle(question: Finding, description: Description) -> str:
     return ""
 
 
-def _start(path: Path, instantiations: int) -> Iterator[Finding]:
+def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         fmu.start({})
         scalar = set(fmu.states) <= set(real_variables(fmu).names)
@@ -158,7 +158,7 @@ def _start(path: Path, instantiations: int) -> Iterator[Finding]:
     yield replace(EVENTS, passed=not count, value=count, reason=reason if count else "")
 
 
-def _reset(path: Path, instantiations: int) -> Iterator[Finding]:
+def _reset(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         everything = real_variables(fmu)
 
@@ -176,7 +176,7 @@ def _reset(path: Path, instantiations: int) -> Iterator[Finding]:
         yield same_bits(RESET, fmu, first, second, "after reset and the same calls")
 
 
-def _inject(path: Path, instantiations: int) -> Iterator[Finding]:
+def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         if not fmu.states:
             yield replace(INJECTION, passed=True, value=0.0)
@@ -204,7 +204,7 @@ def _inject(path: Path, instantiations: int) -> Iterator[Finding]:
     yield replace(INJECTION, passed=not reason, value=value, reason=reason)
 
 
-def _roll_back(path: Path, instantiations: int) -> Iterator[Finding]:
+def _roll_back(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
         _, t = walk(fmu, excitation, 0.0)
@@ -217,7 +217,7 @@ def _roll_back(path: Path, instantiations: int) -> Iterator[Finding]:
         yield same_bits(ROLLBACK, fmu, first, second, "run again from a restored state")
 
 
-def _serialise(path: Path, instantiations: int) -> Iterator[Finding]:
+def _serialise(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
         _, t = walk(fmu, excitation, 0.0)
@@ -237,7 +237,7 @@ def _serialise(path: Path, instantiations: int) -> Iterator[Finding]:
         yield same_bits(SERIALISATION, fmu, first, second, what)
 
 
-def _roll_back_co_simulation(path: Path, instantiations: int) -> Iterator[Finding]:
+def _roll_back_co_simulation(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
     with CoSimulation(path) as simulation:
@@ -253,7 +253,7 @@ def _roll_back_co_simulation(path: Path, instantiations: int) -> Iterator[Findin
         yield same_bits(ROLLBACK_CS, simulation, first, second, what)
 
 
-def _differentiate(path: Path, instantiations: int) -> Iterator[Finding]:
+def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
         outputs = real_variables(fmu, fmu.outputs)
@@ -305,7 +305,7 @@ def _central_differences(evaluate: Callable[[Vector], Vector], x: Vector, steps:
     return (next(sides) - next(sides)) / (2 * steps)
 
 
-def _compare_interfaces(path: Path, instantiations: int) -> Iterator[Finding]:
+def _compare_interfaces(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu, CoSimulation(path) as simulation:
         excitation = excite(fmu)
         start_co_simulation(simulation, excitation)
@@ -363,9 +363,9 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
     return rows
 
 
-_Attempt = Callable[[Path, int], Iterator[int | Finding]]
+_Attempt = Callable[[Path, int], Iterator[int | CheckResult]]
 # What is run, the questions it answers, and those whose answers it rests on.
-_CHECKS: tuple[tuple[_Attempt, tuple[Finding, ...], tuple[Finding, ...]], ...] = (
+_CHECKS: tuple[tuple[_Attempt, tuple[CheckResult, ...], tuple[CheckResult, ...]], ...] = (
     (_start, (START, EVENTS), ()),
     (_reset, (RESET,), (START,)),
     (_inject, (INJECTION,), (START,)),

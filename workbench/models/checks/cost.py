@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.models.checks.excitation import excite, real_variables
-from workbench.models.checks.finding import (
+from workbench.models.checks.result import (
     INSTANCES,
     LOADS,
     MEMORY,
@@ -19,7 +19,7 @@ from workbench.models.checks.finding import (
     TIME_GET,
     TIME_SET,
     TIME_STEP,
-    Finding,
+    CheckResult,
 )
 from workbench.models.fmu import FMU
 
@@ -27,7 +27,7 @@ from workbench.models.fmu import FMU
 _MEMORY_SHOWS = 500
 
 
-def endure(path: Path, instantiations: int) -> Iterator[int | Finding]:
+def endure(path: Path, instantiations: int) -> Iterator[int | CheckResult]:
     """Make instances one after the other, of one loaded library and each of its own."""
     growth = []
     lot = max(instantiations // 10, 1)
@@ -67,7 +67,7 @@ def _resident_memory() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def time_calls(path: Path, instantiations: int) -> Iterator[Finding]:
+def time_calls(path: Path, instantiations: int) -> Iterator[CheckResult]:
     """Time what an observer calls at every sample."""
     with FMU(path) as fmu:
         excitation = excite(fmu)
@@ -85,7 +85,7 @@ def time_calls(path: Path, instantiations: int) -> Iterator[Finding]:
             for level in levels:
                 fmu.set(excitation.inputs, level)
 
-        tasks: tuple[tuple[Finding, Callable[[], None]], ...] = (
+        tasks: tuple[tuple[CheckResult, Callable[[], None]], ...] = (
             (TIME_GET, lambda: at_points(lambda: fmu.get(outputs))),
             (TIME_SET, at_levels),
             (TIME_DERIVATIVES, lambda: at_points(fmu.derivatives)),

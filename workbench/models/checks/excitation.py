@@ -7,7 +7,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.checks.finding import Finding
+from workbench.models.checks.result import CheckResult
 from workbench.models.fmu import FMU, CoSimulation, Variables
 
 COMMUNICATION_STEPS = 100
@@ -147,7 +147,9 @@ def run(simulation: CoSimulation, excitation: Excitation, begin: float) -> tuple
     return np.array(rows), begin + COMMUNICATION_STEPS * h
 
 
-def same_bits(question: Finding, fmu: FMU, first: Matrix, second: Matrix, what: str) -> Finding:
+def same_bits(
+    question: CheckResult, fmu: FMU, first: Matrix, second: Matrix, what: str
+) -> CheckResult:
     """Judge two runs, (samples, k) of all real variables, that must be one and the same."""
     if first.tobytes() == second.tobytes():
         return replace(question, passed=True, value=0.0)

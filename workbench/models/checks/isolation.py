@@ -10,9 +10,9 @@ from multiprocessing.connection import Connection
 from types import FrameType
 
 from workbench.errors import FMUError
-from workbench.models.checks.finding import Finding
+from workbench.models.checks.result import CheckResult
 from workbench.models.trial import Limits, NoAnswerError
-from workbench.runtime.files import scratch_folder
+from workbench.runtime.files import temporary_folder
 from workbench.runtime.pool import start
 
 try:
@@ -21,12 +21,12 @@ except ImportError:  # Windows: the time of an answer is all that is limited
     resource = None  # type: ignore[assignment]
 
 # A check yields findings, and numbers that say how far it is.
-Task = Callable[[], Iterator[int | Finding]]
-_Report = int | Finding | str | NoAnswerError  # text: of an exception; both are the last report
+Task = Callable[[], Iterator[int | CheckResult]]
+_Report = int | CheckResult | str | NoAnswerError  # text: of an exception; both are the last report
 _SHARE = 10.0  # of the processor that a check gets at least, on a machine with other work to do
 
 
-def isolated(task: Task, questions: Sequence[Finding], limits: Limits) -> list[Finding]:
+def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> list[CheckResult]:
     """Run a check in a process; returns one finding per question, whatever happens there.
 
     If the check ends before its time, the question it was at fails with the reason, and those
@@ -40,7 +40,7 @@ def isolated(task: Task, questions: Sequence[Finding], limits: Limits) -> list[F
     """
     reports, to_parent = multiprocessing.Pipe(duplex=False)
     wait = max(limits.answer, _SHARE * limits.processor)
-    with scratch_folder() as scratch:
+    with temporary_folder() as scratch:
         process = start(_work, (task, to_parent, scratch, limits, dict(os.environ)))
         to_parent.close()
         found, reached, reason = _listen(reports, wait)
@@ -70,9 +70,9 @@ def isolated(task: Task, questions: Sequence[Finding], limits: Limits) -> list[F
 
 def _listen(
     reports: "Connection[None, _Report]", timeout: float
-) -> tuple[dict[str, Finding], int | None, str | NoAnswerError]:
+) -> tuple[dict[str, CheckResult], int | None, str | NoAnswerError]:
     """Collect reports to the end: findings, progress since the last, and what went wrong."""
-    found: dict[str, Finding] = {}
+    found: dict[str, CheckResult] = {}
     reached: int | None = None
     while reports.poll(timeout):
         try:
@@ -81,7 +81,7 @@ def _listen(
             return found, reached, ""
         if isinstance(report, str | NoAnswerError):
             return found, reached, report
-        if isinstance(report, Finding):
+        if isinstance(report, CheckResult):
             found[report.name] = report
             reached = None
         else:

@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.models.native import checked, compiled, given
+from workbench.models.native import compiled, raise_on_failure, read_only
 from workbench.observers.contract import Estimate
 from workbench.observers.estimators.kalman import carry, finish
 from workbench.observers.estimators.moving_horizon.estimator import (
@@ -288,21 +288,21 @@ class Smoother(MovingHorizonEstimator):
         """Smooth a recording; see Estimator."""
         self.start(u[0], y[0])
         rows = np.full((time.size, self._width), np.nan)
-        steps, u, y = np.diff(time, prepend=time[0]), given(u), given(self._measured(y))
+        steps, u, y = np.diff(time, prepend=time[0]), read_only(u), read_only(self._measured(y))
         horizon, nodes, s = self._memory, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
         whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
         memory = HorizonMemory(horizon.filter, horizon.held, whole)
         model, settings = self._model, self._settings
-        checked(_go_forward(model, settings, horizon, memory, steps, u, y, rows), self.fmu)
+        raise_on_failure(_go_forward(model, settings, horizon, memory, steps, u, y, rows), self.fmu)
         if time.size > 1:
             start, levels = whole.covariance.copy(), whole.levels.copy()
             step = float(np.median(steps))
             self._doubt(whole, start, levels, y[1:] - rows[1:, : y.shape[1]], step)
-            checked(_go_back(model, settings, memory), self.fmu)
+            raise_on_failure(_go_back(model, settings, memory), self.fmu)
             # A filter lags behind what drifts; what is left now is of sensors and model.
             self._doubt(whole, start, levels, whole.errors, step)
-            checked(_finish(model, settings, memory, spread(nodes, s), u, rows), self.fmu)
+            raise_on_failure(_finish(model, settings, memory, spread(nodes, s), u, rows), self.fmu)
         return self._split(rows)
 
     def _doubt(

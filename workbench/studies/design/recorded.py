@@ -12,12 +12,12 @@ from workbench.models.fmu import CoSimulation
 from workbench.models.native import (
     OK,
     REFUSED,
-    checked,
+    co_simulation_instance,
     compiled,
     do_step,
+    raise_on_failure,
     read,
     set_inputs,
-    stepping,
 )
 from workbench.recordings.case import Case, Value, read_only
 from workbench.studies.design.candidates import Experiment
@@ -110,7 +110,7 @@ def _driven(
     h = float(time[1] - time[0])
     every = max(1, round(system.comparison.block / h))
     model.set(model.variables(names), u[0])
-    running = stepping(model, names, readings)
+    running = co_simulation_instance(model, names, readings)
     for k in range(0, time.size, every):
         block = slice(k, k + every + 1)
         feels = {**known, **dict(zip(felt.names, model.get(felt).tolist(), strict=True))}
@@ -119,7 +119,7 @@ def _driven(
         ends = experiments.ends
         if ends is not None and abs(float(ends.formula(feels))) < ends.below:
             return u[:k], y[:k]
-        checked(_followed(running, h, held, u[block], y[block]), model)
+        raise_on_failure(_followed(running, h, held, u[block], y[block]), model)
     return u, y
 
 

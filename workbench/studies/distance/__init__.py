@@ -16,7 +16,7 @@ from workbench.diagnosis.inference.search import Reporter
 from workbench.errors import InputError
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
-from workbench.runtime.progress import Pace
+from workbench.runtime.progress import ProgressReporter
 from workbench.studies.distance.forecast import (
     Forecaster,
     Question,
@@ -135,7 +135,7 @@ class _Forecasts:
 
     def told(self, stop: Stop) -> Distance:
         """What is to be said of a stop, and of those that were made."""
-        counted = Pace(self._report, "distributions").part(len(self._made) + 1)
+        counted = ProgressReporter(self._report, "distributions").part(len(self._made) + 1)
         questions = [self._question(one.stop, k) for k, one in enumerate(self._made)]
         asked = self._question(stop, None)
         drawn = [
@@ -182,7 +182,7 @@ class _Forecasts:
         if not effort.decades:
             return None, False
         interrupted = False
-        counted = Pace(self._report, "runs of subset simulation").part(_RUNS)
+        counted = ProgressReporter(self._report, "runs of subset simulation").part(_RUNS)
         under_way: list[Future[tuple[Descent, float]]] = []
         try:
             for number in range(_RUNS):
@@ -210,7 +210,7 @@ class _Forecasts:
         if not parts:
             return None, False
         interrupted = False
-        counted = Pace(self._report, "parts of the plain samples").part(len(parts))
+        counted = ProgressReporter(self._report, "parts of the plain samples").part(len(parts))
         under_way: list[Future[Vector]] = []
         try:
             for size, seed in parts:

@@ -14,7 +14,7 @@ from workbench.diagnosis.simulation.steps import restart, steps
 from workbench.diagnosis.simulation.steps import step as advance
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
-from workbench.models.native import OK, checked, compiled, instance, place, read
+from workbench.models.native import OK, compiled, instance, place, raise_on_failure, read
 from workbench.system.stopping import Stopping
 from workbench.system.system import System
 
@@ -156,7 +156,7 @@ class StopSimulation:
                 f"{self._fmu.path.name}: not at rest after {self._stopping.longest:g} s; "
                 "the stop asks for too little, or the way falls too steeply"
             )
-        checked(status, self._fmu)
+        raise_on_failure(status, self._fmu)
         assert status == OK
         distance, time, count = self._found
         return StopResult(float(distance), float(time), y[: int(count)].copy())

@@ -9,10 +9,10 @@ from workbench.diagnosis import Diagnosis
 from workbench.errors import InputError
 from workbench.runtime.files import (
     append_line,
-    before_last,
+    check_checksum,
+    previous_path,
     read_text,
-    sealed,
-    unsealed,
+    with_checksum,
     write_whole,
 )
 from workbench.studies.power.planting import Planting, Repertoire
@@ -133,26 +133,29 @@ class Journal:
             text = read_text(path, "run without --resume, or give another --out")
             if resume:
                 self._parse(text, identity)
-            write_whole(before_last(path), text)
-        lines = [sealed(identity), *(sealed(asdict(result)) for result in self.results)]
+            write_whole(previous_path(path), text)
+        lines = [
+            with_checksum(identity),
+            *(with_checksum(asdict(result)) for result in self.results),
+        ]
         write_whole(path, "".join(f"{line}\n" for line in lines))
 
     def append(self, result: SetVerdict) -> None:
         """Add a verdict; it is on the disk when this returns."""
         self.results.append(result)
-        append_line(self._path, sealed(asdict(result)))
+        append_line(self._path, with_checksum(asdict(result)))
 
     def _parse(self, text: str, identity: Mapping[str, Any]) -> None:
         # What follows the last line feed was being written when the run was killed.
         head, *lines = text.split("\n")[:-1] or [""]
         try:
-            found = unsealed(head)
+            found = check_checksum(head)
         except (ValueError, RecursionError) as error:
             raise InputError(
                 where=f"{self._path}, line 1",
                 found=f"no verdicts as they were written ({error})",
                 expected="what an earlier run wrote",
-                remedy=f"put {before_last(self._path).name} in its place, if it is there, or run "
+                remedy=f"put {previous_path(self._path).name} in its place, if it is there, or run "
                 "without --resume",
             ) from None
         if found != identity:
@@ -165,7 +168,7 @@ class Journal:
             )
         for number, line in enumerate(lines, start=2):
             try:
-                result = _result(unsealed(line))
+                result = _result(check_checksum(line))
                 if any(one.planting == result.planting for one in self.results):
                     raise ValueError("a second verdict on a set")
                 self.results.append(result)

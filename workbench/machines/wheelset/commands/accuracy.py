@@ -22,7 +22,7 @@ from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
 from workbench.observers.gains_file import usual_gains
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []
     begin = time.perf_counter()
-    with claimed(options.out), ExitStack() as stack:
+    with locked_folder(options.out), ExitStack() as stack:
         roles = dict.fromkeys(kind.role for kind in chosen.values())
         models = {role: stack.enter_context(open_model(system, role)) for role in roles}
         gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}

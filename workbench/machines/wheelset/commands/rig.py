@@ -27,7 +27,7 @@ from workbench.machines.wheelset.rig import (
     write_recording,
 )
 from workbench.models.fmu import CoSimulation
-from workbench.runtime.files import claimed
+from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
 from workbench.system.registry import load_system, model_path
 from workbench.system.system import REFERENCE, System
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     scenarios = [proposed_stop(options.next, system)] if options.next else select(options.case)
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
-    with claimed(options.out):
+    with locked_folder(options.out):
         return _recorded(options, output, system, scenarios, effects)
 
 

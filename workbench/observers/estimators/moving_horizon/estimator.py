@@ -8,7 +8,7 @@ from scipy.special import chdtri, ndtri
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import checked, compiled, given, inlined, linearise, read
+from workbench.models.native import compiled, inlined, linearise, raise_on_failure, read, read_only
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
     FilterMemory,
@@ -337,7 +337,9 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
                 expected=f"0 to {self.window.filled[0] - 1}, as many as the horizon has",
                 remedy="give a longer horizon in [design] of the gains",
             )
-        checked(_fill_in(self._model, self._settings, self._memory, k, given(y)), self.fmu)
+        raise_on_failure(
+            _fill_in(self._model, self._settings, self._memory, k, read_only(y)), self.fmu
+        )
 
     def _begin(self, u: Vector, y: Vector) -> None:
         memory, self._memory = self._memory, self._memory.filter

@@ -3,12 +3,12 @@
 import re
 from concurrent.futures import ThreadPoolExecutor
 
-from workbench.runtime.progress import Pace
+from workbench.runtime.progress import ProgressReporter
 
 
 def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:
     lines: list[str] = []
-    done = Pace(lines.append, "simulations", every=0.0).part(4)
+    done = ProgressReporter(lines.append, "simulations", every=0.0).part(4)
     for one in range(4):
         done(one)
     assert [line.partition(",")[0] for line in lines] == [f"{n} simulations" for n in (1, 2, 3, 4)]
@@ -18,7 +18,7 @@ def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:
 
 def test_parts_add_up_from_any_thread() -> None:
     lines: list[str] = []
-    pace = Pace(lines.append, "simulations", every=0.0)
+    pace = ProgressReporter(lines.append, "simulations", every=0.0)
 
     def part(size: int) -> None:
         done = pace.part(size)
@@ -33,7 +33,7 @@ def test_parts_add_up_from_any_thread() -> None:
 
 def test_what_is_soon_done_says_nothing() -> None:
     lines: list[str] = []
-    done = Pace(lines.append, "simulations", every=3600.0).part(100)
+    done = ProgressReporter(lines.append, "simulations", every=3600.0).part(100)
     for one in range(100):
         done(one)
     assert lines == []

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """What one check found.
 
     Attributes
@@ -25,8 +25,8 @@ class Finding:
     unknown: bool = False
 
 
-def is_fit(findings: Iterable[Finding]) -> bool:
-    """Say whether no check failed; see `Finding.unknown`, too."""
+def is_fit(findings: Iterable[CheckResult]) -> bool:
+    """Say whether no check failed; see `CheckResult.unknown`, too."""
     return all(finding.passed is not False for finding in findings)
 
 
@@ -34,26 +34,26 @@ def is_fit(findings: Iterable[Finding]) -> bool:
 SAMPLE = 5000.0
 
 # The questions: findings without an answer. Bits are either the same or not, hence limits of 0.
-START = Finding("start", limit=1, unit="instances")
+START = CheckResult("start", limit=1, unit="instances")
 # The step of an observer takes the model for smooth: it would pass over a jump.
-EVENTS = Finding("smoothness", limit=0, unit="event indicators")
-RESET = Finding("reset and replay", limit=0.0)
-INJECTION = Finding("state injection", limit=0.0)
-ROLLBACK = Finding("rollback", limit=0.0)
-SERIALISATION = Finding("serialised rollback", limit=0.0)
-ROLLBACK_CS = Finding("rollback in Co-Simulation", limit=0.0)
+EVENTS = CheckResult("smoothness", limit=0, unit="event indicators")
+RESET = CheckResult("reset and replay", limit=0.0)
+INJECTION = CheckResult("state injection", limit=0.0)
+ROLLBACK = CheckResult("rollback", limit=0.0)
+SERIALISATION = CheckResult("serialised rollback", limit=0.0)
+ROLLBACK_CS = CheckResult("rollback in Co-Simulation", limit=0.0)
 # Of an entry. Differences at the best of several steps agree to 1e-7; a wrong term is far above.
-DERIVATIVES = Finding("directional derivatives", limit=1e-4)
+DERIVATIVES = CheckResult("directional derivatives", limit=1e-4)
 # Of the range of a state: above any sensible tolerance, below what a sensor of speed resolves.
-INTERFACES = Finding("Co-Simulation against Model Exchange", limit=1e-3)
-INSTANCES = Finding("instantiations", unit="instances")
-LOADS = Finding("loads of the library", unit="instances")
+INTERFACES = CheckResult("Co-Simulation against Model Exchange", limit=1e-3)
+INSTANCES = CheckResult("instantiations", unit="instances")
+LOADS = CheckResult("loads of the library", unit="instances")
 # Tuning starts a model 1e5 times: 1 MB in 1000 would fill 100 MB of each worker.
-MEMORY = Finding("memory growth", limit=1.0, unit="MB per 1000")
-TIME_GET = Finding("time of states and outputs", limit=SAMPLE, unit="us")
-TIME_SET = Finding("time of inputs", limit=SAMPLE, unit="us")
-TIME_DERIVATIVES = Finding("time of states and derivatives", limit=SAMPLE, unit="us")
-TIME_STEP = Finding("time of states and step", limit=SAMPLE, unit="us")
+MEMORY = CheckResult("memory growth", limit=1.0, unit="MB per 1000")
+TIME_GET = CheckResult("time of states and outputs", limit=SAMPLE, unit="us")
+TIME_SET = CheckResult("time of inputs", limit=SAMPLE, unit="us")
+TIME_DERIVATIVES = CheckResult("time of states and derivatives", limit=SAMPLE, unit="us")
+TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 
 # Every estimator sets states and steps by the Jacobian; none rolls back, so far. What makes many
 # instances are tuning and diagnosis; what rolls back are other tools.
@@ -73,7 +73,7 @@ _USES = {
 }
 
 
-def uses(findings: Iterable[Finding]) -> dict[str, list[str]]:
+def uses(findings: Iterable[CheckResult]) -> dict[str, list[str]]:
     """Uses of an FMU, each with the names of what failed that it rests on; none: it would do."""
     failed = {finding.name for finding in findings if finding.passed is False}
     return {
