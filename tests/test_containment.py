@@ -35,7 +35,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     # Of waiting generous, for a machine that has other work to do.
-    monkeypatch.setenv("WORKBENCH_PROOF", "processor=1 answer=60 memory=512 file=10")
+    monkeypatch.setenv("WORKBENCH_TRIAL", "processor=1 answer=60 memory=512 file=10")
     return folder
 
 
@@ -104,7 +104,7 @@ def test_one_that_waits_is_not_measured_rather_than_unfit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan(f"wait {CALL} 1")
-    monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
+    monkeypatch.setenv("WORKBENCH_TRIAL", "answer=1")
     with pytest.raises(NoAnswerError, match=r"did not answer from .* within 1 s, .* for 0\.\d s"):
         FMU(hostile_path)
     assert list(places.iterdir()) == []
@@ -114,7 +114,7 @@ def test_limits_that_cannot_be_read_are_refused(
     hostile_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for text in ("processor=fast", "time=3", "memory=-1", "answer=nan"):
-        monkeypatch.setenv("WORKBENCH_PROOF", text)
+        monkeypatch.setenv("WORKBENCH_TRIAL", text)
         with pytest.raises(InputError, match=f"found '{text}'"):
             FMU(hostile_path)
 
@@ -219,7 +219,7 @@ def test_a_process_that_ends_well_before_its_time_is_a_failure(
 ) -> None:
     plan("exit fmi2Instantiate 30")
     findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
-    reason = "the FMU ended the process with exit code 0 after"
+    reason = "the FMU ended the process with exit status 0 after"
     assert findings["instantiations"].passed is False
     assert findings["instantiations"].reason.startswith(reason)
 
@@ -243,7 +243,7 @@ def test_an_fmu_that_does_not_answer_is_neither_fit_nor_unfit(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     plan(f"wait {CALL} 1")
-    monkeypatch.setenv("WORKBENCH_PROOF", "answer=1")
+    monkeypatch.setenv("WORKBENCH_TRIAL", "answer=1")
     assert main(["fmu", "check", str(hostile_path)]) == 3
     assert "evil.fmu (WheelsetRig.MinimalObserver): not measured" in capsys.readouterr().out
     assert main(["fmu", "check", str(hostile_path), "--json"]) == 3

@@ -151,7 +151,7 @@ def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_no
 @contextmanager
 def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]]":
     """A check that waits for a model, in the middle of its work."""
-    plan = {"HOSTILE": "wait fmi2Instantiate 10", "WORKBENCH_PROOF": "answer=300"}
+    plan = {"HOSTILE": "wait fmi2Instantiate 10", "WORKBENCH_TRIAL": "answer=300"}
     with running(folder, "fmu", "check", hostile_path, **plan) as command:
         assert command.stdout is not None
         while "serialised" not in (line := command.stdout.readline()):

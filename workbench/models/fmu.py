@@ -274,6 +274,20 @@ class Linearisation:
     D: Matrix
 
 
+def central_differences(evaluate: Callable[[Vector], Vector], x: Vector, steps: Vector) -> Matrix:
+    """Jacobian (rows, n) of `evaluate` at x (n,): (f(x + h_j e_j) - f(x - h_j e_j)) / (2 h_j).
+
+    Parameters
+    ----------
+    steps : (n,) h.
+    """
+    columns = [
+        (evaluate(x + step) - evaluate(x - step)) / (2 * step[j])
+        for j, step in enumerate(np.diag(steps))
+    ]
+    return np.column_stack(columns)
+
+
 class FMU:
     """One instance of a Model Exchange FMU, FMI 2.0 or 3.0.
 
@@ -482,18 +496,15 @@ class FMU:
         """Central differences; the step balances truncation and rounding (cube root of eps)."""
         probe = Variables((), unknowns, np.zeros(unknowns.size))
         centre = self.get(knowns).copy()
-        columns = []
-        for j, value in enumerate(centre):
-            step = np.finfo(float).eps ** (1 / 3) * max(abs(value), 1e-3)
-            sides = []
-            for side in (step, -step):
-                moved = centre.copy()
-                moved[j] += side
-                self._inject(knowns, moved)
-                sides.append(self.get(probe).copy())
-            columns.append((sides[0] - sides[1]) / (2 * step))
+
+        def evaluate(values: Vector) -> Vector:
+            self._inject(knowns, values)
+            return self.get(probe).copy()
+
+        steps = np.finfo(float).eps ** (1 / 3) * np.maximum(np.abs(centre), 1e-3)
+        jacobian = central_differences(evaluate, centre, steps)
         self._inject(knowns, centre)
-        return np.column_stack(columns)
+        return jacobian
 
     def _inject(self, variables: Variables, values: Vector) -> None:
         """Set states through the state vector, anything else by reference."""

@@ -63,7 +63,7 @@ _NAMES = {"processor": 1, "answer": 1, "memory": 1 << 20, "file": 1 << 20}  # an
 
 
 def usual_limits() -> Limits:
-    """Limits that hold unless others are given: WORKBENCH_PROOF="processor=20 answer=60".
+    """Limits that hold unless others are given: WORKBENCH_TRIAL="processor=20 answer=60".
 
     The variable of the environment names times in seconds and sizes in MB.
 
@@ -72,7 +72,8 @@ def usual_limits() -> Limits:
     InputError
         If it cannot be read.
     """
-    text = os.environ.get("WORKBENCH_PROOF", "")
+    # WORKBENCH_PROOF is its name before version 0.2.
+    text = os.environ.get("WORKBENCH_TRIAL", os.environ.get("WORKBENCH_PROOF", ""))
     given: dict[str, Any] = {}
     for word in text.split():
         name, _, number = word.partition("=")
@@ -84,7 +85,7 @@ def usual_limits() -> Limits:
             value = 0.0
         if not 0.0 < value < 2.0**62:
             raise InputError(
-                where="environment, WORKBENCH_PROOF",
+                where="environment, WORKBENCH_TRIAL",
                 found=f"'{word[:80]}'",
                 expected=f"some of {', '.join(_NAMES)}, each =NUMBER above 0 (s or MB)",
                 remedy="correct it, for instance to 'processor=20 answer=60'",
@@ -172,7 +173,7 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         raise NoAnswerError(
             f"{where}: did not answer from {last['call']} within {limits.answer:g} s, of which it "
             f"used the processor for {end['used']:.1f} s, so that nothing is known of it; allow "
-            f'more with WORKBENCH_PROOF="answer={10 * limits.answer:g}"'
+            f'more with WORKBENCH_TRIAL="answer={10 * limits.answer:g}"'
         )
     if last["call"] == "not loaded":
         raise InputError(
@@ -182,22 +183,30 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
             remedy="export the model again for this machine; see 'workbench fmu info'",
         )
     if last["call"] != "end":
+        call, used = last["call"], end["used"]
+        at = f" in {call} after {used:.2f} s of processor time"
         raise ContainedError(
-            f"{where}: {_ending(end['status'], last['call'], end['used'])}. It was tried in a "
-            f"process of its own, with limits of {limits} (WORKBENCH_PROOF changes them)"
+            f"{where}: {describe_end(end['status'], call, f'{used:.1f}', at)}. It was tried in a "
+            f"process of its own, with limits of {limits} (WORKBENCH_TRIAL changes them)"
         )
     fmu_cache.remember(_marks(description, interface)[1])
     return str(last["refused"])
 
 
-def _ending(status: int, call: str, used: float) -> str:
-    """Say how the process ended."""
+def describe_end(status: int, call: str, seconds: str, at: str = "") -> str:
+    """Say how a process ended that called an FMU.
+
+    Parameters
+    ----------
+    call : that it was in, as far as that is known.
+    seconds : time of the processor that the call had.
+    at : where the process ended, if that is known.
+    """
     if os.name == "posix" and status == -signal.SIGXCPU:
-        return f"did not return from {call} within {used:.1f} s of processor time"
+        return f"did not return from {call} within {seconds} s of processor time"
     if status < 0:
-        name = signal.Signals(-status).name
-        return f"crashed with {name} in {call} after {used:.2f} s of processor time"
-    return f"ended the process with exit status {status} in {call} after {used:.2f} s"
+        return f"crashed with {signal.Signals(-status).name}{at}"
+    return f"ended the process with exit status {status}{at}"
 
 
 def _task(description: Description, interface: str, folder: Path, limits: Limits) -> dict[str, Any]:

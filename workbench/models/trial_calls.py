@@ -1,4 +1,4 @@
-"""Make the calls of an observer into an FMU; run by `proof` in a process of its own.
+"""Make the calls of an observer into an FMU; run by `trial` in a process of its own.
 
 It stands alone, on the standard library, to start in hundredths of a second. A child makes the
 calls and tells the name of each before it is made; this process says how the child ended, and ends
@@ -26,6 +26,28 @@ _LOG2 = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
 _LOG3 = ctypes.CFUNCTYPE(None, _POINTER, ctypes.c_int, _TEXT, _TEXT)
 _ALLOCATE = ctypes.CFUNCTYPE(_POINTER, _SIZE, _SIZE)
 _FREE = ctypes.CFUNCTYPE(None, _POINTER)
+
+
+def limit_processor(seconds: float) -> None:
+    """Limit what this process may use of the processor from now on [s]."""
+    if resource is not None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        end = int(used.ru_utime + used.ru_stime + seconds) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
+
+
+def limit_sizes(file: int, memory: int) -> None:
+    """Limit the files that this process writes, and its memory [bytes]."""
+    if resource is None:
+        return
+    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # Python ignores it
+    # Of memory that can be written: some runtimes reserve much more than they use.
+    for limit, size in (
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, file),
+        (resource.RLIMIT_DATA, memory),
+    ):
+        resource.setrlimit(limit, (size, size))
 
 
 class _RefusedError(Exception):
@@ -57,7 +79,7 @@ class _Calls:
         self.three = task["version"] == "3.0"
         self._prefix = "fmi3" if self.three else "fmi2"
         tell("loading of its library")
-        self._limit()
+        limit_processor(task["processor"])
         os.chdir(os.path.dirname(task["library"]))
         self._library = ctypes.CDLL(task["library"])
         self.component: int | None = None
@@ -69,13 +91,6 @@ class _Calls:
             _FREE(("free", libc)),
         )
         self._callbacks = _Callbacks(self._kept[0], *self._kept[2:], None, None)
-
-    def _limit(self) -> None:
-        """Limit processor time, from now on."""
-        if resource is not None:
-            used = resource.getrusage(resource.RUSAGE_SELF)
-            seconds = int(used.ru_utime + used.ru_stime + self._task["processor"]) + 1
-            resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
 
     def has(self, name: str) -> bool:
         return hasattr(self._library, self._prefix + name)
@@ -92,7 +107,7 @@ class _Calls:
         function = getattr(self._library, name)
         function.restype = result
         self._tell(name)
-        self._limit()
+        limit_processor(self._task["processor"])
         return function(*(_POINTER(a) if isinstance(a, int) else a for a in arguments))
 
     def instantiate(self) -> None:
@@ -224,15 +239,8 @@ def _work(task: dict[str, Any], report: int) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what an FMU prints is nobody's concern
     os.dup2(1, 2)
     if resource is not None:
-        for number in (signal.SIGXFSZ, signal.SIGPIPE):  # Python ignores them
-            signal.signal(number, signal.SIG_DFL)
-        # Of memory that can be written: some runtimes reserve much more than they use.
-        for kind, size in (
-            (resource.RLIMIT_CORE, 0),
-            (resource.RLIMIT_FSIZE, task["file"]),
-            (resource.RLIMIT_DATA, task["memory"]),
-        ):
-            resource.setrlimit(kind, (size, size))
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it
+    limit_sizes(task["file"], task["memory"])
     refused = ""
     try:
         _try(task, tell)

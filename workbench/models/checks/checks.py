@@ -48,7 +48,7 @@ from workbench.models.description import (
     Description,
     read_description,
 )
-from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.fmu import FMU, CoSimulation, central_differences
 from workbench.models.trial import (
     ContainedError,
     Limits,
@@ -279,7 +279,7 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
         # step confirms it.
         for share in (1e-3, 1e-5, 1e-7):
             steps = share * size
-            measured = _central_differences(evaluate, centre, steps)
+            measured = central_differences(evaluate, centre, steps)
             entry = np.maximum(np.abs(jacobian), np.abs(measured))
             # Below these, an entry is rounding of the differences, or nothing beside others.
             rounding = 1e6 * np.finfo(float).eps * scale / steps
@@ -297,12 +297,6 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
         "by differences; switch directional derivatives off in the export"
     )
     yield replace(DERIVATIVES, passed=passed, value=error[i, j], reason="" if passed else reason)
-
-
-def _central_differences(evaluate: Callable[[Vector], Vector], x: Vector, steps: Vector) -> Matrix:
-    """Jacobian of `evaluate` at x; steps (n,) of the n columns."""
-    sides = (np.column_stack([evaluate(x + d) for d in s * np.diag(steps)]) for s in (1.0, -1.0))
-    return (next(sides) - next(sides)) / (2 * steps)
 
 
 def _compare_interfaces(path: Path, instantiations: int) -> Iterator[CheckResult]:
@@ -337,7 +331,7 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
     def jacobian(t: float, x: Vector) -> Matrix:
         # Not SciPy's: its steps grow without bound for states that no derivative depends on.
         steps = 1e-6 * np.maximum(np.abs(x), excitation.nominal)
-        return _central_differences(lambda x: rates(t, x), x, steps)
+        return central_differences(lambda x: rates(t, x), x, steps)
 
     rows = start[None, :]
     times = np.linspace(0.0, end, COMMUNICATION_STEPS + 1)

@@ -11,14 +11,10 @@ from types import FrameType
 
 from workbench.errors import FMUError
 from workbench.models.checks.result import CheckResult
-from workbench.models.trial import Limits, NoAnswerError
+from workbench.models.trial import Limits, NoAnswerError, describe_end
+from workbench.models.trial_calls import limit_processor, limit_sizes
 from workbench.runtime.files import temporary_folder
 from workbench.runtime.pool import start
-
-try:
-    import resource
-except ImportError:  # Windows: the time of an answer is all that is limited
-    resource = None  # type: ignore[assignment]
 
 # A check yields findings, and numbers that say how far it is.
 Task = Callable[[], Iterator[int | CheckResult]]
@@ -53,7 +49,8 @@ def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> li
             reason = reason or f"the FMU did not let itself be freed within {wait:.0f} s"
     missing = any(question.name not in found for question in questions)
     if not reason and (process.exitcode or missing):
-        reason = f"the FMU {_death(process.exitcode or 0, limits)}"
+        end = describe_end(process.exitcode or 0, "a call", f"{limits.processor:g}")
+        reason = f"the FMU {end}"
     reports.close()
     if not reason:
         return [found[question.name] for question in questions]
@@ -115,31 +112,15 @@ def _work(
 
 def _limit(limits: Limits) -> None:
     """Limit what this process may use; processor time in each call that does not return."""
-    if resource is None:
+    limit_sizes(limits.file, limits.memory)
+    if os.name != "posix":
         return
-    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # Python ignores it
-    for kind, size in (
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, limits.file),
-        (resource.RLIMIT_DATA, limits.memory),
-    ):
-        resource.setrlimit(kind, (size, size))
 
     def alive(number: int = 0, frame: FrameType | None = None) -> None:
         # Python calls this between calls of the FMU only: one that does not return meets the limit.
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        seconds = int(used.ru_utime + used.ru_stime + limits.processor) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
+        limit_processor(limits.processor)
 
     alive()
     signal.signal(signal.SIGPROF, alive)
     period = limits.processor / 10.0
     signal.setitimer(signal.ITIMER_PROF, period, period)
-
-
-def _death(exit_code: int, limits: Limits) -> str:
-    if os.name == "posix" and exit_code == -signal.SIGXCPU:
-        return f"did not return from a call within {limits.processor:g} s of processor time"
-    if exit_code < 0:
-        return f"crashed with {signal.Signals(-exit_code).name}"
-    return f"ended the process with exit code {exit_code}"
