@@ -15,7 +15,7 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.recordings.case import Case, read_cases
-from workbench.recordings.formats import read_foreign
+from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -102,7 +102,7 @@ def test_a_file_that_ends_the_process_of_its_library_is_refused(
         struct.pack_into("<I", damaged, block + 24 + 8 * links + 4, 1 << 28)  # of the first byte
     path.write_bytes(damaged)
     with pytest.raises(InputError, match=r"an MDF file that cannot be read .*SIGSEGV"):
-        read_foreign(path)
+        read_recorded_file(path)
 
 
 def test_the_end_that_a_tdms_file_lacks_is_told(
@@ -131,7 +131,7 @@ def test_what_a_library_warns_of_is_noted(tmp_path: Path, stop: Case, system: Sy
     FORMATS["structures.mat"](path, recorded(stop, system))
     whole = path.read_bytes()
     path.write_bytes(whole + whole[128:])  # without the header
-    assert any("Duplicate variable name" in note for note in read_foreign(path).notes)
+    assert any("Duplicate variable name" in note for note in read_recorded_file(path).notes)
 
 
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
@@ -150,7 +150,7 @@ def test_a_missing_reader_names_the_extra(
     with pytest.raises(
         InputError, match=rf"package '{package}' reads.*extra \[files\].*pip install"
     ):
-        read_foreign(tmp_path / "a")
+        read_recorded_file(tmp_path / "a")
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_what_is_no_recording_is_refused_in_words(
 ) -> None:
     (tmp_path / "a").write_bytes(content)
     with pytest.raises(InputError, match=match):
-        read_foreign(tmp_path / "a")
+        read_recorded_file(tmp_path / "a")
 
 
 # --- the same reader elsewhere ---

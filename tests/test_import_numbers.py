@@ -14,7 +14,7 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.recordings.channels import NamedChannel, propose
 from workbench.recordings.channels.clock import Clock
-from workbench.recordings.formats import read_foreign
+from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.spelling import conversion, spelled
 from workbench.recordings.formats.stamps import iso
 from workbench.system.registry import load_system
@@ -53,12 +53,12 @@ def test_a_header_that_is_narrower_than_its_samples_is_refused(
 ) -> None:
     path = table(tmp_path / "a.csv", [header, *(row.format(i) for i in range(1, 60))])
     with pytest.raises(InputError, match=rf"above line \d: found {match}.*name every column"):
-        read_foreign(path)
+        read_recorded_file(path)
 
 
 def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
     rows = [f"{i};{i}.5;;" for i in range(60)]
-    (group,) = read_foreign(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert [channel.name for channel in group.channels] == ["time", "h"]
 
 
@@ -67,7 +67,7 @@ def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
 
 def clock(path: Path, system: System, **columns: NamedChannel) -> Clock:
     """The one clock of a file."""
-    (found,) = propose([read_foreign(path)], system, columns).clocks.values()
+    (found,) = propose([read_recorded_file(path)], system, columns).clocks.values()
     return found
 
 
@@ -152,7 +152,7 @@ def test_a_rate_in_doubt_is_refused_until_it_is_said(
     path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
     with pytest.raises(InputError, match=f"{match}.*--sample-rate '200 Hz'"):
         clock(path, tank)
-    (said,) = propose([read_foreign(path)], tank, {}, step=0.5).clocks.values()
+    (said,) = propose([read_recorded_file(path)], tank, {}, step=0.5).clocks.values()
     assert_allclose(said.times, MINUTE[:60])
 
 
@@ -163,7 +163,7 @@ def test_one_rate_is_not_that_of_vectors_of_two_lengths(
     savemat(tmp_path / "a.mat", {"fs": 2.0, "h_mm": MINUTE, "inflow": MINUTE[::4], "gains": [1, 2]})
     columns = {"inflow": NamedChannel("inflow", "l/s")}
     with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
-        propose([read_foreign(tmp_path / "a.mat")], tank, columns, said)
+        propose([read_recorded_file(tmp_path / "a.mat")], tank, columns, said)
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
 
 
@@ -214,12 +214,12 @@ def test_a_unit_that_nobody_says_is_to_be_confirmed(
     tmp_path: Path, tank: System, said: dict[str, NamedChannel]
 ) -> None:
     path = table(tmp_path / "a.csv", ["t [s];inflow;h [m]", *(f"{i};5;1" for i in range(60))])
-    proposal = propose([read_foreign(path)], tank, said)
+    proposal = propose([read_recorded_file(path)], tank, said)
     assert not proposal.certain
     (doubt,) = proposal.doubts
     assert doubt.endswith("--column 'inflow=inflow [l/s]' confirms [l/s]")
     confirmed = {"inflow": NamedChannel("inflow", "l/s")}
-    assert propose([read_foreign(path)], tank, confirmed).certain
+    assert propose([read_recorded_file(path)], tank, confirmed).certain
 
 
 @pytest.mark.parametrize(
@@ -234,14 +234,14 @@ def test_a_value_that_is_asked_for_is_no_measurement(
 ) -> None:
     rows = [f"{i};1.5;{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
-    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow"}
+    assert set(propose([read_recorded_file(path)], tank, {}).assigned) == {"inflow"}
 
 
 @pytest.mark.parametrize("name", ["Rollenmessung h", "Radsatz-Rolle h", "h console"])
 def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, name: str) -> None:
     rows = [f"{i};1.5;{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
-    assert set(propose([read_foreign(path)], tank, {}).assigned) == {"inflow", "h"}
+    assert set(propose([read_recorded_file(path)], tank, {}).assigned) == {"inflow", "h"}
 
 
 ROWS = [f"{i};5;{i}" for i in range(60)]
@@ -251,11 +251,11 @@ def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(
     tmp_path: Path, tank: System
 ) -> None:
     path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h [Zoll]", *ROWS])
-    (problem,) = propose([read_foreign(path)], tank, {}).problems
+    (problem,) = propose([read_recorded_file(path)], tank, {}).problems
     assert problem == "h: 'h' is in [Zoll], a unit that is not known"
     match = r"\[Zoll\], a unit that is not known.*convert the values, or name one .*'h=h \[UNIT\]'"
     with pytest.raises(InputError, match=match):
-        propose([read_foreign(path)], tank, {"h": NamedChannel("h")})
+        propose([read_recorded_file(path)], tank, {"h": NamedChannel("h")})
 
 
 def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
@@ -288,7 +288,7 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
     told = {}
     for force in ("F_long [kN]", "Längskraft [kp2]", "Temperatur [degC]"):
         path = table(tmp_path / "a.csv", [f"{names};{force}", *rows])
-        proposal = propose([read_foreign(path)], system, {})
+        proposal = propose([read_recorded_file(path)], system, {})
         assert not proposal.problems
         assert "Fx" not in proposal.assigned
         told[force] = proposal.unmatched
@@ -331,7 +331,7 @@ def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
     names = "t [s],BCP [psi],Torque,Wheel speed [mph],Roller speed [mph]"
     rows = [f"{0.01 * i:.2f},20.5,3000.5,45.5,45.5" for i in range(60)]
     (problem,) = propose(
-        [read_foreign(table(tmp_path / "a.csv", [names, *rows]))], system, {}
+        [read_recorded_file(table(tmp_path / "a.csv", [names, *rows]))], system, {}
     ).problems
     assert problem == "tauR: 'Torque' has no unit and is plausible as N.m or lbf.ft"
 
@@ -346,7 +346,7 @@ def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(
         for t in MINUTE:
             sheet.append([t, 5.0, t])
     book.save(tmp_path / "a.xlsx")
-    held = read_foreign(tmp_path / "a.xlsx")
+    held = read_recorded_file(tmp_path / "a.xlsx")
     left = propose([held], tank, {}).left
     assert "two/h [mm]" in left
     named = {name: NamedChannel(f"two/{name}") for name in ("inflow", "h")}

@@ -17,8 +17,8 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.recordings.case import Case
-from workbench.recordings.channels import Told, propose_recordings
-from workbench.recordings.formats import read_foreign
+from workbench.recordings.channels import RecordingOptions, propose_recordings
+from workbench.recordings.formats import read_recorded_file
 from workbench.system.system import System
 
 from .files_of_stops import FORMATS, Stops, add_sheet, workbook, workbook_of_stamps
@@ -381,7 +381,9 @@ def test_vectors_without_a_time_of_their_own_are_no_recordings(
                 for name, (unit, values) in held.items()
             ]
             file.write_segment(channels)
-    found = propose_recordings([read_foreign(tmp_path / "a.tdms")], system, {}, Told())
+    found = propose_recordings(
+        [read_recorded_file(tmp_path / "a.tdms")], system, {}, RecordingOptions()
+    )
     (one,) = found.held
     assert one.name == ""
     assert "pB: it may be 'Stop 1/Bremsdruck' or 'Stop 2/Bremsdruck'" in found.problems

@@ -26,12 +26,12 @@ from workbench.observers import Gains
 from workbench.observers import choose as choose_estimators
 from workbench.observers.replay import observed
 from workbench.observers.run import Run
-from workbench.recordings.case import Case, check_recording, read_conditions, read_only
+from workbench.recordings.case import Case, check_recording, make_case, read_conditions
 from workbench.recordings.case import read_cases as read_folders
-from workbench.recordings.channels import Told, parse_named
+from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.recordings.csv import header
 from workbench.recordings.datasets import read_recorded, write_cases
-from workbench.recordings.plausibility import Origin, doubts
+from workbench.recordings.plausibility import Origin
 from workbench.runtime.files import locked_folder
 from workbench.studies.design import NextStop
 from workbench.studies.design import next_stop as next_experiment
@@ -77,7 +77,7 @@ def read_cases(
     paths = [path] if isinstance(path, str | Path) else path
     known = system or load_system(usual_system())
     named = [f"{signal}={channel}" for signal, channel in (columns or {}).items()]
-    told = Told(
+    told = RecordingOptions(
         conditions or {},
         dict(parse_named(one, "columns", known) for one in named),
         None if sample_rate is None else 1.0 / quantity(sample_rate, "Hz", "sample_rate"),
@@ -143,8 +143,7 @@ def case_from_frame(
         signal, unit = header(column)
         if signal in units:
             factor = si_factor(unit or "", units[signal], f"{where}, column '{column}'")
-            values = frame[column].to_numpy(float, copy=True) * factor
-            found[signal] = read_only(values)
+            found[signal] = frame[column].to_numpy(float, copy=True) * factor
     asked = ["time", *(signal.name for signal in (*system.inputs, *system.outputs))]
     if missing := [signal for signal in asked if signal not in found]:
         raise InputError(
@@ -157,18 +156,7 @@ def case_from_frame(
     check_recording(time_, system, f"{where}, column 'time'", None)
     given = read_conditions(Table(conditions or {}, f"{where}, conditions"), system)
     origin = Origin(where, None, {}, f"{where}, conditions")
-    case = Case(
-        name=name,
-        title=name,
-        conditions=given,
-        time=time_,
-        signals=found,
-        inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.intermittent),
-        source=Path(name),
-        doubts=doubts(time_, found, given, system, origin),
-    )
+    case = make_case(name, (time_, found), given, system, origin)
     _warn([case])
     return case
 

@@ -21,7 +21,7 @@ from workbench.models.modelica import check, read_library
 from workbench.observers.gains import Gains
 from workbench.observers.gains_file import read_gains
 from workbench.recordings.case import Case, read_case, read_file
-from workbench.recordings.channels import NamedChannel, Told
+from workbench.recordings.channels import NamedChannel, RecordingOptions
 from workbench.runtime import resources
 from workbench.studies.power.journal import Journal, SetVerdict
 from workbench.studies.power.planting import Planting
@@ -90,7 +90,7 @@ def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
     for name, write in FORMATS.items():
         write(folder / name, recorded(stop, system))
         named = _CHANNELS_OF_MATLAB if name.endswith(".mat") else _CHANNELS
-        told = Told(
+        told = RecordingOptions(
             conditions={"wheel_rail": "dry", "discs": ["dry"] * 3},
             columns={signal: NamedChannel(channel) for signal, channel in named.items()},
             step=0.2 if name == "indices.csv" else None,
@@ -111,7 +111,7 @@ _CHANNELS = {
 _CHANNELS_OF_MATLAB = {**_CHANNELS, "Fx": "Laengskraft", "time": "Zeit"}
 
 
-def _read_recorded(name: str, system: System, told: Told, folder: Path) -> Case:
+def _read_recorded(name: str, system: System, told: RecordingOptions, folder: Path) -> Case:
     return read_file(folder / name, system, told)
 
 

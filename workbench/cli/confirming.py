@@ -14,7 +14,7 @@ from workbench.recordings.channels import (
     NamedChannel,
     ProposedRecording,
     ProposedRecordings,
-    Told,
+    RecordingOptions,
     listed,
     parse_named,
     propose_recordings,
@@ -30,7 +30,7 @@ def confirmed(
     files: Sequence[RecordedFile],
     system: System,
     stored: Mapping[str, NamedChannel],
-    known: Told,
+    known: RecordingOptions,
     output: Output,
     yes: bool,
 ) -> tuple[ProposedRecordings, dict[str, Any]]:

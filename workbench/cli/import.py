@@ -11,12 +11,12 @@ from typing import Any
 from workbench.cli.arguments import nearby
 from workbench.cli.confirming import confirmed
 from workbench.cli.import_figure import draw_cuts
-from workbench.cli.inputs import told
+from workbench.cli.inputs import recording_options
 from workbench.cli.output import Done, Output
 from workbench.errors import InputError
 from workbench.recordings.case import UNKNOWN
-from workbench.recordings.channels import Told, stored_columns
-from workbench.recordings.formats import read_foreign
+from workbench.recordings.channels import RecordingOptions, stored_columns
+from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.importing import (
     IMPORTED,
     Import,
@@ -36,7 +36,7 @@ from workbench.system.system import System
 def run(options: argparse.Namespace, output: Output) -> Done:
     """Import files, each by itself; what is refused leaves the others."""
     system = load_system(options.system)
-    known = told(options, system)
+    known = recording_options(options, system)
     if options.together or options.apart:
         known = replace(known, apart=options.apart)
     together = [options.files] if options.together else [[path] for path in options.files]
@@ -62,12 +62,12 @@ def _files(
     paths: Sequence[Path],
     record: list[dict[str, Any]],
     system: System,
-    known: Told,
+    known: RecordingOptions,
     options: argparse.Namespace,
     output: Output,
 ) -> tuple[list[dict[str, Any]], list[InputError]]:
     """Import the recordings of some files; returns what is imported by now, and what is not."""
-    files = [read_foreign(path) for path in paths]
+    files = [read_recorded_file(path) for path in paths]
     stored = stored_columns(options.out, system)
     found, conditions = confirmed(files, system, stored, known, output, options.yes)
     hashes = [file.sha256 for file in files]

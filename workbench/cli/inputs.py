@@ -9,14 +9,14 @@ from typing import Any
 from workbench.cli.arguments import nearby
 from workbench.errors import InputError, closest
 from workbench.recordings.case import UNKNOWN, Case, check_names, read_cases
-from workbench.recordings.channels import Told, parse_named
+from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system
 from workbench.system.system import FULL, OBSERVER, System
 from workbench.system.units import quantity
 
 
-def told(options: argparse.Namespace, system: System) -> Told:
+def recording_options(options: argparse.Namespace, system: System) -> RecordingOptions:
     """What is said of recordings without a case.toml.
 
     Raises
@@ -37,7 +37,7 @@ def told(options: argparse.Namespace, system: System) -> Told:
                 remedy="write for instance --sample-rate '200 Hz'",
             )
         step = 1.0 / rate
-    return Told(conditions, columns, step)
+    return RecordingOptions(conditions, columns, step)
 
 
 def read_condition(text: str, system: System) -> tuple[str, Any]:
@@ -84,7 +84,7 @@ def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
             remedy=f"name them, or write cases = 'FOLDER' in {nearby(system.source)}",
         )
     folders = paths or [path for path in [system.cases] if path is not None]
-    cases = read_cases(folders, system, told(options, system))
+    cases = read_cases(folders, system, recording_options(options, system))
     for case in cases:
         for doubt in case.doubts:
             print(f"warning: {doubt}", file=sys.stderr, flush=True)

@@ -11,14 +11,14 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.recordings.channels import (
-    Told,
+    RecordingOptions,
     has_own_names,
     read_measured,
     read_named,
     stored_columns,
 )
 from workbench.recordings.csv import read_columns
-from workbench.recordings.formats import is_foreign
+from workbench.recordings.formats import is_other_format
 from workbench.recordings.plausibility import Origin, doubts, shown_by
 from workbench.system.system import Condition, System
 from workbench.system.tables import Table, read_table, shown
@@ -125,7 +125,7 @@ def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str,
     return found
 
 
-_NOTHING = Told()
+_NOTHING = RecordingOptions()
 
 
 KEYS = ("title", "date", "conditions", "measurement", "model")  # of case.toml
@@ -203,6 +203,40 @@ class Case:
         return replace(self, time=self.time[samples], signals=cut)
 
 
+def make_case(
+    name: str,
+    measured: tuple[Vector, Mapping[str, Vector]],
+    conditions: Mapping[str, Value],
+    system: System,
+    origin: Origin | None = None,
+) -> Case:
+    """Make a case of signals, which nobody may change from here on; its title is its name.
+
+    Parameters
+    ----------
+    measured : time (n,) s, and signals (n,) each, SI.
+    origin : where they stand, for what is doubted; None: nothing is, as it was simulated.
+
+    Raises
+    ------
+    InputError
+        If the recording cannot be what it says it is.
+    """
+    time, signals = measured
+    return Case(
+        name=name,
+        title=name,
+        conditions=conditions,
+        time=read_only(time),
+        signals={signal: read_only(values) for signal, values in signals.items()},
+        inputs=tuple(signal.name for signal in system.inputs),
+        outputs=tuple(output.name for output in system.outputs),
+        aids=tuple(aid.name for aid in system.intermittent),
+        source=Path(name),
+        doubts=doubts(time, signals, conditions, system, origin) if origin else (),
+    )
+
+
 def sign(case: Case, system: System) -> float:
     """Sign of the recording's signals, by the condition that says so; 1 without one."""
     for condition in system.conditions:
@@ -211,7 +245,9 @@ def sign(case: Case, system: System) -> float:
     return 1.0
 
 
-def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> list[Case]:
+def read_cases(
+    paths: Sequence[Path], system: System, options: RecordingOptions = _NOTHING
+) -> list[Case]:
     """Read case folders, folders of case folders, and files of recorders.
 
     A folder that holds `case.toml` is a case. Of any other folder the sub-folders are read,
@@ -220,7 +256,7 @@ def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> 
 
     Parameters
     ----------
-    told : conditions and channels of files that have no `case.toml`.
+    options : conditions and channels of files that have no `case.toml`.
 
     Raises
     ------
@@ -245,7 +281,7 @@ def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> 
                 remedy="rename one of the folders, or give it once",
             )
         folders[name] = folder
-    if told != _NOTHING and not any(folder.is_file() for folder in folders.values()):
+    if options != _NOTHING and not any(folder.is_file() for folder in folders.values()):
         raise InputError(
             where=", ".join(map(str, paths)),
             found="conditions, columns or a rate for recordings that have a case.toml",
@@ -253,7 +289,7 @@ def read_cases(paths: Sequence[Path], system: System, told: Told = _NOTHING) -> 
             remedy="write them into case.toml",
         )
     return [
-        read_file(path, system, told) if path.is_file() else read_case(path, system)
+        read_file(path, system, options) if path.is_file() else read_case(path, system)
         for path in folders.values()
     ]
 
@@ -264,7 +300,7 @@ def _name(path: Path) -> str:
     return re.sub(r"(\.[A-Za-z]\w{1,6})?(\.gz)?$", "", name) if path.is_file() else name
 
 
-def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
+def read_file(path: Path, system: System, options: RecordingOptions = _NOTHING) -> Case:
     """Read a file of a recorder; conditions that it shows need not be told.
 
     Raises
@@ -273,25 +309,14 @@ def read_file(path: Path, system: System, told: Told = _NOTHING) -> Case:
         If it cannot be read, its channels are neither confirmed nor certain, or a condition is
         missing.
     """
-    measured = read_measured(path, system, told, stored_columns(path.parent, system))
+    measured = read_measured(path, system, options, stored_columns(path.parent, system))
     shown = conditions_shown(measured.signals, system)
     where = "command line, --condition"
-    conditions = read_conditions(Table({**shown, **told.conditions}, where), system)
+    conditions = read_conditions(Table({**shown, **options.conditions}, where), system)
     check_recording(measured.time, system, f"{path}, time", None)
-    signals = {name: read_only(values) for name, values in measured.signals.items()}
     origin = Origin(str(path), None, {}, where, measured.doubts)
-    return Case(
-        name=_name(path),
-        title=path.name,
-        conditions=conditions,
-        time=read_only(measured.time),
-        signals=signals,
-        inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.intermittent),
-        source=path,
-        doubts=doubts(measured.time, signals, conditions, system, origin),
-    )
+    case = make_case(_name(path), (measured.time, measured.signals), conditions, system, origin)
+    return replace(case, title=path.name, source=path)
 
 
 def read_case(folder: Path, system: System) -> Case:
@@ -323,26 +348,20 @@ def read_case(folder: Path, system: System) -> Case:
     model = document.table("model")
     model.refuse_unknown(("names",))
     names = model.table("names")
-    return Case(
-        name=folder.resolve().name,
+    case = make_case(folder.resolve().name, (time, signals), conditions, system, origin)
+    return replace(
+        case,
         title=title,
-        conditions=conditions,
-        time=time,
-        signals=signals,
-        inputs=tuple(one.name for one in system.inputs),
-        outputs=tuple(output.name for output in system.outputs),
-        aids=tuple(aid.name for aid in system.intermittent),
         source=source,
         names=check_names(names.content, f"{toml}, [model.names]", system),
         date=document.date("date"),
         counts_from=_counts_from(measurement, time),
-        doubts=doubts(time, signals, conditions, system, origin),
     )
 
 
 def _recorded(
     source: Path, measurement: Table, system: System
-) -> tuple[Vector, dict[str, Vector], Origin]:
+) -> tuple[Vector, Mapping[str, Vector], Origin]:
     """Time and signals of a case's recording, SI, and where they stand.
 
     A CSV whose columns have names and units as the workbench writes them is read to the letter; any
@@ -351,15 +370,14 @@ def _recorded(
     own = measurement.table("columns")
     stored = stored_columns(source.parent.parent, system) | stored_columns(source.parent, system)
     as_named = not any(isinstance(name, dict) for name in own.content.values())
-    if not is_foreign(source) and as_named and (not stored or has_own_names(source, system)):
+    if not is_other_format(source) and as_named and (not stored or has_own_names(source, system)):
         columns = _column_names(measurement, system)
         time, signals = _read_signals(source, columns, system)
         return time, signals, Origin(str(source), 2, columns, "")
-    told = Told(columns=read_named(own, system))
-    measured = read_measured(source, system, told, stored)
+    options = RecordingOptions(columns=read_named(own, system))
+    measured = read_measured(source, system, options, stored)
     check_recording(measured.time, system, f"{source}, time", None)
-    signals = {name: read_only(values) for name, values in measured.signals.items()}
-    return read_only(measured.time), signals, Origin(str(source), None, {}, "", measured.doubts)
+    return measured.time, measured.signals, Origin(str(source), None, {}, "", measured.doubts)
 
 
 def _counts_from(measurement: Table, time: Vector) -> float:
@@ -499,7 +517,7 @@ def _read_signals(
         if column in recorded:
             where = f"{source}, line 1, column '{column}'"
             factor = si_factor(recorded[column].unit, units[signal], where)
-            signals[signal] = read_only(recorded[column].values * factor)
+            signals[signal] = recorded[column].values * factor
     time = signals.pop("time")
     check_recording(time, system, f"{source}, column '{columns['time']}'")
     return time, signals

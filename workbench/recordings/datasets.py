@@ -1,6 +1,6 @@
 """Published recordings become case folders: the publisher's own files, checked by their checksums.
 
-The workbench holds none of them. What it knows of a set is a `Published`, which a system's
+The workbench holds none of them. What it knows of a set is a `PublishedSet`, which a system's
 companion has as `PUBLISHED`, a package in its module `published`.
 """
 
@@ -93,7 +93,7 @@ class FolderLayout:
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedSet:
     """A set of recordings that somebody published.
 
     Attributes
@@ -120,7 +120,7 @@ class Published:
         return "\n".join(parts)
 
 
-def published(which: str) -> Published:
+def published(which: str) -> PublishedSet:
     """What a system's companion knows of its published recordings.
 
     Parameters
@@ -144,14 +144,14 @@ def published(which: str) -> Published:
     return found
 
 
-def _known(companion: str) -> Published | None:
+def _known(companion: str) -> PublishedSet | None:
     """What a companion knows of published recordings, if there is one, and it does."""
     if not companion:
         return None
     # A package has it in a part of its own: commands ask each package whether it has some, too.
     own = companion_part(companion, "published") or import_module(companion)
     found = getattr(own, "PUBLISHED", None)
-    return found if isinstance(found, Published) else None
+    return found if isinstance(found, PublishedSet) else None
 
 
 def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]:
@@ -253,7 +253,7 @@ def _refuse_other_files(out: Path) -> None:
         )
 
 
-def _layout(known: Published, source: Path) -> FolderLayout:
+def _layout(known: PublishedSet, source: Path) -> FolderLayout:
     """The layout in which the set lies in a folder, of files with the right checksums."""
     for layout in known.layouts:
         if layout.found(source):

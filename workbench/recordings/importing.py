@@ -18,7 +18,13 @@ import tomli_w
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.case import UNKNOWN, check_recording, conditions_shown, read_conditions
-from workbench.recordings.channels import COLUMNS, Measured, NamedChannel, ProposedRecording, merge
+from workbench.recordings.channels import (
+    COLUMNS,
+    MergedRecording,
+    NamedChannel,
+    ProposedRecording,
+    merge,
+)
 from workbench.recordings.csv import cell
 from workbench.recordings.formats.stamps import iso
 from workbench.recordings.plausibility import Origin, doubts
@@ -189,7 +195,7 @@ class Import:
     """
 
     recording: ProposedRecording
-    measured: Measured
+    measured: MergedRecording
     parts: tuple[Cut, ...]
     pieces: tuple[Piece, ...] = field(default_factory=tuple)
 
@@ -258,7 +264,7 @@ def case_name(path: Path, part: str = "") -> str:
 def _piece(
     name: str,
     cut: Cut,
-    measured: Measured,
+    measured: MergedRecording,
     system: System,
     given: Mapping[str, Any],
     where: str,

@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.recordings.csv import read_columns
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _CSV, _FOLDER = "original.csv", "20200201/measured.csv"
 # A cycle begins ten samples before the compressor starts: what it warms has cooled by then.
@@ -57,7 +57,7 @@ def _read_folders(folder: Path) -> list[PublishedRecording]:
     return _cut(time, intake, pressure, _FOLDER)
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="Air production unit of a metro train: pressure of its reservoir, flag of its compressor",
     source="N. Davari, B. Veloso, R. P. Ribeiro, J. Gama, MetroPT-3 Dataset (2023), UCI Machine "
     "Learning Repository 791, https://doi.org/10.24432/C5VW3R",

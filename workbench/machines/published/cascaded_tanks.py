@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.recordings.csv import read_columns
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _TITLES = {
     "estimation": "Levels driven by a multisine, record for estimation",
@@ -50,7 +50,7 @@ def _read_folders(folder: Path) -> list[PublishedRecording]:
     return found
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="Two cascaded tanks that overflow: voltage of the pump, and of the lower tank's level",
     source="M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noel, Cascaded tanks benchmark combining "
     "soft and hard nonlinearities (2016), 4TU.ResearchData, https://doi.org/10.4121/12960104",

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _FILE = "SNLS80mV.csv"
 _STEP = 2.0**14 / 1e7  # [s], of a clock of 10 MHz
@@ -58,7 +58,7 @@ def _read(folder: Path) -> list[PublishedRecording]:
     ]
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="A circuit that swings as a mass on a stiffening spring does: its input and output",
     source="T. Wigren, J. Schoukens, Three free data sets for development and benchmarking in "
     "nonlinear system identification, European Control Conference (2013), "

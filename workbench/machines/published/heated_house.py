@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _FILE = "inputPRBS1.csv"
 _FITTED = 1152  # samples of 5 minutes, 96 hours
@@ -46,7 +46,7 @@ def _read(folder: Path) -> list[PublishedRecording]:
     ]
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="An office whose heaters are switched at random: power, weather, temperature inside",
     source="P. Bacher, H. Madsen, Identifying suitable models for the heat dynamics of buildings, "
     "Energy and Buildings 43 (2011), 1511-1522; record of the examples of CTSM-R, "

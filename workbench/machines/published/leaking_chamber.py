@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.machines.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
-from workbench.recordings.datasets import Published, PublishedRecording
+from workbench.recordings.datasets import PublishedRecording, PublishedSet
 
 _BETWEEN = 2.0  # bar: what is above is fitted, what is below is held out
 _CLOSED = 0.05  # bar from a sample to the next: as long as air comes in, pressure moves by less
@@ -80,7 +80,7 @@ def _theirs(path: Path) -> Columns:
     return {"time": time, "pressure": np.array([float(row[2]) for row in rows])}
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="Pressure of closed chambers: one of aluminium, and printed ones",
     source=SOURCE,
     licence=LICENCE,

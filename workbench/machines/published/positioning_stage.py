@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _STEP = 1e-3  # [s]
 _FILES = {
@@ -46,7 +46,7 @@ def _read(folder: Path) -> list[PublishedRecording]:
     return [_recording(folder, file) for file in _FILES]
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="A carriage on a ball screw: reference and position, and the command of its controller",
     source="A. Janot, M. Gautier, M. Brunot, data set and models of EMPS (2019), "
     "https://www.nonlinearbenchmark.org; also in https://github.com/forgi86/"

@@ -14,7 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from workbench.arrays import Vector
 from workbench.machines.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
-from workbench.recordings.datasets import Published, PublishedRecording
+from workbench.recordings.datasets import PublishedRecording, PublishedSet
 
 _HELD_OUT = "_5bar"
 _DROPPED = 15  # samples at the start, as the publisher does
@@ -113,7 +113,7 @@ def _theirs(path: Path) -> Columns:
     return {"time": time / 1e3, "stroke": stroke, "pressure": pressure, "force": force}
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="Force of a pneumatic cylinder of 25 mm bore with two seals, an O-ring and a lip seal "
     "(NAPN), by pressure and stroke",
     source=SOURCE,

@@ -15,7 +15,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.recordings.csv import read_columns
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 
 _MOTIONS = {
     "lift_and_drop": "lifted, then let go",
@@ -159,7 +159,7 @@ def _read_folders(folder: Path) -> list[PublishedRecording]:
     return found
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="A Dynamixel XL330 that swings 0.49 kg at 0.1 m: goal, supply voltage, position",
     source="M. Duclusaud, G. Passault, Better Actuator Models (2026), Rhoban, "
     "https://github.com/Rhoban/bam, commit af226046; see also M. Duclusaud et al., Extended "

@@ -12,7 +12,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.recordings.csv import read_columns
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
 from workbench.system.tables import read_table
 from workbench.system.units import si_factor
 
@@ -121,7 +121,7 @@ def _along(file: Path, position: Vector) -> tuple[Matrix, Matrix]:
     return slopes, curves
 
 
-PUBLISHED = Published(
+PUBLISHED = PublishedSet(
     title="Stops of a train of two vehicles, four axles each: pressures, axle speeds, acceleration",
     source="the train's own computer; any folder of stops in its format",
     licence="that of the train's owner",

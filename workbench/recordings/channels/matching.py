@@ -7,15 +7,14 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.recordings.channels.names import EXACT, WITHIN, WORDS, NamedChannel, alike, is_asked
-from workbench.recordings.channels.units import conversion_to, fitting_units, unit_in_name
 from workbench.recordings.formats import FileChannel, Group
-from workbench.recordings.formats.spelling import is_unit
+from workbench.recordings.formats.spelling import Conversion, conversion, is_unit, spelled
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
 
 @dataclass(frozen=True, eq=False)
-class Assigned:
+class Assignment:
     """A channel that is taken for a signal.
 
     Attributes
@@ -85,8 +84,8 @@ def unit_reason(reason: str, unit: str, concluded: bool) -> str:
 
 
 def match(
-    named: Mapping[str, Assigned], places: Sequence[PlacedChannel], system: System
-) -> tuple[dict[str, Assigned], dict[str, str]]:
+    named: Mapping[str, Assignment], places: Sequence[PlacedChannel], system: System
+) -> tuple[dict[str, Assignment], dict[str, str]]:
     """Channels by signal, those that are named and those that names and units tell; and doubts.
 
     Doubts say why a signal has no channel. One that a recording may be without is not assigned by
@@ -102,7 +101,7 @@ def match(
 
 def _candidate(
     place: PlacedChannel, signal: Signal, system: System, likeness: int
-) -> tuple[Assigned | None, str]:
+) -> tuple[Assignment | None, str]:
     """A channel as a signal, or None and why it cannot be."""
     channel = place.channel
     unit = stated = channel.unit or unit_in_name(channel.name, signal, system)
@@ -131,7 +130,7 @@ def _candidate(
     elif not likeness:
         confirms = f"--column '{signal.name}={place.label}' confirms it"
         doubt = f"nothing but its unit speaks for it, {confirms}"
-    return Assigned(
+    return Assignment(
         place.file,
         place.group,
         channel,
@@ -148,13 +147,13 @@ def _candidate(
 
 
 def _by_name(
-    assigned: dict[str, Assigned],
+    assigned: dict[str, Assignment],
     doubts: dict[str, str],
     places: Sequence[PlacedChannel],
     system: System,
 ) -> None:
     """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
-    found: dict[int, list[tuple[Signal, Assigned]]] = {EXACT: [], WORDS: [], WITHIN: []}
+    found: dict[int, list[tuple[Signal, Assignment]]] = {EXACT: [], WORDS: [], WITHIN: []}
     for signal in system.signals.values():
         for place in places:
             likeness = alike(place.channel.name, place.channel.about, signal)
@@ -184,11 +183,11 @@ def _by_name(
 
 def _by_unit(
     signals: Sequence[Signal],
-    assigned: Mapping[str, Assigned],
+    assigned: Mapping[str, Assignment],
     doubts: Mapping[str, str],
     places: Sequence[PlacedChannel],
     system: System,
-) -> dict[str, Assigned]:
+) -> dict[str, Assignment]:
     """The only channel that has its unit, for each signal that alone lacks one of it."""
     taken = {id(assignment.channel) for assignment in assigned.values()}
     fitting = [
@@ -206,3 +205,56 @@ def _by_unit(
         for signal, one in fitting
         if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1
     }
+
+
+# Units that recorders use and may leave out, by the SI unit of what they measure.
+_USUAL = {
+    "Pa": ("Pa", "kPa", "MPa", "mbar", "bar", "psi"),
+    "rad/s": ("rad/s", "rpm", "rev/s", "deg/s"),
+    "rad": ("rad", "deg", "rev"),
+    "m/s": ("m/s", "km/h", "mph"),
+    "m": ("m", "cm", "mm"),
+    "N": ("N", "kN", "lbf"),
+    "N.m": ("N.m", "kN.m", "lbf.ft"),
+    "V": ("V", "mV"),
+    "A": ("A", "mA"),
+    "K": ("K", "degC"),
+}
+_TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
+
+
+def conversion_to(unit: str, signal: Signal, system: System) -> tuple[Conversion, str] | None:
+    """How values in a unit become a signal, and by which formula; None: in no way."""
+    direct = conversion(unit, signal.unit)
+    if direct is not None:
+        return direct, ""
+    other = signal.recorded_as
+    found = conversion(unit, other.unit) if other is not None else None
+    if other is None or found is None:
+        return None
+    (slope,) = other.formula.slopes((signal.name,), system.values)
+    return Conversion(found.factor / slope, found.zero / slope), other.formula.text
+
+
+def fitting_units(channel: FileChannel, signal: Signal, system: System) -> list[str]:
+    """Usual units in which values without a unit have the signal's typical size."""
+    others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
+    fitting: list[str] = []
+    for unit in dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others)):
+        way = conversion_to(unit, signal, system)
+        if way is None:
+            continue
+        values = way[0].factor * channel.values + way[0].zero
+        size = float(np.nanmax(np.abs(values), initial=0.0))
+        low, high = signal.plausible
+        typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL
+        if typical and np.nanmin(values) >= low and np.nanmax(values) <= high:
+            fitting.append(unit)
+    return fitting
+
+
+def unit_in_name(name: str, signal: Signal, system: System) -> str:
+    """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
+    _, _, last = name.replace(" ", "_").rpartition("_")
+    unit = spelled(last)
+    return unit if len(last) > 1 and last != name and conversion_to(unit, signal, system) else ""

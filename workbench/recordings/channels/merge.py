@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.recordings.channels.matching import Assigned
+from workbench.recordings.channels.matching import Assignment
 from workbench.recordings.channels.proposal import ProposedMapping
 from workbench.recordings.formats import RecordedFile
 from workbench.system.parts import Signal
@@ -19,7 +19,7 @@ _LATE = 1.5  # steps of a channel, from which on it has a gap
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MergedRecording:
     """A recording in SI units.
 
     Attributes
@@ -49,7 +49,9 @@ class _Track:
     missing: int
 
 
-def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: System) -> Measured:
+def merge(
+    files: Sequence[RecordedFile], proposal: ProposedMapping, system: System
+) -> MergedRecording:
     """Bring the channels of a proposal to common times.
 
     The times are those of the slowest output, where all have samples. Other signals are
@@ -111,7 +113,7 @@ def merge(files: Sequence[RecordedFile], proposal: ProposedMapping, system: Syst
     zero = min(begun, default=math.nan)
     damaged = [f"{file.path}: {doubt}" for file in files for doubt in file.doubts]
     doubts = *damaged, *proposal.contradictions, *_mixed(files, proposal)
-    return Measured(time[known], signals, zero, tuple(notes), doubts)
+    return MergedRecording(time[known], signals, zero, tuple(notes), doubts)
 
 
 def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
@@ -161,7 +163,7 @@ def _starts(
     return {key: clock.start - first for key, clock in clocks.items()}
 
 
-def _track(signal: Signal, assigned: Assigned, proposal: ProposedMapping, start: float) -> _Track:
+def _track(signal: Signal, assigned: Assignment, proposal: ProposedMapping, start: float) -> _Track:
     times = proposal.clocks[assigned.file, assigned.group].times + start
     values = assigned.values
     held = np.isfinite(times) & np.isfinite(values)

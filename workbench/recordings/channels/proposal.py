@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from workbench.errors import InputError, closest
 from workbench.recordings.channels.clock import Clock, read_clock
 from workbench.recordings.channels.matching import (
-    Assigned,
+    Assignment,
     PlacedChannel,
+    conversion_to,
+    fitting_units,
     match,
     unconfirmed,
     unit_reason,
 )
 from workbench.recordings.channels.names import TIME, NamedChannel, listed
-from workbench.recordings.channels.units import conversion_to, fitting_units
 from workbench.recordings.formats import RecordedFile
 from workbench.recordings.formats.spelling import conversion, is_unit
 from workbench.system.parts import Signal
@@ -35,7 +36,7 @@ class ProposedMapping:
     contradictions : units that were named and that files contradict, in words.
     """
 
-    assigned: Mapping[str, Assigned]
+    assigned: Mapping[str, Assignment]
     clocks: Mapping[tuple[int, int], Clock]
     left: tuple[str, ...]
     problems: tuple[str, ...]
@@ -176,7 +177,7 @@ def _as_named(
     places: Sequence[PlacedChannel],
     system: System,
     where: str,
-) -> Assigned:
+) -> Assignment:
     """The channel that a user names for a signal."""
     place = _find(channel, signal.name, places, where)
     unit = stated = channel.unit or place.channel.unit
@@ -189,7 +190,7 @@ def _as_named(
         raise _no_unit_of(signal, place, unit, stated_by_user=bool(channel.unit), where=where)
     turn = -1.0 if channel.reversed else 1.0
     scale, formula = way
-    return Assigned(
+    return Assignment(
         place.file,
         place.group,
         place.channel,
@@ -227,7 +228,7 @@ def _no_unit_of(
     )
 
 
-def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
+def _refuse_shared(assigned: Mapping[str, Assignment], where: str) -> None:
     """Refuse one channel that is named for two signals."""
     taken: dict[int, str] = {}
     for signal, assignment in assigned.items():
@@ -242,7 +243,7 @@ def _refuse_shared(assigned: Mapping[str, Assigned], where: str) -> None:
 
 
 def _clocks(
-    assigned: Mapping[str, Assigned],
+    assigned: Mapping[str, Assignment],
     files: Sequence[RecordedFile],
     named: NamedChannel | None,
     step: float | None,
@@ -277,7 +278,7 @@ def _clocks(
 
 def _contradictions(
     given: Mapping[str, NamedChannel],
-    assigned: Mapping[str, Assigned],
+    assigned: Mapping[str, Assignment],
     files: Sequence[RecordedFile],
     clocks: Mapping[tuple[int, int], Clock],
     system: System,

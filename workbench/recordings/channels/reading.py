@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.recordings.channels.merge import Measured, merge
-from workbench.recordings.channels.names import TIME, NamedChannel, listed
-from workbench.recordings.channels.parting import propose_recordings
+from workbench.recordings.channels.merge import MergedRecording, merge
+from workbench.recordings.channels.names import TIME, NamedChannel, RecordingOptions, listed
 from workbench.recordings.channels.proposal import ProposedMapping
-from workbench.recordings.channels.told import Told
+from workbench.recordings.channels.splitting import propose_recordings
 from workbench.recordings.csv import header
-from workbench.recordings.formats import read_foreign
+from workbench.recordings.formats import read_recorded_file
 from workbench.system.system import System
 
 
@@ -27,13 +26,13 @@ def has_own_names(path: Path, system: System) -> bool:
 
 
 def read_measured(
-    path: Path, system: System, told: Told, stored: Mapping[str, NamedChannel]
-) -> Measured:
+    path: Path, system: System, options: RecordingOptions, stored: Mapping[str, NamedChannel]
+) -> MergedRecording:
     """Read a file whose channels were confirmed, or are named as the signals are.
 
     Parameters
     ----------
-    stored : channels that were confirmed for the folder; those of `told` win.
+    stored : channels that were confirmed for the folder; those of `options` win.
 
     Raises
     ------
@@ -41,8 +40,8 @@ def read_measured(
         If the file cannot be read, holds several recordings, or somebody must say what its
         channels are.
     """
-    recorded = read_foreign(path)
-    found = propose_recordings([recorded], system, stored, told)
+    recorded = read_recorded_file(path)
+    found = propose_recordings([recorded], system, stored, options)
     if len(found.held) > 1:
         names = [f"'{one.name}'" for one in found.held]
         raise InputError(

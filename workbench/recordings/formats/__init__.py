@@ -51,12 +51,12 @@ _BEGINS = {  # how files begin, whatever their ending
 }
 
 
-def is_foreign(path: Path) -> bool:
+def is_other_format(path: Path) -> bool:
     """Whether a file is read here by its ending; a CSV may be the workbench's own."""
     return path.suffix.lower() != ".csv"
 
 
-def read_foreign(path: Path) -> RecordedFile:
+def read_recorded_file(path: Path) -> RecordedFile:
     """Read a file of a recorder.
 
     Raises

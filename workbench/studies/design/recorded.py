@@ -1,7 +1,7 @@
 """Recordings that a model predicts of an experiment, as sensors would make them."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from workbench.models.native import (
     read,
     set_inputs,
 )
-from workbench.recordings.case import Case, Value, read_only
+from workbench.recordings.case import Case, Value, make_case
 from workbench.studies.design.candidates import Experiment
 from workbench.system.experiments import Experiments
 from workbench.system.parts import LARGEST
@@ -57,21 +57,12 @@ def recorded(
         zip((*(one.name for one in system.inputs), *outputs, *judged), [*u.T, *y.T], strict=True)
     )
     signals = {
-        key: read_only(
-            column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
-        )
+        key: column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
         for key, column in clean.items()
     }
-    return Case(
-        name=name,
-        title=candidate.text(system),
-        conditions=_conditions(system, candidate, clean),
-        time=read_only(time),
-        signals=signals,
-        inputs=tuple(one.name for one in system.inputs),
-        outputs=outputs,
-        source=Path(name),
-    )
+    conditions = _conditions(system, candidate, clean)
+    case = make_case(name, (time, signals), conditions, system)
+    return replace(case, title=candidate.text(system), aids=())
 
 
 def start_of(system: System, experiments: Experiments, candidate: Experiment) -> dict[str, float]:
