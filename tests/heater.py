@@ -7,8 +7,10 @@ import pandas as pd
 
 from workbench import case_from_frame
 from workbench.diagnosis import Outcome, diagnose, read_effects
+from workbench.diagnosis.problem import Problem
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
@@ -110,4 +112,4 @@ def diagnosed(
 ) -> Outcome:
     library = read_library(of.library)
     effects = read_effects(library, "Observer")
-    return diagnose(of, fitted, library, effects, out, 1, lambda _: None, held_out=held_out)
+    return diagnose(Problem(of, fitted, library, effects, held_out), Engine(out=out))

@@ -19,6 +19,7 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.certainty import assess
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import Fitted
@@ -120,7 +121,7 @@ def fits(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fit]]:
             y = SCALE * u + law(u) + NOISE * rng.standard_normal(t.size)
             columns = {"time [s]": t, "u [m]": u, "y [N]": y}
             cases.append(case_from_frame(system, pd.DataFrame(columns), name=f"{period:g} s"))
-        opened.append(Simulations(path, system, {}, cases, 1))
+        opened.append(Simulations(ModelSource(path, system, {}), cases))
         fits[name] = Fit(opened[-1], effects)
     yield fits
     for one in opened:

@@ -16,14 +16,17 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, select
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
+from workbench.runtime.engine import Engine
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
@@ -84,7 +87,9 @@ def mostly_long(names: Iterable[str], short: Collection[str]) -> list[Any]:
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The observer model with every effect at zero."""
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    text = ExtendedModel(
+        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
+    ).source()
     build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
@@ -94,7 +99,7 @@ def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
     def run(cases: Sequence[Case], system: System = SYSTEM) -> Diagnosis:
         effects = catalogue(system, LIBRARY)
         # Alone: the tests themselves run side by side.
-        with Simulations(everything, system, {}, cases, 1) as simulations:
+        with Simulations(ModelSource(everything, system, {}), cases) as simulations:
             return conclude(Fit(simulations, effects), effects, lambda _: None)
 
     return run
@@ -176,7 +181,7 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Pat
     cases = recorded(tmp_path / "stops", Effects(cylinder_lag=0.06), 511)
 
     def said(system: System, out: Path) -> Outcome:
-        return diagnose(system, cases, LIBRARY, EFFECTS, out, 1, lambda _: None)
+        return diagnose(Problem(system, cases, LIBRARY, EFFECTS), Engine(out=out))
 
     first = said(SYSTEM, tmp_path / "first")
     assert [cause.effect.name for cause in first.diagnosis.causes] == ["CylinderLag"]
@@ -230,7 +235,7 @@ def test_stops_by_one_clock_show_none_that_is_late(
     clock = next(one for one in catalogue(SYSTEM, LIBRARY) if "omegaW" in one.late)
     ratios = []
     for cases in (clean, *(recorded(tmp_path / str(seed), Effects(), seed) for seed in (32, 33))):
-        with Simulations(everything, SYSTEM, {}, cases, 1) as simulations:
+        with Simulations(ModelSource(everything, SYSTEM, {}), cases) as simulations:
             fit = Fit(simulations, [clock])
             nominal = anew(fit, fit.unknowns.start(), ())
             lin = fit.linearise(nominal.linearised, (), [(clock, {})])

@@ -14,10 +14,15 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
 from workbench.diagnosis.data.cleaning import outliers
 from workbench.diagnosis.data.clocks import in_time
-from workbench.diagnosis.data.motion import Opened, motion, opened
+from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion, opened
 from workbench.diagnosis.data.samples import Samples, compared
 from workbench.diagnosis.data.samples import prepare as prepare_samples
-from workbench.diagnosis.effects.extension import build, sizes_by_component, source, variables
+from workbench.diagnosis.effects.extension import (
+    ExtendedModel,
+    build,
+    sizes_by_component,
+    variables,
+)
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised, Point, slowness
 from workbench.diagnosis.inference.quadratic import (
@@ -61,7 +66,9 @@ INPUTS, OUTPUTS = ("pB", "tauR"), ("omegaW", "omegaR")
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    text = ExtendedModel(
+        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
+    ).source()
     build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
@@ -116,9 +123,9 @@ def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(
     )
     speeds = replace(case.without(["Fx"]), name="speeds")
     values = {"muWR": 0.4}
-    with Simulations(everything, SYSTEM, {}, [case, speeds], 1) as both:
+    with Simulations(ModelSource(everything, SYSTEM, {}), [case, speeds]) as both:
         told, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
-    with Simulations(everything, SYSTEM, {}, [speeds], 1) as alone:
+    with Simulations(ModelSource(everything, SYSTEM, {}), [speeds]) as alone:
         (without,) = alone.at([values])
     assert silent.blocks.tolist() == [*without.blocks, 0]
     assert np.array_equal(silent.errors[:, :2], without.errors)
@@ -455,7 +462,7 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
     cases = read_cases([ROOT / "cases" / name for name in named], SYSTEM)
 
     def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
-        with Simulations(everything, SYSTEM, {}, of, 1) as simulations:
+        with Simulations(ModelSource(everything, SYSTEM, {}), of) as simulations:
             fit = Fit(simulations, EFFECTS)
             point = replace(fit.unknowns.start(), sizes={("WaterFilm", "film"): 0.3})
             values = fit.unknowns.values(point)
@@ -488,7 +495,9 @@ def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
 
 def test_source_with_an_error_says_where(tmp_path: Path) -> None:
     wrong = {EFFECTS[0].name: {"slop": 0.1}}
-    text = source(LIBRARY, "MinimalObserver", "Extended", EFFECTS[:1], wrong, {}, "a typo")
+    text = ExtendedModel(
+        LIBRARY, "MinimalObserver", "Extended", EFFECTS[:1], "a typo", wrong
+    ).source()
     with pytest.raises(InputError, match="slop"):
         build(LIBRARY, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
     assert not (tmp_path / "Extended.fmu").exists()
@@ -530,13 +539,15 @@ def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything:
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
     values = given_values(everything, SYSTEM)
 
-    def evidence(case: Case, model: Opened | None) -> Evidence:
-        with Simulations(everything, SYSTEM, values, [case], 1, model=model) as simulations:
+    def evidence(case: Case, model: OpenModel | None) -> Evidence:
+        with Simulations(
+            ModelSource(everything, SYSTEM, values), [case], model=model
+        ) as simulations:
             fit = Fit(simulations, [inertia])
             (found,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).evidence
         return found
 
-    with opened(everything, SYSTEM, values) as model:
+    with opened(ModelSource(everything, SYSTEM, values)) as model:
         for case in (noisy(6), noisy(7)):
             alone, shared = evidence(case, None), evidence(case, model)
             np.testing.assert_array_equal(shared.errors, alone.errors)
@@ -547,7 +558,7 @@ def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None
     """An effect is given up, and not the diagnosis, where a step leads beyond what a model can."""
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
     with Simulations(
-        everything, SYSTEM, given_values(everything, SYSTEM), [noisy(6)], 1
+        ModelSource(everything, SYSTEM, given_values(everything, SYSTEM)), [noisy(6)]
     ) as simulations:
         fit = Fit(simulations, [inertia])
         nominal = anew(fit, fit.unknowns.start(), ())
@@ -602,7 +613,7 @@ def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path: P
     path = tmp_path / "AllEffects.fmu"
     build_everything(system, library, effects, path)
     name = "outlet.risingLeak.rate"
-    with Simulations(path, system, given_values(path, system), cases, 1) as simulations:
+    with Simulations(ModelSource(path, system, given_values(path, system)), cases) as simulations:
         unknowns = Fit(simulations, effects).unknowns
         (values,) = unknowns.values(unknowns.start())
         sizes = sizes_by_component(effects)

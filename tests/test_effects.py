@@ -10,7 +10,7 @@ pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
 from workbench.diagnosis import Effect, read_effects
-from workbench.diagnosis.effects.extension import build, source, variables
+from workbench.diagnosis.effects.extension import ExtendedModel, build, variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.errors import InputError
 from workbench.models.compiler.flat import flatten
@@ -168,7 +168,7 @@ def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_
     assert slots["padFriction"].handed == {"lack": "lackBefore"}
     assert not any(slot.handed for name, slot in slots.items() if name != "padFriction")
     fmu = tmp_path / "AllEffects.fmu"
-    text = source(WHEELSET, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "All effects")
+    text = ExtendedModel(WHEELSET, "MinimalObserver", "AllEffects", EFFECTS, "All effects").source()
     build(WHEELSET, "AllEffects", text, fmu, every_platform=False)
 
     def force(size: str, film: float) -> float:
@@ -229,7 +229,9 @@ def test_after_puts_an_effect_behind_a_more_usual_one(tmp_path: Path) -> None:
 def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
     library = tank(tmp_path)
     effects = read_effects(library, "Base")
-    text = source(library, "Tank.Base", "Extended", effects, {}, {"A": 3.0}, "All effects")
+    text = ExtendedModel(
+        library, "Tank.Base", "Extended", effects, "All effects", parameters={"A": 3.0}
+    ).source()
     package = library.file.rename(tmp_path / "package.mo")
     (tmp_path / "Extended.mo").write_text(f"within Tank;\n{text}")
     flat = flatten(package, "Tank.Extended")
@@ -242,7 +244,9 @@ def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path)
     """Closed forms: a level of 1 m, Torricelli's law."""
     library = tank(tmp_path)
     effects = read_effects(library, "Base")
-    text = source(library, "Base", "Extended", effects, {"Leak": {"area": 2e-4}}, {}, "")
+    text = ExtendedModel(
+        library, "Base", "Extended", effects, "", {"Leak": {"area": 2e-4}}
+    ).source()
     path = tmp_path / "Extended.fmu"
     build(library, "Extended", text, path, every_platform=False)
     velocity = np.sqrt(2.0 * 9.81)
@@ -280,7 +284,7 @@ def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path: Path) -> None:
         ),
     )
     effects = read_effects(library, "Base")
-    text = source(library, "Base", "Extended", effects, {}, {}, "")
+    text = ExtendedModel(library, "Base", "Extended", effects, "").source()
     path = tmp_path / "Extended.fmu"
     build(library, "Extended", text, path, every_platform=False)
     with FMU(path) as fmu:
@@ -295,8 +299,8 @@ def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_pa
     library = tank(tmp_path, ("Orifice orifice(h=h)", "Orifice orifice(h=h, a=A/1e3)"))
     effects = read_effects(library, "Base")
     with pytest.raises(InputError, match=r"Clogging and Leak beside a Tank\.Orifice"):
-        source(library, "Base", "Extended", effects, {}, {}, "")
-    source(library, "Base", "Extended", effects[1:], {}, {}, "")  # one of them alone
+        ExtendedModel(library, "Base", "Extended", effects, "").source()
+    ExtendedModel(library, "Base", "Extended", effects[1:], "").source()  # one of them alone
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 from workbench.arrays import Vector
 from workbench.diagnosis import given_values, read_effects
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.laws.forms import WrittenForm, candidates
@@ -82,12 +83,14 @@ def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
     extended = extended_library(library, [law.written], tmp_path)
     (own,) = [effect for effect in read_effects(extended, base) if effect.name == law.written.name]
     names = [f"padFriction.{name}" for name in ("Fperp", "v", "mu")]
-    text = watching(source(extended, base, "Heat", [own], {}, {}, "A law of heat"), names)
+    text = watching(ExtendedModel(extended, base, "Heat", [own], "A law of heat").source(), names)
     path = tmp_path / "Heat.fmu"
     build(extended, "Heat", text, path, every_platform=False)
     with FMU(path) as fmu:
         (clock,) = (name for name in fmu.states if name.endswith(CLOCK))
-    with Simulations(path, system, given_values(path, system), [dry_case], 1) as simulations:
+    with Simulations(
+        ModelSource(path, system, given_values(path, system)), [dry_case]
+    ) as simulations:
         unknowns = Fit(simulations, [own]).unknowns
         points = unknowns.values(unknowns.start())
         (table,) = simulations.along(points, ["watched0", "watched1", "watched2", clock])

@@ -15,6 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.evidence import Simulations
@@ -103,7 +104,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
         of = block(tmp_path / name, more)
         effects, path = library_effects(of), tmp_path / f"{name}.fmu"
         build_everything(of, effects, path)
-        with Simulations(path, of, of.given, cases(of, [frame]), 1) as simulations:
+        with Simulations(ModelSource(path, of, of.given), cases(of, [frame])) as simulations:
             variances.append(simulations.recordings[0].whitening[-1, 0, 0] ** -2)
             size = of.comparison.block
     moved = steady(0.5 * (1.0 + share)) - steady(0.5)
@@ -121,7 +122,9 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: P
     build_everything(of, effects, path)
     steps = {}
     for name, system in (("free", of), ("known", known)):
-        with Simulations(path, system, system.given, cases(system, [warm]), 1) as simulations:
+        with Simulations(
+            ModelSource(path, system, system.given), cases(system, [warm])
+        ) as simulations:
             fit = Fit(simulations, effects)
             begun = fit.linearise(fit.at(fit.unknowns.start()), [])
             point = fit.stepped(begun, np.ones(1), {})

@@ -20,6 +20,7 @@ from workbench.diagnosis.inference.rivals import read_rivals
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.recordings.case import Case
+from workbench.runtime.engine import ALONE
 from workbench.studies.design import (
     NextStop,
     RankedExperiment,
@@ -315,7 +316,7 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
     asked = replace(asked, labels={**asked.labels, "knob": "a knob"})
     assert len(some_settings(asked)) == 1
     assert undecided.rivals is not None
-    found = next_stop(replace(block, experiments=asked), undecided.rivals, 1, lambda _: None)
+    found = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
     turned = {one.prediction.candidate.settings["knob"].value for one in found.tried}
     assert turned == {0.0, 1.0}
 
@@ -394,7 +395,7 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
 ) -> None:
     assert undecided.rivals is not None
     alone = replace(undecided.rivals, models=undecided.rivals.models[:1])
-    found = next_stop(block, alone, 1, lambda _: None)
+    found = next_stop(block, alone, ALONE)
     deviations = [one.prediction.precision[1] for one in found.tried]
     assert deviations == sorted(deviations)
     assert "times as sure" in found.sentence
@@ -470,7 +471,7 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(
     assert undecided.rivals is not None
     silent = replace(block, experiments=None)
     with pytest.raises(InputError, match=r"no table \[next\]"):
-        next_stop(silent, undecided.rivals, 1, lambda _: None)
+        next_stop(silent, undecided.rivals, ALONE)
 
 
 @pytest.mark.parametrize(

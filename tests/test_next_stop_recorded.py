@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from workbench.recordings.case import read_cases
+from workbench.runtime.engine import ALONE
 from workbench.studies.design import next_stop
 from workbench.studies.power.diagnosing import (
     build_everything,
@@ -30,7 +31,7 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system: System, tmp_path:
     _, rivals = rivals_of_set(system, effects, all_effects, light)
     assert rivals is not None
     assert {model.effects for model in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
-    asked = next_stop(system, rivals, 1, lambda _: None)
+    asked = next_stop(system, rivals, ALONE)
     assert "initial speed 160 km/h" in asked.tried[0].text
     both = [*light, *read_cases([RADIUS / "06_dry_160_3.6_rev"], system)]
     (cause,) = diagnose_set(system, effects, all_effects, both).causes

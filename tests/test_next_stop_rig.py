@@ -21,6 +21,7 @@ from workbench.machines.wheelset.rig import (
     stop_of,
 )
 from workbench.recordings.case import Case, read_case
+from workbench.runtime.engine import ALONE
 from workbench.studies.design import NextStop, RankedExperiment, next_stop, predict_experiments
 from workbench.studies.design.candidates import Experiment, every_setting
 from workbench.system.experiments import Setting
@@ -207,7 +208,7 @@ def test_what_derivatives_alone_promise_is_not_proposed(system: System, tmp_path
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     names = ["CreepStiffness", "WheelLoad"]
     _, rivals, _ = of_two(system, "creep_stiffness=0.16", names, tmp_path)
-    proposed = next_stop(system, rivals, 1, lambda _: None)
+    proposed = next_stop(system, rivals, ALONE)
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
     assert max(one.prediction.separation for one in proposed.tried) < 6.4
@@ -225,7 +226,7 @@ def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(
     rig = replace(system, experiments=replace(asked, settings=light))
     names = ["CreepStiffness", "WheelLoad"]
     _, rivals, _ = of_two(rig, "creep_stiffness=-0.16", names, tmp_path)
-    proposed = next_stop(rig, rivals, 1, lambda _: None)
+    proposed = next_stop(rig, rivals, ALONE)
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
     # Of the last, which both do not claim: what a wheel that slides would show.

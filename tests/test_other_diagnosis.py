@@ -21,12 +21,14 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.diagnosis import Outcome, catalogue, diagnose
+from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
 from workbench.pages.provenance import run_of
 from workbench.recordings.case import Case, read_cases
+from workbench.runtime.engine import Engine
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -252,7 +254,7 @@ def diagnosed(
 def diagnosis(system: System, cases: list[Case], out: Path) -> Outcome:
     library = read_library(system.library)
     effects = catalogue(system, library)
-    return diagnose(system, cases, library, effects, out, 1, lambda _: None)
+    return diagnose(Problem(system, cases, library, effects), Engine(out=out))
 
 
 Diagnosed = Callable[[Torque], tuple[Outcome, Path]]

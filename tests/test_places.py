@@ -8,7 +8,7 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 
 from workbench.diagnosis import choose, read_effects
-from workbench.diagnosis.effects.extension import parameter_of, source, variables
+from workbench.diagnosis.effects.extension import ExtendedModel, parameter_of, variables
 from workbench.errors import InputError
 from workbench.models.compiler.flat import flatten
 from workbench.models.modelica import Library, read_library
@@ -90,7 +90,9 @@ def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path: Path) -> Non
     effects = read_effects(library, "Base")
     values = {"Clogging[1]": {"lost": 0.1}, "Clogging[3]": {"lost": 0.5}, "Drought": {"dry": 0.2}}
     found = [effects[0], effects[2], effects[3]]
-    text = source(library, "Base", "Extended", found, values, {}, "Two valves, and the well")
+    text = ExtendedModel(
+        library, "Base", "Extended", found, "Two valves, and the well", values
+    ).source()
     package = library.file.rename(tmp_path / "package.mo")
     (tmp_path / "Extended.mo").write_text(f"within Orchard;\n{text}")
     flat = flatten(package, "Orchard.Extended")

@@ -29,6 +29,7 @@ from workbench.machines.wheelset.rig import (
 )
 from workbench.models.fmu import FMU
 from workbench.pages.provenance import run_of
+from workbench.runtime.engine import Engine
 from workbench.studies.power import (
     Journal,
     NamedCause,
@@ -44,6 +45,7 @@ from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.studies.power.planned import SURE, clear, predict_campaign
 from workbench.studies.power.planting import Group, Kind
 from workbench.studies.power.report import format_plan, format_power, write_plan, write_power
+from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
 
@@ -348,11 +350,8 @@ _GROUPS = [
 
 
 def run(out: Path, report: Callable[[str], None]) -> tuple[list[SetVerdict], bool]:
-    rig = PlantedStops(tuple(STOPS), REFERENCE)
-    effects = library_effects(SYSTEM)
-    return diagnose_sets(
-        _GROUPS, SYSTEM, rig, effects, out, seed=1, workers=1, resume=True, report=report
-    )
+    study = PowerStudy(SYSTEM, PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM))
+    return diagnose_sets(_GROUPS, study, Engine(report=report, out=out), seed=1, resume=True)
 
 
 def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -> None:
@@ -387,9 +386,9 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
 
 def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     """Of the two short stops above: a gain of 1.6 % is plain in them, one of 0.05 % is not."""
-    rig, effects = PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM)
+    study = PowerStudy(SYSTEM, PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM))
     sizes = (0.25, 8.0)
-    rows = predict_campaign(SYSTEM, rig, effects, PLANTABLE, sizes, 1)
+    rows = predict_campaign(study, PLANTABLE, sizes, 1)
     by_name = {row.effect: row for row in rows}
     (faint, small), (plain, large) = by_name["FxGain"].chances
     assert (faint, plain) == pytest.approx((0.0005, 0.016))

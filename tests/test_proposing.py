@@ -15,6 +15,7 @@ from scipy.stats import chi2, multivariate_normal
 from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, given_values, read_effects
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
@@ -335,7 +336,7 @@ def test_a_law_acts_as_its_class_does(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "AllEffects.fmu"
     build_everything(system, library, [seepage], path)
     given = given_values(path, system)
-    with Simulations(path, system, given, cases, 1) as simulations:
+    with Simulations(ModelSource(path, system, given), cases) as simulations:
         values = Fit(simulations, [seepage]).unknowns
         points = values.values(values.start())
         column = Variation(variables(seepage, "k"))

@@ -9,7 +9,7 @@ import pytest
 
 from workbench.diagnosis import read_effects
 from workbench.diagnosis.data.counting import count
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, simulate, stop_of
 from workbench.models.fmu import FMU, CoSimulation
@@ -52,7 +52,7 @@ def test_fade_of_the_model_begins_there_too(tmp_path: Path) -> None:
     (fade,) = (
         effect for effect in read_effects(library, "MinimalObserver") if effect.name == "BrakeFade"
     )
-    text = source(library, "MinimalObserver", "Fading", [fade], {}, {}, "Pads that fade")
+    text = ExtendedModel(library, "MinimalObserver", "Fading", [fade], "Pads that fade").source()
     build(library, "Fading", text, tmp_path / "Fading.fmu", every_platform=False)
     forces = []
     with FMU(tmp_path / "Fading.fmu") as model:

@@ -12,6 +12,8 @@ from workbench.system.registry import load_system
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
+from workbench.diagnosis.data.motion import ModelSource
+
 from .built import build_here
 
 H, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
@@ -65,7 +67,7 @@ def test_a_fading_swing_leaves_noise_alone(samples: int, fine: bool, tmp_path: P
     path = tmp_path / "Mass.fmu"
     build_here(tmp_path / "package.mo", "Swing.Mass", path)
     values = {"w": omega, "a": FADES, "y": 1.0, "v": 0.0}
-    with Simulations(path, system, values, read_cases([case], system), 1) as simulations:
+    with Simulations(ModelSource(path, system, values), read_cases([case], system)) as simulations:
         assert (simulations.simulated.parts > 1) == fine
         ((rms,), _) = simulations.at([values])[0].sizes
     # Noise of a thousand samples is known to 2.2 %; steps may add a thousandth of its square.

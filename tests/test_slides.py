@@ -11,9 +11,9 @@ pytest.importorskip("rumoca")
 
 from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, catalogue
-from workbench.diagnosis.data.motion import motion
+from workbench.diagnosis.data.motion import ModelSource, motion
 from workbench.diagnosis.data.samples import Samples, compared, prepare
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.simulation.evidence import Simulations
@@ -138,7 +138,9 @@ def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = source(LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, {}, {}, "Every effect at zero")
+    text = ExtendedModel(
+        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
+    ).source()
     build(LIBRARY, "AllEffects", text, path, every_platform=False)
     return path
 
@@ -148,7 +150,9 @@ def diagnosed(
 ) -> tuple[Diagnosis, list[dict[str, int]]]:
     for scenario in scenarios:
         record(scenario, seed, effects, folder / scenario.name)
-    with Simulations(everything, SYSTEM, {}, read_cases([folder], SYSTEM), 1) as simulations:
+    with Simulations(
+        ModelSource(everything, SYSTEM, {}), read_cases([folder], SYSTEM)
+    ) as simulations:
         found = conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
         return found, [recording.set_aside for recording in simulations.recordings]
 

@@ -16,6 +16,7 @@ from workbench.__main__ import main
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops
 from workbench.machines.wheelset.rig import SCENARIOS, Scenario
+from workbench.runtime.engine import Engine
 from workbench.studies.power import (
     NamedCause,
     Planting,
@@ -26,7 +27,7 @@ from workbench.studies.power import (
 from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
 from workbench.studies.power.planting import plan_sheet_errors, some
 from workbench.studies.power.report import format_sheet, format_thresholds
-from workbench.studies.power.run import Setup
+from workbench.studies.power.run import PowerStudy, Setup
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity, changed, values, vary
 from workbench.studies.power.sheet import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
@@ -171,14 +172,10 @@ def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain: float, tmp_
     planting = Planting("sheet", 41, 1.0, {"roller_inertia": gain}, ("RollerInertia",))
     (found,), _ = diagnose_sets(
         [(planting,)],
-        SYSTEM,
-        rig,
-        EFFECTS,
-        tmp_path,
+        PowerStudy(SYSTEM, rig, EFFECTS),
+        Engine(out=tmp_path),
         seed=1,
-        workers=1,
         resume=False,
-        report=lambda _: None,
     )
     assert found.verdict in ("found", "nothing", "unexplained")
     assert not named_wrong(found)

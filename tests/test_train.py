@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import workbench as wb
 from workbench.diagnosis import read_effects
-from workbench.diagnosis.effects.extension import source
+from workbench.diagnosis.effects.extension import ExtendedModel
 from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
@@ -133,8 +133,14 @@ def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
 
 def test_an_extended_model_keeps_what_is_known_of_each_axle(train: System) -> None:
     known = {f"muDC[{axle}]": axle / 16 for axle in (2, 1, 3, 4, 5, 6, 7, 8)}
-    about = (read_library(train.library), train.models[OBSERVER].name, "Extended", [], {})
-    text = source(*about, {"pads": 0.9, **known}, "as known")
+    text = ExtendedModel(
+        read_library(train.library),
+        train.models[OBSERVER].name,
+        "Extended",
+        effects=[],
+        about="as known",
+        parameters={"pads": 0.9, **known},
+    ).source()
     assert "pads=0.9,\n    muDC={0.0625, 0.125, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.5}" in text
 
 

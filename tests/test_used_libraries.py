@@ -10,7 +10,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.diagnosis import read_effects
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.errors import InputError
 from workbench.models import compiler, fmu_cache
@@ -144,7 +144,7 @@ def test_an_extended_model_has_the_common_laws(beside: bool, tmp_path: Path) -> 
         law = own_effects(tmp_path).parent / "Friction" / "Viscous.mo"
         law.write_text(law.read_text().replace("f = damping*v", "f = 2.0*damping*v"))
     library = read_library(file)
-    text = source(library, "Base", "Extended", read_effects(library, "Base"), {}, {}, "")
+    text = ExtendedModel(library, "Base", "Extended", read_effects(library, "Base"), "").source()
     build(library, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)
     sizes = {
         "friction.bearingFriction.coulomb": 3.0,

@@ -16,7 +16,7 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.diagnosis import Effect, Outcome, catalogue, choose
+from workbench.diagnosis import Effect, Outcome, Problem, catalogue, choose
 from workbench.diagnosis import diagnose as diagnose_system
 from workbench.diagnosis.laws import Proposal, needs_law
 from workbench.diagnosis.laws import propose as propose_law
@@ -32,6 +32,7 @@ from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.recordings.csv import header
 from workbench.recordings.datasets import read_recorded, write_cases
 from workbench.recordings.plausibility import Origin
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.studies.design import NextStop
 from workbench.studies.design import next_stop as next_experiment
@@ -247,10 +248,9 @@ def diagnose(
         If recordings or library cannot be used.
     """
     library, chosen = _catalogue(system, effects)
-    rest = (_folder(out, "diagnosis"), _number(workers), report)
-    return diagnose_system(
-        *(system, cases, library, chosen, *rest), held_out=held_out, certainty=certainty
-    )
+    problem = Problem(system, cases, library, chosen, held_out)
+    engine = Engine(_number(workers), report, _folder(out, "diagnosis"))
+    return diagnose_system(problem, engine, certainty=certainty)
 
 
 def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:
@@ -296,8 +296,8 @@ def propose(
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
     library, chosen = _catalogue(found.system, effects)
-    rest = (_folder(out, "proposal"), _number(workers), report)
-    return propose_law(found, library, chosen, *rest, held_out=held_out)
+    problem = Problem(found.system, found.cases, library, chosen, held_out)
+    return propose_law(found, problem, Engine(_number(workers), report, _folder(out, "proposal")))
 
 
 def monitor(
@@ -327,9 +327,10 @@ def monitor(
         folder = Path(out) if out is not None else Path(scratch)
         with locked_folder(folder):
             return watch_machine(
-                *(system, Path(history), folder),
+                system,
+                Path(history),
+                Engine(_number(workers), out=folder),
                 rate=false_alarms,
-                workers=_number(workers),
                 read=read_recorded,
             )
 
@@ -359,7 +360,7 @@ def next_stop(
             expected="a cause that was found, whose rivals or size are to be told better",
             remedy="diagnose more recordings first",
         )
-    return next_experiment(found.system, found.rivals, _number(workers), report)
+    return next_experiment(found.system, found.rivals, Engine(_number(workers), report))
 
 
 def distance(
@@ -386,5 +387,5 @@ def distance(
     InputError
         If the system does not say how it stops, or a recording holds no stop.
     """
-    rest = (effort or Effort(), _number(workers), report)
-    return distance_of_stop(system, stops, asked or {}, *rest)
+    engine = Engine(_number(workers), report)
+    return distance_of_stop(system, stops, asked or {}, effort or Effort(), engine)

@@ -6,8 +6,10 @@ from pathlib import Path
 from workbench.machines.wheelset.planting import PlantedStops
 from workbench.machines.wheelset.rig import SCENARIOS, Scenario
 from workbench.runtime import resources
+from workbench.runtime.engine import Engine
 from workbench.studies.power import Planting, diagnose_sets
 from workbench.studies.power.diagnosing import library_effects
+from workbench.studies.power.run import PowerStudy
 from workbench.system.registry import load_system
 
 GROUPS = [
@@ -29,13 +31,9 @@ def main(out: Path) -> int:
     rig = PlantedStops(stops, resources.fmus() / "fmi2" / "Reference.fmu")
     _, interrupted = diagnose_sets(
         GROUPS,
-        system,
-        rig,
-        library_effects(system),
-        out,
+        PowerStudy(system, rig, library_effects(system)),
+        Engine(2, print, out),
         seed=1,
-        workers=2,
         resume=True,
-        report=print,
     )
     return 130 if interrupted else 0

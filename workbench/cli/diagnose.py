@@ -10,18 +10,19 @@ from typing import Any
 from workbench.cli.extras import require_compiler
 from workbench.cli.inputs import given_cases
 from workbench.cli.output import Done, Output, read_result
-from workbench.diagnosis import Effect, Outcome, catalogue, choose, diagnose
-from workbench.diagnosis.laws import needs_law
+from workbench.diagnosis import Outcome, Problem, catalogue, choose, diagnose
+from workbench.diagnosis.laws import needs_law, propose
 from workbench.diagnosis.laws.report import PROPOSED, write_proposal
 from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError, closest
-from workbench.models.modelica import Library, read_library
+from workbench.models.modelica import read_library
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system, open_model
-from workbench.system.system import OBSERVER, System
+from workbench.system.system import OBSERVER
 
 
 def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
@@ -56,48 +57,33 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     require_compiler()
     cases, held_out = _parted(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
-        return _run(options, output, system, library, effects, cases, held_out)
+        return _run(options, output, Problem(system, cases, library, effects, held_out))
 
 
 def _propose(
     options: argparse.Namespace,
     output: Output,
     outcome: Outcome,
-    held_out: Sequence[Case],
+    problem: Problem,
     provenance: Mapping[str, Any],
 ) -> None:
     """Propose a law, if no effect explains what is missing."""
-    from workbench.api import propose  # all of the workbench, which a diagnosis alone does not need
-
     if not needs_law(outcome):
         output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
-    found = propose(
-        outcome,
-        held_out=held_out,
-        effects=options.effects,
-        out=options.out / PROPOSED,
-        workers=options.workers,
-        report=output.stage,
-    )
+    engine = Engine(options.workers, output.stage, options.out / PROPOSED)
+    found = propose(outcome, problem, engine)
     told = write_proposal(found, outcome, provenance, options.out, options.workers)
     output.result(f"\n{found.summary()}")
     output.result(f"to read: {told}, data and figures beside it")
 
 
-def _run(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    library: Library,
-    effects: tuple[Effect, ...],
-    cases: Sequence[Case],
-    held_out: Sequence[Case],
-) -> Done:
+def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Done:
+    system, cases, held_out = problem.system, problem.cases, problem.held_out
     output.stage(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
     outcome = diagnose(
-        *(system, cases, library, effects, options.out, options.workers, output.stage),
-        held_out=held_out,
+        problem,
+        Engine(options.workers, output.stage, options.out),
         every_platform=options.platforms == "all",
         certainty=options.certainty,
     )
@@ -107,12 +93,12 @@ def _run(
             "workbench": version("wheelset-workbench"),
             "system": system.name,
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
-            "effects": [effect.name for effect in effects],
+            "effects": [effect.name for effect in problem.effects],
         }
     output.result(outcome.summary())
     page = write_diagnosis(outcome, provenance, options.out, options.workers)
     if options.propose:
-        _propose(options, output, outcome, held_out, provenance)
+        _propose(options, output, outcome, problem, provenance)
     output.stage("done")
     output.result(f"to read: {page}, data and figures beside it")
     status = 130 if outcome.diagnosis.interrupted else 0

@@ -6,6 +6,7 @@ from workbench.cli.inputs import given_cases
 from workbench.cli.output import Done, Output, read_result
 from workbench.errors import InputError
 from workbench.pages.provenance import models, run_of, software, sources
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.studies.distance import Effort, distance_of_stop
 from workbench.studies.distance.report import write_distance
@@ -25,7 +26,8 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     cases = given_cases(options, system)
     effort = Effort(options.samples, options.safety, options.seed, options.plain)
     with locked_folder(options.out):
-        found = distance_of_stop(system, cases, said, effort, options.workers, output.stage)
+        engine = Engine(options.workers, output.stage)
+        found = distance_of_stop(system, cases, said, effort, engine)
         provenance = {
             "run": run_of("distance", system, sources(cases)),
             **software(["numpy", "scipy"]),

@@ -9,11 +9,12 @@ from typing import Any
 from workbench.cli.extras import require_compiler
 from workbench.cli.monitor_fleet import provenance_of, run_fleet
 from workbench.cli.output import Done, Output, read_result
-from workbench.diagnosis import catalogue, diagnose
+from workbench.diagnosis import Problem, catalogue, diagnose
 from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.datasets import read_recorded
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.studies.monitoring import MonitoringResult, monitor
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
@@ -40,9 +41,8 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         found = monitor(
             system,
             history,
-            options.out,
+            Engine(options.workers, out=options.out),
             rate=options.false_alarms,
-            workers=options.workers,
             read=read_recorded,
             step=partial(output.step, begin=begin),
         )
@@ -68,7 +68,8 @@ def _cause(
     names = recordings_after(found)
     output.stage(f"cause of the change, from {', '.join(names)}")
     cases = [read_recorded(Path(options.history) / name, system) for name in names]
-    outcome = diagnose(system, cases, library, effects, out, options.workers, output.stage)
+    engine = Engine(options.workers, output.stage, out)
+    outcome = diagnose(Problem(system, cases, library, effects), engine)
     page = write_diagnosis(outcome, provenance, out, options.workers)
     output.result(outcome.summary())
     output.result(f"to read: {page}")

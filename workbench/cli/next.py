@@ -11,6 +11,7 @@ from workbench.cli.output import Done, Output, read_result
 from workbench.diagnosis.inference.rivals import Rivals, read_rivals
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, read_text
 from workbench.studies.design import next_stop
 from workbench.studies.design.report import write_next_stop
@@ -27,7 +28,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     system = load_system(options.system or str(summary["provenance"]["system"]))
     require_compiler()
     with locked_folder(options.out):
-        found = next_stop(system, rivals, options.workers, output.stage)
+        found = next_stop(system, rivals, Engine(options.workers, output.stage))
         provenance = {
             "run": run_of("next", system, {"diagnosis": file}),
             "workbench": version("wheelset-workbench"),

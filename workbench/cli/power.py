@@ -9,14 +9,14 @@ from typing import Any
 
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import Done, Output, read_result
-from workbench.diagnosis import Effect
 from workbench.diagnosis.inference.thresholds import of_system
 from workbench.errors import InputError, closest
-from workbench.models.modelica import read_library
 from workbench.pages.provenance import run_of
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.studies.power import (
     Plantable,
+    PowerStudy,
     Repertoire,
     SetVerdict,
     VirtualRig,
@@ -48,7 +48,7 @@ from workbench.studies.power.report import (
 from workbench.studies.power.sensitivity import values, vary_sets
 from workbench.studies.power.sheet import summarise_sheet
 from workbench.system.registry import load_system, model_path
-from workbench.system.system import REFERENCE, System
+from workbench.system.system import REFERENCE
 
 
 def run(options: argparse.Namespace, output: Output) -> Done:
@@ -62,14 +62,14 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         sets = read_recorded_sets(system, options.recorded)
         with locked_folder(options.out):
             output.progress(f"{len(sets.recordings)} recorded sets")
-            return _usual(options, output, system, sets, effects, sets.groups)
+            return _usual(options, output, PowerStudy(system, sets, effects), sets.groups)
     known = model_path(system, REFERENCE) if REFERENCE in system.models else None
     rig = open_virtual_rig(system, options.case, options.reference or known)
+    study = PowerStudy(system, rig, effects)
     with locked_folder(options.out):
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if options.check is None:
-            planned = _planned(options, rig, effects)
-            return _usual(options, output, system, rig, effects, planned)
+            return _usual(options, output, study, _planned(options, study))
         checks = {
             "thresholds": _thresholds,
             "sheet_error": _sheet_error,
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
             "plan": _plan_campaign,
             "follow": _followed,
         }
-        return checks[options.check](options, output, system, rig, effects)
+        return checks[options.check](options, output, study)
 
 
 def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -95,21 +95,19 @@ def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
 
 
 def _provenance(
-    options: argparse.Namespace, system: System, rig: VirtualRig, interrupted: bool
+    options: argparse.Namespace, study: PowerStudy, interrupted: bool
 ) -> dict[str, Any]:
     return {
-        "run": run_of("power", system, {}),
+        "run": run_of("power", study.system, {}),
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
-        "stops": list(rig.recordings),
+        "stops": list(study.rig.recordings),
         "interrupted": interrupted,
     }
 
 
-def _planned(
-    options: argparse.Namespace, rig: VirtualRig, effects: tuple[Effect, ...]
-) -> list[Group]:
-    repertoire = Repertoire(_chosen(options.effects, rig), effects)
+def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
+    repertoire = Repertoire(_chosen(options.effects, study.rig), tuple(study.effects))
     sizes = sorted(set(options.sizes))
     counts = (options.clean, sizes, options.repeats, options.pairs)
     if not (groups := plan(repertoire, *counts, options.seed)):
@@ -123,104 +121,61 @@ def _planned(
 
 
 def _usual(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-    groups: Sequence[Group],
+    options: argparse.Namespace, output: Output, study: PowerStudy, groups: Sequence[Group]
 ) -> Done:
-    results, interrupted = _diagnosed(options, output, groups, system, rig, effects, options.out)
-    summary = summarise(results, Repertoire(rig.plantables, effects))
-    write_power(summary, effects, _provenance(options, system, rig, interrupted), options.out)
+    results, interrupted = _diagnosed(options, output, groups, study, options.out)
+    summary = summarise(results, Repertoire(study.rig.plantables, tuple(study.effects)))
+    write_power(summary, study.effects, _provenance(options, study, interrupted), options.out)
     output.result(format_power(summary))
     output.result(f"to read: {options.out / 'index.html'}, data and figures beside it")
     done = _written(options.out / "power.json", interrupted)
     return replace(done, page=options.out / "index.html")
 
 
-def _sheet_error(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-) -> Done:
+def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
     out = options.out / "sheet_error"
-    groups = plan_sheet_errors(rig.sheet_errors, options.repeats, options.seed)
-    results, interrupted = _diagnosed(options, output, groups, system, rig, effects, out)
+    groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)
+    results, interrupted = _diagnosed(options, output, groups, study, out)
     rows = summarise_sheet(results)
-    write_sheet(rows, _provenance(options, system, rig, interrupted), out)
+    write_sheet(rows, _provenance(options, study, interrupted), out)
     return _told(output, format_sheet(rows), out / "sheet_error.json", interrupted)
 
 
-def _left_out(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-) -> Done:
+def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
     out = options.out / "left_out"
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
-    rows, interrupted = propose_left_out(
-        *(_planned(largest, rig, effects), system, read_library(system.library), rig, effects),
-        workers=options.workers,
-        report=output.stage,
-    )
+    engine = Engine(options.workers, output.stage)
+    rows, interrupted = propose_left_out(_planned(largest, study), study, engine)
     summary = summarise_left_out(rows)
-    write_left_out(summary, rows, _provenance(options, system, rig, interrupted), out)
+    write_left_out(summary, rows, _provenance(options, study, interrupted), out)
     return _told(output, format_left_out(summary, rows), out / "left_out.json", interrupted)
 
 
-def _thresholds(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-) -> Done:
-    sets = some(_planned(options, rig, effects), options.sets, options.seed)
-    results, interrupted = vary_sets(
-        sets, system, rig, effects, workers=options.workers, report=output.stage
-    )
-    usual = values(of_system(system.comparison, len(effects)))
+def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+    sets = some(_planned(options, study), options.sets, options.seed)
+    results, interrupted = vary_sets(sets, study, Engine(options.workers, output.stage))
+    usual = values(of_system(study.system.comparison, len(study.effects)))
     out = options.out / "thresholds"
-    write_thresholds(results, usual, _provenance(options, system, rig, interrupted), out)
+    write_thresholds(results, usual, _provenance(options, study, interrupted), out)
     return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)
 
 
-def _plan_campaign(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-) -> Done:
+def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
     out = options.out / "plan"
-    sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, rig)
+    sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
     output.stage("one set without any effect is made and diagnosed")
-    rows = predict_campaign(system, rig, effects, wanted, sizes, options.seed)
-    write_plan(rows, sizes, _provenance(options, system, rig, False), out)
+    rows = predict_campaign(study, wanted, sizes, options.seed)
+    write_plan(rows, sizes, _provenance(options, study, False), out)
     return _told(output, format_plan(rows, sizes), out / "plan.json", False)
 
 
-def _followed(
-    options: argparse.Namespace,
-    output: Output,
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
-) -> Done:
+def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
     out = options.out / "followed"
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
-    rows, interrupted = follow_proposals(
-        *(_planned(alone, rig, effects), system, rig, effects),
-        workers=options.workers,
-        report=output.stage,
-    )
+    engine = Engine(options.workers, output.stage)
+    rows, interrupted = follow_proposals(_planned(alone, study), study, engine)
     summary = summarise_following(rows)
-    write_followed(summary, rows, _provenance(options, system, rig, interrupted), out)
+    write_followed(summary, rows, _provenance(options, study, interrupted), out)
     return _told(output, format_followed(summary, rows), out / "followed.json", interrupted)
 
 
@@ -240,19 +195,8 @@ def _diagnosed(
     options: argparse.Namespace,
     output: Output,
     groups: Sequence[Group],
-    system: System,
-    rig: VirtualRig,
-    effects: tuple[Effect, ...],
+    study: PowerStudy,
     out: Path,
 ) -> tuple[list[SetVerdict], bool]:
-    return diagnose_sets(
-        groups,
-        system,
-        rig,
-        effects,
-        out,
-        seed=options.seed,
-        workers=options.workers,
-        resume=options.resume,
-        report=output.stage,
-    )
+    engine = Engine(options.workers, output.stage, out)
+    return diagnose_sets(groups, study, engine, seed=options.seed, resume=options.resume)

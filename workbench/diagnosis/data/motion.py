@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,22 @@ class Motion:
     ratio: float
 
 
+class ModelSource(NamedTuple):
+    """A model that can be opened.
+
+    Attributes
+    ----------
+    path : of its FMU.
+    given : values of its variables instead of the defaults.
+    """
+
+    path: Path
+    system: System
+    given: Mapping[str, float]
+
+
 @dataclass(frozen=True, eq=False)
-class Opened:
+class OpenModel:
     """An FMU that is open in this process, for one set of recordings after the other.
 
     Attributes
@@ -61,10 +76,10 @@ class Opened:
 
 
 @contextmanager
-def opened(path: Path, system: System, given: Mapping[str, float]) -> Iterator[Opened]:
-    """Open an FMU, with values that it has instead of its defaults."""
-    with FMU(path, None, given) as fmu:
-        yield Opened(fmu, motion(fmu, system))
+def opened(source: ModelSource) -> Iterator[OpenModel]:
+    """Open an FMU."""
+    with FMU(source.path, None, source.given) as fmu:
+        yield OpenModel(fmu, motion(fmu, source.system))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ Needs the extra `[compiler]` to build; sources can be written without it.
 import shutil
 import tempfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from workbench.diagnosis.effects.catalogue import Effect
@@ -54,58 +54,61 @@ def parameter_of(effect: Effect, variable: str) -> str:
     return parameter if variable in variables(effect, parameter) else ""
 
 
-def source(
-    library: Library,
-    base: str,
-    name: str,
-    effects: Sequence[Effect],
-    values: Mapping[str, Mapping[str, float]],
-    parameters: Mapping[str, float],
-    about: str,
-) -> str:
-    """Write the Modelica source of the extended model.
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """A model of a library with effects plugged in.
 
-    Parameters
+    Attributes
     ----------
     base : name of the model that is extended.
     name : of the extended model.
     effects : to plug in, in this order within a slot.
+    about : one line, for the documentation.
     values : by effect and parameter, SI; parameters that are not named keep their defaults.
     parameters : of the base model itself, that differ from its defaults; of an array, all entries.
-    about : one line, for the documentation.
-
-    Raises
-    ------
-    InputError
-        If effects of one slot cannot stand together.
     """
-    nested: list[str] = []
-    used: set[str] = set()
-    redeclared = [f"    {written}" for written in _modifiers(parameters)]
-    for slot in read_slots(library, base):
-        inside = _bindings([effect for effect in effects if slot.name in effect.slots], values)
-        if not inside:
-            continue
-        label = slot.name[0].upper() + slot.name[1:]
-        if label == library.name:
-            label += "Slot"  # it would hide the library
-        used |= {one.partition(".")[0] for one in (slot.partial, slot.nominal)} - {library.name}
-        slot = replace(
-            slot, partial=written(slot.partial, library), nominal=written(slot.nominal, library)
+
+    library: Library
+    base: str
+    name: str
+    effects: Sequence[Effect]
+    about: str
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def source(self) -> str:
+        """Write the Modelica source.
+
+        Raises
+        ------
+        InputError
+            If effects of one slot cannot stand together.
+        """
+        library, nested = self.library, []
+        used: set[str] = set()
+        redeclared = [f"    {modifier}" for modifier in _modifiers(self.parameters)]
+        for slot in read_slots(library, self.base):
+            plugged = [effect for effect in self.effects if slot.name in effect.slots]
+            if not (inside := _bindings(plugged, self.values)):
+                continue
+            label = slot.name[0].upper() + slot.name[1:]
+            if label == library.name:
+                label += "Slot"  # it would hide the library
+            used |= {name.partition(".")[0] for name in (slot.partial, slot.nominal)}
+            slot = replace(
+                slot, partial=written(slot.partial, library), nominal=written(slot.nominal, library)
+            )
+            write = _chain if slot.chained or len(inside) == 1 else _sum
+            nested.append(write(label, slot, inside))
+            redeclared.append(f"    redeclare {label} {slot.name}")
+        modifiers = ",\n".join(redeclared)
+        return (
+            f'model {self.name} "{self.about}"\n'
+            + "".join(f"  import {USED}{one} = {one};\n" for one in sorted(used - {library.name}))
+            + f"  extends {library.find(self.base).name}(\n{modifiers});\n\n"
+            + "\n".join(nested)
+            + f"end {self.name};\n"
         )
-        if slot.chained or len(inside) == 1:
-            nested.append(_chain(label, slot, inside))
-        else:
-            nested.append(_sum(label, slot, inside))
-        redeclared.append(f"    redeclare {label} {slot.name}")
-    modifiers = ",\n".join(redeclared)
-    return (
-        f'model {name} "{about}"\n'
-        + "".join(f"  import {USED}{one} = {one};\n" for one in sorted(used))
-        + f"  extends {library.find(base).name}(\n{modifiers});\n\n"
-        + "\n".join(nested)
-        + f"end {name};\n"
-    )
 
 
 def _modifiers(parameters: Mapping[str, float]) -> list[str]:

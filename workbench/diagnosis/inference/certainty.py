@@ -17,7 +17,8 @@ from workbench.arrays import Matrix
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised, Point
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import ROUNDS, Fitted, Reporter, differentiable, fitted
+from workbench.diagnosis.inference.search import ROUNDS, Fitted, differentiable, fitted
+from workbench.runtime.engine import Reporter
 from workbench.system.units import BAND
 
 _STARTS = 4  # of fits from elsewhere, each of which costs as much as a step of the search

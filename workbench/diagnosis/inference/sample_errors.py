@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from workbench.diagnosis.inference.linearised import Linearised
 from workbench.diagnosis.inference.search import ROUNDS, Fitted
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,9 @@ def errors_of(
 
 
 def held_out_errors(
-    everything: Path,
     fitted: Simulations,
     effects: Sequence[Effect],
-    before: Fitted,
-    after: Fitted,
+    ends: tuple[Fitted, Fitted],
     cases: Sequence[Case],
     workers: int,
 ) -> tuple[list[Errors], dict[str, dict[str, float]]]:
@@ -69,25 +67,25 @@ def held_out_errors(
 
     Parameters
     ----------
-    everything : FMU with all effects.
     fitted : the other recordings.
-    before, after : the nominal and the last model, as fitted to those.
+    ends : the nominal and the last model, as fitted to those.
 
     Returns
     -------
     errors : of both models.
     starts : of the last model, by recording, see `Unknowns.starts`.
     """
-    given = (everything, fitted.system, fitted.given, cases, workers)
-    with Simulations(*given, restarting=False) as simulations:
+    with Simulations(fitted.source, cases, Engine(workers), restarting=False) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
-        ends = []
-        for one in (before, after):
-            start = fit.unknowns.start()
-            levels = {key: one.point.levels.get(key, usual) for key, usual in start.levels.items()}
-            phases = {name: np.zeros(len(cases)) for name in one.point.phases}
-            point = replace(start, sizes=one.point.sizes, levels=levels, phases=phases)
+
+        def apart(model: Fitted) -> Linearised:
+            start, known = fit.unknowns.start(), model.point
+            levels = {key: known.levels.get(key, usual) for key, usual in start.levels.items()}
+            phases = {name: np.zeros(len(cases)) for name in known.phases}
+            point = replace(start, sizes=known.sizes, levels=levels, phases=phases)
             common = {**point.sizes, **point.levels}
-            ends.append(fit.refine(fit.at(point), one.active, ROUNDS, held=common))
-        starts = fit.unknowns.starts(ends[-1].point)
-        return errors_of(simulations, *ends, held_out=True), starts
+            return fit.refine(fit.at(point), model.active, ROUNDS, held=common)
+
+        before, after = map(apart, ends)
+        starts = fit.unknowns.starts(after.point)
+        return errors_of(simulations, before, after, held_out=True), starts

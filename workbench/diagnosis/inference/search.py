@@ -14,8 +14,8 @@ from workbench.diagnosis.inference.linearised import Linearised, Point
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.inference.trial import Option, Prospect, Trial, shapes, tried
 from workbench.errors import FMUError
+from workbench.runtime.engine import Reporter
 
-Reporter = Callable[[str], None]
 Result = TypeVar("Result")
 
 BEGUN = 3  # rounds after which a rival that is far behind is given up

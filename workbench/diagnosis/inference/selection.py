@@ -17,7 +17,6 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Point
 from workbench.diagnosis.inference.search import (
     Fitted,
-    Reporter,
     Step,
     beyond,
     examine,
@@ -27,6 +26,7 @@ from workbench.diagnosis.inference.search import (
     seek,
 )
 from workbench.diagnosis.inference.trial import Prospect, Trial, shapes
+from workbench.runtime.engine import Reporter
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,12 @@ from scipy.stats import bootstrap
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import BEGUN, Fitted, Reporter, Step, extended, misfits
+from workbench.diagnosis.inference.search import BEGUN, Fitted, Step, extended, misfits
 from workbench.diagnosis.inference.selection import Selection, search, select
 from workbench.diagnosis.inference.timing import Late, by_themselves
 from workbench.diagnosis.inference.trial import Prospect
 from workbench.errors import InputError
+from workbench.runtime.engine import Reporter
 from workbench.system.units import BAND
 
 Verdict = Literal["nothing", "found", "unexplained"]

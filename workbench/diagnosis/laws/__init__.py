@@ -14,13 +14,15 @@ import numpy as np
 from workbench.diagnosis import (
     Effect,
     Outcome,
+    Problem,
     build_everything,
     diagnose,
     given_values,
     read_effects,
 )
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import Fitted, Reporter, Step, beyond, seek
+from workbench.diagnosis.inference.search import Fitted, Step, beyond, seek
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
 from workbench.diagnosis.inference.verdict import Diagnosis
@@ -32,9 +34,8 @@ from workbench.diagnosis.laws.scan import LawProspect, Scan
 from workbench.diagnosis.laws.writing import PACKAGE, extended_library, package
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.models.modelica import Library
-from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
-from workbench.system.system import OBSERVER, System
 
 __all__ = ["Proposal", "needs_law", "propose"]
 
@@ -56,16 +57,7 @@ def _more(found: Diagnosis) -> bool:
     return len(found.causes) == 1 and lasting >= Thresholds.wrong
 
 
-def propose(
-    before: Outcome,
-    library: Library,
-    effects: Sequence[Effect],
-    out: Path,
-    workers: int,
-    report: Reporter,
-    *,
-    held_out: Sequence[Case] = (),
-) -> Proposal:
+def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
     """Infer a law from recordings that no effect of a catalogue explains.
 
     Parameters
@@ -73,44 +65,40 @@ def propose(
     before : the diagnosis that left something unexplained, or that needed several effects: then a
         law is proposed only if it makes the description shorter. Where errors last beside a single
         cause, a law is sought beside that.
-    library, effects, held_out : as of that.
-    out : folder of the extended model and of the generated classes.
-    report : takes a line on what is being done.
+    problem : as it was asked of that.
+    engine : whose folder takes the extended model and the generated classes.
 
     Raises
     ------
     InputError
         If the library cannot be compiled, or the model is none of this library.
     """
-    system, cases = before.system, before.cases
     about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
-    scan = Scan(system, library, cases, workers, report, about)
+    scan = Scan(problem, about, engine)
     estimates = _turning(scan.prospects)
     if not estimates:
         able = _likeliest(scan.prospects)
-        every = estimated(system, library, cases, workers, report, able, about) if able else []
         fitted: dict[tuple[str, ...], FittedLaw] = {}
-        for one in every:
-            fitted.setdefault(_called(one.law), one)
+        for law in estimated(problem, able, about, engine) if able else ():
+            fitted.setdefault(_called(law.law), law)
         estimates = list(fitted.values())
     # Odds that chance turns at the rate of false alarms; and what splines owe to their form.
-    decides = of_system(system.comparison, len(scan.prospects))
+    decides = of_system(problem.system.comparison, len(scan.prospects))
     odds, near = 0.5 * decides.tied, 0.5 * (decides.tied + decides.form)
     tied = [estimate for estimate in estimates if estimates[0].evidence - estimate.evidence < near]
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
     forms = {form.written.name: form for estimate in tied for form in _forms(estimate)}
-    forms = _surviving(system, library, cases, forms, workers, report, about)
+    forms = _surviving(problem, forms, about, engine)
     found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
     proposal = Proposal(before, *found, forms, None)
     # Beside what bends to the rest, a law may not be seen; alone it may explain a part.
-    comparison = replace(system.comparison, left=1.0)
-    ways = [(system, effects), (replace(system, comparison=comparison), ())]
-    for judged, beside in ways if before.diagnosis.verdict == "unexplained" else ways[:1]:
+    tolerant = replace(problem.system, comparison=replace(problem.system.comparison, left=1.0))
+    ways = [problem, replace(problem, system=tolerant, effects=())]
+    for way in ways if before.diagnosis.verdict == "unexplained" else ways[:1]:
         for name in list(forms)[:_OF_FORMS]:
             own = {name: forms[name], **forms}
-            rest = (out, workers, report, held_out)
-            outcome = _diagnosed(judged, cases, library, beside, own, *rest)
+            outcome = _diagnosed(way, own, engine)
             proposal = Proposal(before, *found, own, outcome)
             if proposal.laws:
                 return proposal
@@ -182,32 +170,26 @@ def _forms(estimate: FittedLaw) -> list[WrittenForm]:
 
 
 def _surviving(
-    system: System,
-    library: Library,
-    cases: Sequence[Case],
-    forms: Mapping[str, WrittenForm],
-    workers: int,
-    report: Reporter,
-    about: Fitted,
+    problem: Problem, forms: Mapping[str, WrittenForm], about: Fitted, engine: Engine
 ) -> dict[str, WrittenForm]:
     """The closed form with the shortest description, first, and those that are as good.
 
     They are found as causes are, by what they predict of recordings that they were not fitted to.
     Beside others each would be one of many: forms of one law are alike.
     """
-    report(f"{len(forms)} closed forms, each alone")
-    base = system.models[OBSERVER].name
+    system = problem.system
+    engine.report(f"{len(forms)} closed forms, each alone")
     with tempfile.TemporaryDirectory() as scratch:
-        extended, own = _as_effects(library, base, forms, Path(scratch))
+        extended, own = _as_effects(problem, forms, Path(scratch))
         path = Path(scratch) / "Forms.fmu"
         every = [*about.active, *own]
         build_everything(system, extended, every, path)
-        given = given_values(path, system)
         steps: list[Step] = []
-        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+        source = ModelSource(path, system, given_values(path, system))
+        with Simulations(source, problem.cases, engine) as simulations:
             decides = of_system(system.comparison, len(own))
             fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
-            seek(fit, own, anew(fit, about.point, about.active), steps, (), report)
+            seek(fit, own, anew(fit, about.point, about.active), steps, (), engine.report)
     if not steps:
         return {}
     before, rivals = steps[0].before, steps[0].rivals
@@ -218,35 +200,24 @@ def _surviving(
 
 
 def _as_effects(
-    library: Library, base: str, forms: Mapping[str, WrittenForm], folder: Path
+    problem: Problem, forms: Mapping[str, WrittenForm], folder: Path
 ) -> tuple[Library, list[Effect]]:
     """A library with closed forms, and these: the likelier law and the simpler form first."""
-    extended = extended_library(library, [form.written for form in forms.values()], folder)
+    extended = extended_library(problem.library, [form.written for form in forms.values()], folder)
     order = list(forms)
-    own = [effect for effect in read_effects(extended, base) if effect.name in forms]
-    return extended, sorted(own, key=lambda one: order.index(one.name))
+    own = [effect for effect in read_effects(extended, problem.base) if effect.name in forms]
+    return extended, sorted(own, key=lambda effect: order.index(effect.name))
 
 
-def _diagnosed(
-    system: System,
-    cases: Sequence[Case],
-    library: Library,
-    effects: Sequence[Effect],
-    forms: Mapping[str, WrittenForm],
-    out: Path,
-    workers: int,
-    report: Reporter,
-    held_out: Sequence[Case],
-) -> Outcome:
+def _diagnosed(problem: Problem, forms: Mapping[str, WrittenForm], engine: Engine) -> Outcome:
     """Diagnose with the first closed form beside the catalogue; of equals, that has its name."""
     first = dict(list(forms.items())[:1])
-    report(f"{', '.join(first)} beside {len(effects)} effects")
+    engine.report(f"{', '.join(first)} beside {len(problem.effects)} effects")
     with tempfile.TemporaryDirectory() as scratch:
-        extended, own = _as_effects(library, system.models[OBSERVER].name, first, Path(scratch))
-        outcome = diagnose(
-            *(system, cases, extended, [*effects, *own], out, workers, report), held_out=held_out
-        )
+        extended, own = _as_effects(problem, first, Path(scratch))
+        effects = [*problem.effects, *own]
+        outcome = diagnose(replace(problem, library=extended, effects=effects), engine)
     if outcome.extension is not None:
-        text = package(library, [form.written for form in forms.values()])
+        text = package(problem.library, [form.written for form in forms.values()])
         write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome

@@ -10,22 +10,23 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import given_values
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import Fitted, Reporter, fitted
+from workbench.diagnosis.inference.search import Fitted, fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.places import Law
 from workbench.diagnosis.laws.scan import LawProspect, effect_at, eliminated
 from workbench.diagnosis.laws.splines import COEFFICIENTS, smoothest
 from workbench.diagnosis.laws.writing import Written, clock, extended_library, number, unit_of
+from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.errors import FMUError, InputError
 from workbench.models.modelica import Library
-from workbench.recordings.case import Case
-from workbench.system.system import OBSERVER, System
+from workbench.runtime.engine import Engine
 
 _ROUNDS = 2  # of fit and smoothness
 _BEGUN = (1.0, 0.5, 0.25, 0.1)  # shares of a function that a fit begins with
@@ -137,13 +138,7 @@ def _bump(knot: int) -> str:
 
 
 def estimated(
-    system: System,
-    library: Library,
-    cases: Sequence[Case],
-    workers: int,
-    report: Reporter,
-    prospects: Sequence[LawProspect],
-    about: Fitted,
+    problem: Problem, prospects: Sequence[LawProspect], about: Fitted, engine: Engine
 ) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
@@ -152,15 +147,15 @@ def estimated(
     """
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "Free.fmu"
-        report(f"compiling {len(prospects)} free functions")
-        able = _compiled(system, library, prospects, path, about.active)
+        engine.report(f"compiling {len(prospects)} free functions")
+        able = _compiled(problem, prospects, path, about.active)
         if not able:
             return []
-        effects = _effects(library, able)
-        given = given_values(path, system)
-        with Simulations(path, system, given, cases, workers, report=report) as simulations:
+        effects = _effects(problem.library, able)
+        source = ModelSource(path, problem.system, given_values(path, problem.system))
+        with Simulations(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, [*about.active, *effects])
-            report("fitting free functions")
+            engine.report("fitting free functions")
             job = partial(_estimate, simulations, anew(fit, about.point, about.active))
             tried = fit.together(job, list(zip(effects, able, strict=True)))
     found = [one for one in tried if one is not None]
@@ -178,33 +173,27 @@ def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
 
 
 def _compiled(
-    system: System,
-    library: Library,
-    prospects: Sequence[LawProspect],
-    path: Path,
-    known: Sequence[Effect],
+    problem: Problem, prospects: Sequence[LawProspect], path: Path, known: Sequence[Effect]
 ) -> list[LawProspect]:
     """Build the FMU of free functions; returns those that it has.
 
     What a law depends on may depend on it: a loop that is not linear, which no FMU of ours solves.
     """
-    base = system.models[OBSERVER].name
+    name, about = "FreeFunctions", "With free functions"
     with tempfile.TemporaryDirectory() as scratch:
         written = [_written(f"Free{k}", prospect) for k, prospect in enumerate(prospects)]
-        extended = extended_library(library, written, Path(scratch))
-        effects = [*known, *_effects(library, prospects)]
-        text = source(extended, base, "FreeFunctions", effects, {}, {}, "With free functions")
+        extended = extended_library(problem.library, written, Path(scratch))
+        effects = [*known, *_effects(problem.library, prospects)]
+        text = ExtendedModel(extended, problem.base, name, effects, about).source()
         try:
-            build(extended, "FreeFunctions", text, path, every_platform=False)
+            build(extended, name, text, path, every_platform=False)
         except InputError:
             if len(prospects) == 1:
                 return []
         else:
             return list(prospects)
-    able = [
-        prospect for prospect in prospects if _compiled(system, library, [prospect], path, known)
-    ]
-    return _compiled(system, library, able, path, known) if able else []
+    able = [prospect for prospect in prospects if _compiled(problem, [prospect], path, known)]
+    return _compiled(problem, able, path, known) if able else []
 
 
 def _estimate(

@@ -9,12 +9,13 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import given_values
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.effects.extension import build, source, variables
+from workbench.diagnosis.effects.extension import ExtendedModel, build, variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Joint, Key
-from workbench.diagnosis.inference.search import Fitted, Reporter
+from workbench.diagnosis.inference.search import Fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.periods import Period, strongest_period
 from workbench.diagnosis.laws.places import (
@@ -28,11 +29,11 @@ from workbench.diagnosis.laws.places import (
 )
 from workbench.diagnosis.laws.splines import APART, COEFFICIENTS, Knots, Smoothness, smoothest
 from workbench.diagnosis.laws.writing import PACKAGE, Written, extended_library, unit_of
+from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.models.modelica import Library
-from workbench.recordings.case import Case
-from workbench.system.system import OBSERVER, System
+from workbench.runtime.engine import Engine
 
 _AT_ONCE = 300  # columns of derivatives: some hundred megabytes
 _ROUNDING = 1e-8  # share of what an unknown explains alone
@@ -99,17 +100,9 @@ class Scan:
     prospects : of all laws, the likeliest first.
     """
 
-    def __init__(
-        self,
-        system: System,
-        library: Library,
-        cases: Sequence[Case],
-        workers: int,
-        report: Reporter,
-        about: Fitted,
-    ) -> None:
+    def __init__(self, problem: Problem, about: Fitted, engine: Engine) -> None:
+        system, library, base = problem.system, problem.library, problem.base
         self._lasting = system.comparison.lasting
-        base = system.models[OBSERVER].name
         where = tuple(places(library, base, read_slots(library, base)))
         names = list(
             dict.fromkeys(f"{place.slot.name}.{one}" for place in where for one in _seen(place))
@@ -119,11 +112,11 @@ class Scan:
             probes = [effect_at(place.name, library, place, _SIZE) for place in where]
             effects = [*about.active, *probes]
             path = Path(scratch) / "Probes.fmu"
-            text = source(extended, base, "Probes", effects, {}, {}, "With probes")
-            report(f"compiling probes in {len(where)} places")
+            text = ExtendedModel(extended, base, "Probes", effects, "With probes").source()
+            engine.report(f"compiling probes in {len(where)} places")
             build(extended, "Probes", watching(text, names), path, every_platform=False)
-            given = given_values(path, system)
-            with Simulations(path, system, given, cases, workers, report=report) as simulations:
+            source = ModelSource(path, system, given_values(path, system))
+            with Simulations(source, problem.cases, engine) as simulations:
                 self._fit = Fit(simulations, effects)
                 self.base = anew(self._fit, about.point, about.active)
                 values = self._fit.unknowns.values(self.base.point)
@@ -134,7 +127,7 @@ class Scan:
                 ]
                 span = _SPAN * system.comparison.lasting
                 every = [law for place in where for law in laws(place, self._recordings, span)]
-                report(f"{len(every)} laws in {len(where)} places")
+                engine.report(f"{len(every)} laws in {len(where)} places")
                 found = self._judged(simulations, values, every)
                 found += self._turning(simulations, values, where)
         self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)

@@ -8,7 +8,6 @@ import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import ExitStack, nullcontext
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from workbench.arrays import Matrix
 from workbench.diagnosis.data.clocks import late_signals
-from workbench.diagnosis.data.motion import Opened, opened
+from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.diagnosis.simulation.prediction import Variation
@@ -30,9 +29,9 @@ from workbench.diagnosis.simulation.simulator import (
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.recordings.case import Case
+from workbench.runtime.engine import ALONE, Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import ProgressReporter
-from workbench.system.system import System
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -43,15 +42,15 @@ class Simulations:
 
     Parameters
     ----------
-    path : FMU with all effects that may be asked for.
-    given : values of its variables that the diagnosed model has instead of the defaults.
+    source : FMU with all effects that may be asked for, with the values of the diagnosed model.
+    engine : is told now and then how many simulations were made.
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
-    report : takes a line now and then on how many simulations were made.
-    model : the FMU with these values, where it is open already; it must outlive the simulations.
+    model : the same, where it is open already; it must outlive the simulations.
 
     Attributes
     ----------
+    source, system, given : the model, whose it is, and its values.
     nominal, units, bounds : value, unit, (least, greatest) value by variable of the FMU.
     begin : start values of states by recording, as measured.
     simulated : what its simulators are made from.
@@ -60,30 +59,28 @@ class Simulations:
 
     def __init__(
         self,
-        path: Path,
-        system: System,
-        given: Mapping[str, float],
+        source: ModelSource,
         cases: Sequence[Case],
-        workers: int,
+        engine: Engine = ALONE,
         sound: Soundness = SOUND,
-        report: Callable[[str], None] = lambda line: None,
         *,
         restarting: bool = True,
-        model: Opened | None = None,
+        model: OpenModel | None = None,
     ) -> None:
-        self._pace = ProgressReporter(report, "simulations")
-        self.system, self.given, self.cases = system, dict(given), list(cases)
-        self._sound, self._workers = sound, min(workers, len(cases))
+        self._pace = ProgressReporter(engine.report, "simulations")
+        self.source, self.system = source, source.system
+        self.given, self.cases = dict(source.given), list(cases)
+        self._sound, self._workers = sound, min(engine.workers, len(cases))
         self._alone = self._workers == 1
         self._at = list(range(len(cases)))  # of each recording, among all forms
         self._without = list(self._at)
         self._refused: dict[int, InputError] = {}
         self._interrupted = threading.Event()
         with ExitStack() as stack:
-            self._model = model or stack.enter_context(opened(path, system, given))
+            self._model = model or stack.enter_context(opened(source))
             self._tell(self._model.fmu)
             self.recordings = [self._ready(case, restarting=restarting) for case in cases]
-            coarse = Simulated(path, system, tuple(self.recordings))
+            coarse = Simulated(source.path, self.system, tuple(self.recordings))
             parts = settled_parts(self._simulator(coarse), self.nominal)
             self.simulated = coarse._replace(parts=parts)
             self._forms = self._weighed([*self.recordings, *self._lesser()])

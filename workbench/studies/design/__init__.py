@@ -13,9 +13,9 @@ from pathlib import Path
 from workbench.diagnosis import build_everything, catalogue, choose
 from workbench.diagnosis.data.samples import channels
 from workbench.diagnosis.inference.rivals import Rivals
-from workbench.diagnosis.inference.search import Reporter
 from workbench.errors import InputError
 from workbench.models.modelica import read_library
+from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.design.candidates import (
     Experiment,
@@ -41,7 +41,7 @@ _CONFIRMED = 24  # at most: a quarter of what is tried
 _SENSED = 3  # experiments that are tried with further sensors
 
 
-def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) -> NextStop:
+def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
     """Rank the experiments that a system allows by what they would tell.
 
     Settings are exchanged first and profiles then, once each, as coordinates of a design (R. K.
@@ -54,17 +54,16 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
     ----------
     system : that was diagnosed.
     rivals : what its recordings leave undecided.
-    report : takes a line on what is being done.
 
     Raises
     ------
     InputError
         If the system does not say what may be varied, or no recording of it would count.
     """
-    with _open(system, rivals, workers, report) as (experiments, pool):
+    with _open(system, rivals, engine) as (experiments, pool):
         every, plan = every_setting(experiments), some_settings(experiments)
         named = " with ".join(rivals.models[0].effects)
-        report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
+        engine.report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
         ranked = chosen(_predict_all(system, pool, plan))
         near = [
             other_setting
@@ -73,7 +72,9 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
         ]
         beside = [one for one in every if one in near and one not in plan]
         if beside:
-            report(f"{len(beside)} others that differ from the best {_SETTINGS} in one setting")
+            engine.report(
+                f"{len(beside)} others that differ from the best {_SETTINGS} in one setting"
+            )
             ranked = chosen([*ranked, *_predict_all(system, pool, beside)])
         best = [one.candidate for one in ranked[:_SETTINGS]]
         more = [
@@ -82,15 +83,15 @@ def next_stop(system: System, rivals: Rivals, workers: int, report: Reporter) ->
             for other_profile in other_profiles(experiments, setting)
         ]
         if more:
-            report(f"{len(more)} profiles with the best {len(best)}")
+            engine.report(f"{len(more)} profiles with the best {len(best)}")
             ranked = chosen([*ranked, *_predict_all(system, pool, more)])
         if len(rivals.models) > 1:
-            report("the best, with the models fitted again in full")
+            engine.report("the best, with the models fitted again in full")
             ranked = _confirmed(pool, ranked)
         sensors = {}
         first = ranked[0]
         if len(first.groups) < len(rivals.models) and experiments.sensors:
-            report("the same with further sensors")
+            engine.report("the same with further sensors")
             best = [one.candidate for one in ranked[:_SENSED]]
             for sensor, found in _sensed(pool, best, experiments.sensors, len(first.groups)):
                 sensed = with_sensor(system, sensor)
@@ -114,14 +115,14 @@ def predict_experiments(
     InputError
         As `next_stop`.
     """
-    with _open(system, rivals, workers, lambda _: None) as (experiments, pool):
+    with _open(system, rivals, Engine(workers)) as (experiments, pool):
         ranked = chosen(_predict_all(system, pool, plan, in_full=True))
         return [_proposal(system, experiments, one) for one in ranked]
 
 
 @contextmanager
 def _open(
-    system: System, rivals: Rivals, workers: int, report: Reporter
+    system: System, rivals: Rivals, engine: Engine
 ) -> Iterator[tuple[Experiments, Pool[ExperimentPredictor]]]:
     """What the system allows, and workers with its model."""
     experiments = system.experiments
@@ -136,10 +137,10 @@ def _open(
     effects = {one.name: one for one in choose(rivals.effects, catalogue(system, library))}
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / "AllEffects.fmu"
-        report(f"compiling {len(effects)} effects")
+        engine.report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
         outlook = DesignProblem(everything, system, experiments, rivals, effects)
-        with Pool(workers, open_predictor, outlook) as pool:
+        with Pool(engine.workers, open_predictor, outlook) as pool:
             yield experiments, pool
 
 

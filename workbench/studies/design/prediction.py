@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.motion import Opened
+from workbench.diagnosis.data.motion import ModelSource, OpenModel
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised, Point
@@ -105,9 +105,14 @@ class DesignProblem:
     rivals: Rivals
     effects: Mapping[str, Effect]
 
+    @property
+    def source(self) -> ModelSource:
+        """The FMU, with what the diagnosed model has."""
+        return ModelSource(self.everything, self.system, self.rivals.given)
+
 
 def predicted(
-    asked: DesignProblem, model: Opened, candidate: Experiment, case: Case, *, in_full: bool
+    asked: DesignProblem, model: OpenModel, candidate: Experiment, case: Case, *, in_full: bool
 ) -> Prediction:
     """What an experiment would tell.
 
@@ -117,8 +122,7 @@ def predicted(
     case : a recording of it as the first rival predicts it.
     in_full : whether rivals are fitted again, or taken as they are linearised where they are.
     """
-    given = (asked.everything, asked.system, asked.rivals.given, [case], 1)
-    with Simulations(*given, model=model) as simulations:
+    with Simulations(asked.source, [case], model=model) as simulations:
         fit = Fit(simulations, list(asked.effects.values()), beside=[case])
         begun = _begun(fit, start_of(asked.system, asked.experiments, candidate))
         rows = [_linearised(fit, asked, model, begun) for model in asked.rivals.models]

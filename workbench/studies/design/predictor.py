@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from workbench.diagnosis.data.motion import Opened, opened
+from workbench.diagnosis.data.motion import OpenModel, opened
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.rivals import Rival
 from workbench.diagnosis.inference.unknowns import ALL
@@ -22,7 +22,7 @@ from workbench.system.system import Channel, System
 class ExperimentPredictor:
     """The model with all effects, at hand for one experiment after the other."""
 
-    def __init__(self, asked: DesignProblem, model: CoSimulation, derived: Opened) -> None:
+    def __init__(self, asked: DesignProblem, model: CoSimulation, derived: OpenModel) -> None:
         self._asked, self._model, self._derived = asked, model, derived
 
     def predict_experiment(
@@ -76,8 +76,7 @@ class ExperimentPredictor:
 @contextmanager
 def open_predictor(asked: DesignProblem) -> Iterator[ExperimentPredictor]:
     """What a worker is prepared with."""
-    path, system, given = asked.everything, asked.system, asked.rivals.given
-    with CoSimulation(path) as model, opened(path, system, given) as derived:
+    with CoSimulation(asked.everything) as model, opened(asked.source) as derived:
         yield ExperimentPredictor(asked, model, derived)
 
 

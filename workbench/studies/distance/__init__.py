@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.inference.search import Reporter
 from workbench.errors import InputError
 from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine, Reporter
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import ProgressReporter
 from workbench.studies.distance.forecast import (
@@ -29,7 +29,7 @@ from workbench.studies.distance.past import PastFit, fitted, places
 from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Descent, Tail
 from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, recorded
-from workbench.system.stopping import SPEED, Stopping
+from workbench.system.stopping import SPEED
 from workbench.system.system import System
 
 __all__ = ["Distance", "Effort", "distance_of_stop"]
@@ -71,8 +71,7 @@ def distance_of_stop(
     cases: Sequence[Case],
     said: Mapping[str, Any],
     effort: Effort,
-    workers: int,
-    report: Reporter,
+    engine: Engine,
 ) -> Distance:
     """Predict the distance of a stop from past stops of the same machine.
 
@@ -81,7 +80,6 @@ def distance_of_stop(
     cases : past stops.
     said : what is asked for and the conditions, as people write them, by name; what is not said is
         usual.
-    report : takes a line on what is being done.
 
     Raises
     ------
@@ -99,10 +97,10 @@ def distance_of_stop(
             expected="two stops or more, which say what the model leaves",
             remedy="give more recordings of this machine",
         )
-    report(f"fit to {len(cases)} stops")
-    past = fitted(system, cases, workers, report)
-    with Pool(workers, forecasting, system) as pool:
-        return _Forecasts(system, stopping, made, past, effort, pool, report).told(stop)
+    engine.report(f"fit to {len(cases)} stops")
+    past = fitted(system, cases, engine)
+    with Pool(engine.workers, forecasting, system) as pool:
+        return _Forecasts(system, made, past, effort, pool, engine.report).told(stop)
 
 
 class _Forecasts:
@@ -111,14 +109,13 @@ class _Forecasts:
     def __init__(
         self,
         system: System,
-        stopping: Stopping,
         made: Sequence[RecordedStop],
         past: PastFit,
         effort: Effort,
         pool: Pool[Forecaster],
         report: Reporter,
     ) -> None:
-        self._system, self._stopping = system, stopping
+        self._system, self._stopping = system, stopping_of(system)
         self._made, self._past, self._effort = made, past, effort
         self._pool, self._report = pool, report
         own = []

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Joint, Key, Quadratic, add, covariance, minimum
-from workbench.diagnosis.inference.search import ROUNDS, Reporter
+from workbench.diagnosis.inference.search import ROUNDS
 from workbench.diagnosis.inference.thresholds import of_system
 from workbench.diagnosis.inference.unknowns import choice_of
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.errors import InputError
 from workbench.recordings.case import Case, Value
+from workbench.runtime.engine import Engine
 from workbench.system.system import OBSERVER, System
 
 
@@ -68,7 +70,7 @@ class PastFit:
         return MachineLevels(self.joint.shared, self.mean + step, covariance(total.N))
 
 
-def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter) -> PastFit:
+def fitted(system: System, cases: Sequence[Case], engine: Engine) -> PastFit:
     """Fit levels, and what differs between recordings, to past stops.
 
     Raises
@@ -78,8 +80,8 @@ def fitted(system: System, cases: Sequence[Case], workers: int, report: Reporter
     """
     path = system.model(OBSERVER).path
     assert path is not None
-    given = (path, system, system.given, cases, workers)
-    with Simulations(*given, report=report, restarting=False) as simulations:
+    source = ModelSource(path, system, system.given)
+    with Simulations(source, cases, engine, restarting=False) as simulations:
         # Of effects none is tried; the thresholds bound steps alone.
         fit = Fit(simulations, [], of_system(system.comparison, 1))
         best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)

@@ -4,7 +4,6 @@ folder -> recordings that are new -> estimates -> state on the disk -> watch -> 
 """
 
 import hashlib
-import os
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
@@ -13,6 +12,7 @@ from typing import Any
 
 from workbench.errors import InputError
 from workbench.recordings.case import Case, read_case
+from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.monitoring.chart import LevelChange
 from workbench.studies.monitoring.estimate import (
@@ -49,10 +49,9 @@ Steps = Callable[[int, int, str], None]
 def monitor(
     system: System,
     folder: Path,
-    out: Path,
+    engine: Engine,
     *,
     rate: float = RATE,
-    workers: int = os.cpu_count() or 1,
     read: Reader = read_case,
     step: Steps = lambda done, total, name: None,
 ) -> MonitoringResult:
@@ -64,9 +63,8 @@ def monitor(
     Parameters
     ----------
     folder : holds a folder for each recording of one machine.
-    out : of the state, and where a run goes on from.
+    engine : whose folder takes the state, from which a run goes on.
     rate : alarms per recording that a sound machine may raise.
-    workers : processes.
     read : makes a case of a folder; a function of a module.
     step : takes how many of the new recordings are done, of how many, and the last one's name.
 
@@ -82,9 +80,9 @@ def monitor(
             expected="quantities in [estimated] that no condition sets",
             remedy="name some parameters of the model there, with corrections",
         )
-    with opened(out / STATE, _identity(system)) as state:
+    with opened(engine.out / STATE, _identity(system)) as state:
         new = state.missing(recording_folders(folder))
-        interrupted = _estimate(system, new, state, workers, read, step)
+        interrupted = _estimate(system, new, state, engine.workers, read, step)
         told = state.all()
         if interrupted and not any(one.estimate for one in told):
             raise KeyboardInterrupt  # there is nothing to conclude from

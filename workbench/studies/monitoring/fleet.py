@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.errors import InputError
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 from workbench.studies.monitoring import STATE, MonitoringResult, Reader, monitor
 from workbench.system.system import System
@@ -133,7 +134,8 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> MachineResult:
             (out / STATE).write_bytes(state)
         try:
             folder = fleet.fetched(machine, Path(scratch) / "recordings")
-            found = monitor(fleet.system, folder, out, rate=fleet.rate, workers=1, read=fleet.read)
+            engine = Engine(out=out)
+            found = monitor(fleet.system, folder, engine, rate=fleet.rate, read=fleet.read)
             fleet.write(found, out)
         except InputError as error:
             return MachineResult(machine, refusal=str(error))

@@ -5,7 +5,7 @@ plan -> sets of recordings by the virtual rig -> verdicts -> statistics
 
 from workbench.studies.power.journal import Journal, NamedCause, SetVerdict
 from workbench.studies.power.planting import Findable, Plantable, Planting, Repertoire, plan
-from workbench.studies.power.run import diagnose_sets
+from workbench.studies.power.run import PowerStudy, diagnose_sets
 from workbench.studies.power.statistics import CLEAR, VISIBLE, share, summarise
 from workbench.studies.power.virtual_rig import (
     RecordedSets,
@@ -22,6 +22,7 @@ __all__ = [
     "NamedCause",
     "Plantable",
     "Planting",
+    "PowerStudy",
     "RecordedSets",
     "Repertoire",
     "SetVerdict",

@@ -8,6 +8,7 @@ import numpy as np
 
 from workbench import diagnosis
 from workbench.diagnosis import Diagnosis, Effect, catalogue
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.rivals import Rivals, gathered
 from workbench.diagnosis.inference.search import Fitted, examine, extended
@@ -15,6 +16,7 @@ from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
+from workbench.runtime.engine import silent
 from workbench.system.system import System
 
 
@@ -45,7 +47,7 @@ def diagnose_set(
 ) -> Diagnosis:
     """Diagnose one set of recordings, in this process alone."""
     with _fit(system, effects, everything, cases) as (_, fit):
-        return conclude(fit, effects, _silent)
+        return conclude(fit, effects, silent)
 
 
 def rivals_of_set(
@@ -53,7 +55,7 @@ def rivals_of_set(
 ) -> tuple[Diagnosis, Rivals | None]:
     """Diagnose one set, and keep what it leaves undecided; None where no cause is found."""
     with _fit(system, effects, everything, cases) as (simulations, fit):
-        found = conclude(fit, effects, _silent)
+        found = conclude(fit, effects, silent)
         left = gathered(simulations, fit, found.base, found.rivals) if found.rivals else None
         return found, left
 
@@ -78,8 +80,8 @@ def distances_in_set(
         that could be fitted.
     """
     with _fit(system, effects, everything, cases) as (_, fit):
-        found = conclude(fit, effects, _silent)
-        base, trial = examine(fit, found.base, effects, _silent)
+        found = conclude(fit, effects, silent)
+        base, trial = examine(fit, found.base, effects, silent)
         fits: dict[str, Fitted | None] = {}
         for score in trial.scores():
             name = score.effect.name
@@ -106,9 +108,5 @@ def distance(chi_squared: float) -> float:
 def _fit(
     system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
 ) -> Iterator[tuple[Simulations, Fit]]:
-    with Simulations(everything, system, system.given, cases, 1) as simulations:
+    with Simulations(ModelSource(everything, system, system.given), cases) as simulations:
         yield simulations, Fit(simulations, effects)
-
-
-def _silent(line: str) -> None:
-    """Progress of each set would hide that of all."""

@@ -1,34 +1,31 @@
 """Whether the recording that is proposed next parts what a set leaves together."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from workbench.diagnosis import Diagnosis, Effect
+from workbench.diagnosis import Diagnosis
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
+from workbench.runtime.engine import ALONE, Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
 from workbench.studies.design.candidates import drawn
 from workbench.studies.power.diagnosing import (
-    build_everything,
     distance,
     distances_in_set,
     rivals_of_set,
 )
 from workbench.studies.power.planting import Group, Planting
-from workbench.studies.power.run import Setup
+from workbench.studies.power.run import PowerStudy, Setup
 from workbench.studies.power.statistics import share
-from workbench.studies.power.virtual_rig import FollowingRig, VirtualRig
-from workbench.system.system import System
+from workbench.studies.power.virtual_rig import FollowingRig
 
 _DRAWN = 2  # experiments that are drawn for each set, to compare with
 _NEAR = 0.2  # share of a separation
@@ -47,21 +44,13 @@ SHARES = {
 
 
 def follow_proposals(
-    groups: Sequence[Group],
-    system: System,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    *,
-    workers: int,
-    report: Callable[[str], None],
+    groups: Sequence[Group], study: PowerStudy, engine: Engine
 ) -> tuple[list[dict[str, Any]], bool]:
     """Make sets with one cause each, make what is proposed next, and diagnose all of it.
 
     Parameters
     ----------
     groups : as planned; of them, sets with one cause of the catalogue.
-    effects : of the library, which may be found.
-    report : takes a line on each set.
 
     Returns
     -------
@@ -74,9 +63,9 @@ def follow_proposals(
     InputError
         If the rig cannot make what is proposed.
     """
-    if not isinstance(rig, FollowingRig):
+    if not isinstance(study.rig, FollowingRig):
         raise InputError(
-            where=f"{system.source}, the companion's module 'planting'",
+            where=f"{study.system.source}, the companion's module 'planting'",
             found="a virtual rig that makes no experiments",
             expected="one with the method 'following'",
             remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",
@@ -84,22 +73,22 @@ def follow_proposals(
     sets = [one for group in groups for one in group if one.kind == "single"]
     rows: dict[int, dict[str, Any]] = {}
     begin = time.perf_counter()
-    with TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
-        build_everything(system, effects, setup.everything)
-        with Pool(workers, nullcontext, setup, isolated=True) as pool:
-            numbers = {pool.submit(_row, one): k for k, one in enumerate(sets)}
-            try:
-                for task in as_completed(numbers):
-                    k = numbers[task]
-                    try:
-                        rows[k] = task.result()
-                    except WorkerError as error:
-                        rows[k] = _begun(sets[k]) | {"error": repr(error)}
-                    left = (time.perf_counter() - begin) / len(rows) * (len(sets) - len(rows))
-                    report(f"[{len(rows)}/{len(sets)}] {_said(rows[k])}; {left:.0f} s left")
-            except KeyboardInterrupt:
-                return [rows[k] for k in sorted(rows)], True
+    with (
+        study.setup() as setup,
+        Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
+    ):
+        numbers = {pool.submit(_row, planting): k for k, planting in enumerate(sets)}
+        try:
+            for task in as_completed(numbers):
+                k = numbers[task]
+                try:
+                    rows[k] = task.result()
+                except WorkerError as error:
+                    rows[k] = _begun(sets[k]) | {"error": repr(error)}
+                left = (time.perf_counter() - begin) / len(rows) * (len(sets) - len(rows))
+                engine.report(f"[{len(rows)}/{len(sets)}] {_said(rows[k])}; {left:.0f} s left")
+        except KeyboardInterrupt:
+            return [rows[k] for k in sorted(rows)], True
     return [rows[k] for k in sorted(rows)], False
 
 
@@ -171,7 +160,7 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
     if rivals is None or len(rivals.models) == 1:
         return
     experiments = setup.system.experiments
-    asked = next_stop(setup.system, rivals, 1, _silent)
+    asked = next_stop(setup.system, rivals, ALONE)
     row["sentence"], row["sensors"] = asked.sentence, list(asked.sensors)
     if planted not in asked.names:
         return
@@ -206,8 +195,9 @@ def _made(
     rig = setup.rig.following(experiment.to_dict(), setup.system)
     more = replace(setup, rig=rig).recorded(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
+    recordings = [*cases, *more]
     found, shown = distances_in_set(
-        *(setup.system, setup.effects, setup.everything, [*cases, *more], planted, others),
+        setup.system, setup.effects, setup.everything, recordings, planted, others
     )
     named = _named(found)
     return {
@@ -231,7 +221,3 @@ def _made(
 def _named(found: Diagnosis) -> list[str]:
     """Causes, with those that are as good."""
     return [name for cause in found.causes for name in (cause.effect.name, *cause.confusable_with)]
-
-
-def _silent(line: str) -> None:
-    """Progress of each set would hide that of all."""

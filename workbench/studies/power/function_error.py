@@ -1,34 +1,26 @@
 """How far a proposed law is from the true one, along recordings that neither was fitted to."""
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis import Outcome, given_values
+from workbench.diagnosis import Outcome, Problem, given_values
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.effects.extension import build, source
+from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import Fitted
 from workbench.diagnosis.laws import Proposal
 from workbench.diagnosis.laws.scan import watching
 from workbench.diagnosis.laws.writing import extended_library
 from workbench.diagnosis.simulation.evidence import Simulations
-from workbench.models.modelica import Library
-from workbench.recordings.case import Case
-from workbench.system.system import OBSERVER, System
 
 
 def function_error(
-    system: System,
-    library: Library,
-    cases: Sequence[Case],
-    known: Outcome,
-    found: Proposal,
-    effect: Effect,
+    problem: Problem, known: Outcome, found: Proposal, effect: Effect
 ) -> float | None:
     """Error of the first law that is proposed, over the range of what the true cause does.
 
@@ -37,7 +29,7 @@ def function_error(
 
     Parameters
     ----------
-    cases : recordings that were not fitted.
+    problem : whose recordings were not fitted.
     known : of the diagnosis with the true cause in its catalogue.
     effect : that cause, of the library.
 
@@ -54,15 +46,16 @@ def function_error(
     elsewhere = law.place.slot.name not in effect.slots or effect not in true.active
     if elsewhere or any(one.order_locked for one in every.values()):
         return None
-    base = system.models[OBSERVER].name
     with tempfile.TemporaryDirectory() as scratch:
         written = [found.forms[cause.effect.name].written for cause in found.laws]
-        extended = extended_library(library, written, Path(scratch))
+        extended = extended_library(problem.library, written, Path(scratch))
         effects, path = list(every.values()), Path(scratch) / "Both.fmu"
-        text = source(extended, base, "Both", effects, {}, {}, "With the law and the true cause")
+        about = "With the law and the true cause"
+        text = ExtendedModel(extended, problem.base, "Both", effects, about).source()
         output = f"{law.place.slot.name}.{law.place.output.name}"
         build(extended, "Both", watching(text, [output]), path, every_platform=False)
-        with Simulations(path, system, given_values(path, system), cases, 1) as simulations:
+        both = ModelSource(path, problem.system, given_values(path, problem.system))
+        with Simulations(both, problem.cases) as simulations:
             fit = Fit(simulations, effects)
             without, right, seen = (
                 _along(simulations, fit, one) for one in (known.diagnosis.base, true, proposed)

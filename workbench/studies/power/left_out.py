@@ -2,19 +2,19 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from workbench.diagnosis import Effect, diagnose
+from workbench.diagnosis import Problem, diagnose
 from workbench.diagnosis.laws import Proposal, needs_law, propose
-from workbench.models.modelica import Library
 from workbench.recordings.case import read_cases
+from workbench.runtime.engine import Engine
 from workbench.studies.power.function_error import function_error
 from workbench.studies.power.planting import Group, Planting
+from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import share
-from workbench.studies.power.virtual_rig import VirtualRig
-from workbench.system.system import System
 
 _WORTH = 0.8  # of what the true form gains
 _NEAR = 0.15  # of the range of what a cause does
@@ -50,22 +50,13 @@ def _gains(row: Mapping[str, Any]) -> bool:
 
 
 def propose_left_out(
-    groups: Sequence[Group],
-    system: System,
-    library: Library,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    *,
-    workers: int,
-    report: Callable[[str], None],
+    groups: Sequence[Group], study: PowerStudy, engine: Engine
 ) -> tuple[list[dict[str, Any]], bool]:
     """Make sets with one cause each, and diagnose them with a catalogue that lacks it.
 
     Parameters
     ----------
     groups : as planned; of each the first set is made, if it has one cause or none.
-    effects : of the library.
-    report : takes a line on what is being done.
 
     Returns
     -------
@@ -77,23 +68,19 @@ def propose_left_out(
     begin = time.perf_counter()
     try:
         for number, planting in enumerate(sets):
-            rows.append(_row(planting, system, library, rig, effects, workers))
+            rows.append(_row(planting, study, engine.workers))
             left = (time.perf_counter() - begin) / (number + 1) * (len(sets) - number - 1)
             said = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
-            report(f"[{number + 1}/{len(sets)}] {planting.options}: {said}; {left:.0f} s left")
+            engine.report(
+                f"[{number + 1}/{len(sets)}] {planting.options}: {said}; {left:.0f} s left"
+            )
     except KeyboardInterrupt:
         return rows, True
     return rows, False
 
 
-def _row(
-    planting: Planting,
-    system: System,
-    library: Library,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    workers: int,
-) -> dict[str, Any]:
+def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
+    system, library, rig, effects = study.system, study.library, study.rig, study.effects
     planted = [effect for effect in effects if effect.name in planting.effects]
     others = [effect for effect in effects if effect not in planted]
     acting = {slot for one in planted for slot in one.slots}
@@ -124,23 +111,25 @@ def _row(
             simulated = rig.simulate(planting.seed, planting.gains)
             rig.write(simulated, planting.gains, recordings)
             cases = read_cases([recordings], system)
-            before = diagnose(system, cases, library, others, out, workers, _silent)
+            engine = Engine(workers, out=out)
+            problem = Problem(system, cases, library, others)
+            before = diagnose(problem, engine)
             row["verdict"] = before.diagnosis.verdict
             row["named"] = [cause.effect.name for cause in before.diagnosis.causes]
             late = before.diagnosis.late
             row["late"] = [] if late is None else list(late.signals)
             row["asked"] = needs_law(before)
             if row["asked"]:
-                found = propose(before, library, others, out, workers, _silent)
+                found = propose(before, problem, engine)
                 row |= _told(found)
                 if planted and found.laws:
-                    known = diagnose(system, cases, library, effects, out, workers, _silent)
+                    known = diagnose(replace(problem, effects=effects), engine)
                     gain = known.diagnosis.gain
                     row["after_with_it"] = None if gain is None else gain.after
                     rig.write(rig.simulate(planting.seed + 1, planting.gains), planting.gains, new)
                     fresh = read_cases([new], system)
                     row["function_error"] = function_error(
-                        system, library, fresh, known, found, planted[0]
+                        replace(problem, cases=fresh), known, found, planted[0]
                     )
     except Exception as error:  # one set must not end a run of hours; it is counted
         row["error"] = repr(error)
@@ -159,7 +148,3 @@ def _told(found: Proposal) -> dict[str, Any]:
         "before": None if gain is None else gain.before,
         "after": None if gain is None else gain.after,
     }
-
-
-def _silent(line: str) -> None:
-    """Progress of each set would hide that of all."""

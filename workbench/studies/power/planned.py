@@ -1,9 +1,7 @@
 """What a campaign of recordings would show, before one of them is made."""
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.special import chndtrinc
@@ -11,11 +9,9 @@ from scipy.stats import ncx2
 
 from workbench.diagnosis import Diagnosis, Effect
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
-from workbench.studies.power.diagnosing import build_everything, diagnose_set
+from workbench.studies.power.diagnosing import diagnose_set
 from workbench.studies.power.planting import Plantable, Planting
-from workbench.studies.power.run import Setup
-from workbench.studies.power.virtual_rig import VirtualRig
-from workbench.system.system import System
+from workbench.studies.power.run import PowerStudy
 
 SURE = 0.95  # chance from which on a size is called found
 
@@ -42,19 +38,13 @@ class EffectChance:
 
 
 def predict_campaign(
-    system: System,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    wanted: Sequence[Plantable],
-    sizes: Sequence[float],
-    seed: int,
+    study: PowerStudy, wanted: Sequence[Plantable], sizes: Sequence[float], seed: int
 ) -> list[EffectChance]:
     """Chances that effects are named, from one set of recordings without any.
 
     Parameters
     ----------
-    rig : makes the recordings of the campaign.
-    effects : of the system's library, which may be found.
+    study : whose rig makes the recordings of the campaign.
     wanted : those that the campaign is asked for.
     sizes : multiples of what matters.
     seed : of the machine's tolerances and the sensors' noise.
@@ -64,13 +54,12 @@ def predict_campaign(
     InputError
         If a model or the library is not what it should be.
     """
-    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
-        build_everything(system, effects, setup.everything)
-        cases = setup.recorded(Planting("clean", seed, 0.0, {}, ()), rig.simulate(seed, {}))
-        found = diagnose_set(system, effects, setup.everything, cases)
-    decides = of_system(system.comparison, len(effects))
-    known = {effect.name: effect for effect in effects}
+    with study.setup() as setup:
+        clean = Planting("clean", seed, 0.0, {}, ())
+        cases = setup.recorded(clean, study.rig.simulate(seed, {}))
+        found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+    decides = of_system(study.system.comparison, len(study.effects))
+    known = {effect.name: effect for effect in study.effects}
     return [
         _effect_chance(known[one.effect], one, found, sizes, decides)
         for one in wanted
@@ -90,7 +79,10 @@ def _effect_chance(
         if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
             unknowns = 1 + len(score.phases) * effect.order_locked
             return EffectChance(
-                *(effect.name, planted.unit, effect.matters, score.sigma),
+                effect=effect.name,
+                unit=planted.unit,
+                matters=effect.matters,
+                sigma=score.sigma,
                 chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in asked),
                 least=max(effect.matters, score.sigma * clear(unknowns, decides)),
             )

@@ -3,9 +3,9 @@
 import hashlib
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, as_completed
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from typing import Any
 from workbench import diagnosis
 from workbench.diagnosis import Effect
 from workbench.errors import WorkerError
+from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case, read_cases
+from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.power.diagnosing import build_everything, diagnose_set
 from workbench.studies.power.journal import Journal, SetVerdict, diagnosed
@@ -52,28 +54,44 @@ class Setup:
         return Repertoire(self.rig.plantables, self.effects)
 
 
+@dataclass(frozen=True, eq=False)
+class PowerStudy:
+    """Whose power is measured: a diagnosis of what a virtual rig records.
+
+    Attributes
+    ----------
+    rig : makes the recordings.
+    effects : of the system's library, which may be found.
+    """
+
+    system: System
+    rig: VirtualRig
+    effects: Sequence[Effect]
+
+    @property
+    def library(self) -> Library:
+        """Of the system."""
+        return read_library(self.system.library)
+
+    @contextmanager
+    def setup(self) -> Iterator[Setup]:
+        """How sets are made and diagnosed, by an FMU that is there as long as this is open."""
+        with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
+            everything = Path(scratch) / "AllEffects.fmu"
+            build_everything(self.system, self.effects, everything)
+            yield Setup(self.system, self.rig, everything, tuple(self.effects))
+
+
 def diagnose_sets(
-    groups: Sequence[Group],
-    system: System,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    out: Path,
-    *,
-    seed: int,
-    workers: int,
-    resume: bool,
-    report: Callable[[str], None],
+    groups: Sequence[Group], study: PowerStudy, engine: Engine, *, seed: int, resume: bool
 ) -> tuple[list[SetVerdict], bool]:
     """Make and diagnose sets of recordings.
 
     Parameters
     ----------
     groups : as planned; sets that are diagnosed already are left out.
-    rig : makes the recordings.
-    effects : of the system's library, which may be found.
-    out : folder of the verdicts, and where a run resumes from.
+    engine : whose folder takes the verdicts, and is where a run resumes from.
     seed : of the plan.
-    report : takes a line on each set.
 
     Returns
     -------
@@ -85,33 +103,27 @@ def diagnose_sets(
     InputError
         If a model is not what it should be, or verdicts of another run are there.
     """
-    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
-        build_everything(system, effects, setup.everything)
+    with study.setup() as setup:
         identity = {
             "seed": seed,
-            **rig.identity,
+            **study.rig.identity,
             "observer": _hash([setup.everything]),
-            "effects": [repr(effect) for effect in effects],
+            "effects": [repr(effect) for effect in study.effects],
             "code": _hash(sorted(f for p in diagnosis.__path__ for f in Path(p).rglob("*.py"))),
         }
-        journal = Journal(out / _JOURNAL, identity, resume=resume)
+        journal = Journal(engine.out / _JOURNAL, identity, resume=resume)
         if journal.damaged:
             numbers = ", ".join(map(str, journal.damaged))
-            report(f"warning: {_JOURNAL}, lines {numbers} are damaged; these sets are made again")
+            engine.report(
+                f"warning: {_JOURNAL}, lines {numbers} are damaged; these sets are made again"
+            )
         known = {result.planting.options for result in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
-        interrupted = _run([one for one in left if one], setup, workers, journal, report)
+        interrupted = _run([one for one in left if one], setup, journal, engine)
         return journal.results, interrupted
 
 
-def _run(
-    groups: Sequence[Group],
-    setup: Setup,
-    workers: int,
-    journal: Journal,
-    report: Callable[[str], None],
-) -> bool:
+def _run(groups: Sequence[Group], setup: Setup, journal: Journal, engine: Engine) -> bool:
     """Diagnose all groups; returns whether the run was interrupted."""
     total = sum(map(len, groups))
     begin, done = time.perf_counter(), 0
@@ -124,16 +136,18 @@ def _run(
             left = (time.perf_counter() - begin) / done * (total - done)
             name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
             said = ", ".join(cause.effect for cause in result.causes) or result.verdict
-            report(f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left")
+            engine.report(
+                f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left"
+            )
 
     # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
-    with Pool(workers, nullcontext, setup, isolated=True) as pool:
+    with Pool(engine.workers, nullcontext, setup, isolated=True) as pool:
         open_tasks = {pool.submit(_evaluate, group): group for group in groups}
         try:
             for task in as_completed(list(open_tasks)):
                 collect(task)
         except KeyboardInterrupt:
-            report("interrupted, finishing the sets that are under way")
+            engine.report("interrupted, finishing the sets that are under way")
             pool.finish()
             for task in [open_task for open_task in open_tasks if not open_task.cancelled()]:
                 collect(task)

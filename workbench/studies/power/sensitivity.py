@@ -1,9 +1,8 @@
 """Which thresholds of the diagnosis matter: half and twice of each, on the same recordings."""
 
 import dataclasses
-import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import Matrix
-from workbench.diagnosis import Effect
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, of_system
 from workbench.diagnosis.inference.verdict import conclude
@@ -22,11 +21,10 @@ from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.simulator import Evidence
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
+from workbench.runtime.engine import Engine, silent
 from workbench.runtime.pool import Pool
-from workbench.studies.power.diagnosing import build_everything
 from workbench.studies.power.planting import Planting
-from workbench.studies.power.run import Setup
-from workbench.studies.power.virtual_rig import VirtualRig
+from workbench.studies.power.run import PowerStudy, Setup
 from workbench.system.system import System
 
 FACTORS = (0.5, 2.0)
@@ -87,7 +85,7 @@ class Remembering(Simulations):
     def __init__(
         self, path: Path, system: System, cases: Sequence[Case], samples: Soundness
     ) -> None:
-        super().__init__(path, system, system.given, cases, 1, samples)
+        super().__init__(ModelSource(path, system, system.given), cases, sound=samples)
         self._points: dict[Any, list[Evidence]] = {}
         self._columns: dict[Any, list[Matrix]] = {}
 
@@ -151,34 +149,21 @@ def _said(
         with Remembering(setup.everything, setup.system, cases, samples) as simulations:
             for one in mine:
                 fit = Fit(simulations, setup.effects, one)
-                found = conclude(fit, setup.effects, _silent)
+                found = conclude(fit, setup.effects, silent)
                 said[one] = (found.verdict, *(cause.effect.name for cause in found.causes))
     except InputError:  # too few samples are left
         return dict.fromkeys(mine, ("refused",))
     return said
 
 
-def _silent(_: str) -> None:
-    """Say nothing."""
-
-
 def vary_sets(
-    plantings: Sequence[Planting],
-    system: System,
-    rig: VirtualRig,
-    effects: Sequence[Effect],
-    *,
-    workers: int,
-    report: Callable[[str], None],
+    plantings: Sequence[Planting], study: PowerStudy, engine: Engine
 ) -> tuple[list[ThresholdSensitivity], bool]:
     """Diagnose sets of recordings by half and twice of each threshold.
 
     Parameters
     ----------
     plantings : what each set hides.
-    rig : makes the recordings, once for all thresholds.
-    effects : of the system's library, which may be found.
-    report : takes a line on each set.
 
     Returns
     -------
@@ -192,25 +177,27 @@ def vary_sets(
     """
     results: list[ThresholdSensitivity] = []
     begin = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-        setup = Setup(system, rig, Path(scratch) / "AllEffects.fmu", tuple(effects))
-        build_everything(system, effects, setup.everything)
-        with Pool(workers, nullcontext, setup, isolated=True) as pool:
-            names = list(values(of_system(system.comparison, len(effects))))
-            tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
-            try:
-                for done, task in enumerate(as_completed(tasks), start=1):
-                    left = (time.perf_counter() - begin) / done * (len(tasks) - done)
-                    name = tasks[task].options
-                    try:
-                        one = task.result()
-                    except WorkerError as error:
-                        said = f"failed: {error}"
-                    else:
-                        results.append(one)
-                        said = f"{', '.join(one.said)}; {len(one.changed)} changes"
-                    report(f"[{done:>3}/{len(tasks)}] {name}: {said}  about {left:.0f} s left")
-            except KeyboardInterrupt:
-                report("interrupted")
-                return results, True
+    names = list(values(of_system(study.system.comparison, len(study.effects))))
+    with (
+        study.setup() as setup,
+        Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
+    ):
+        tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
+        try:
+            for done, task in enumerate(as_completed(tasks), start=1):
+                left = (time.perf_counter() - begin) / done * (len(tasks) - done)
+                try:
+                    varied = task.result()
+                except WorkerError as error:
+                    said = f"failed: {error}"
+                else:
+                    results.append(varied)
+                    said = f"{', '.join(varied.said)}; {len(varied.changed)} changes"
+                engine.report(
+                    f"[{done:>3}/{len(tasks)}] {tasks[task].options}: {said}  "
+                    f"about {left:.0f} s left"
+                )
+        except KeyboardInterrupt:
+            engine.report("interrupted")
+            return results, True
     return results, False

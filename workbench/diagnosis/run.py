@@ -1,0 +1,268 @@
+"""A diagnosis, from recordings to the extended model and what it gains."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.diagnosis.data.clocks import case_in_time, late_signals
+from workbench.diagnosis.data.counting import refuse_too_few
+from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
+from workbench.diagnosis.inference.certainty import assess
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.residuals import dependences, residuals
+from workbench.diagnosis.inference.rivals import gathered
+from workbench.diagnosis.inference.sample_errors import errors_of, held_out_errors
+from workbench.diagnosis.inference.verdict import Diagnosis, conclude
+from workbench.diagnosis.outcome import Extension, Outcome
+from workbench.diagnosis.problem import Problem
+from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.simulator import delay, simulating
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.models.modelica import Library
+from workbench.observers.estimators.disturbance import DisturbanceObserver
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.replay import replay
+from workbench.observers.score import score
+from workbench.runtime.engine import Engine
+from workbench.runtime.files import write_whole
+from workbench.runtime.progress import ProgressReporter
+from workbench.system.reader import with_model
+from workbench.system.registry import open_model
+from workbench.system.system import OBSERVER, System
+
+EVERYTHING, EXTENDED = "AllEffects", "Extended"
+# Observers that are tried with both models: one with a gain for all, one that makes it as it goes.
+_TRIED = (DisturbanceObserver, ExtendedKalmanFilter)
+
+
+def diagnose(
+    problem: Problem, engine: Engine, *, every_platform: bool = False, certainty: bool = False
+) -> Outcome:
+    """Find what an observer model lacks, from recordings; write the extended model.
+
+    Parameters
+    ----------
+    every_platform : whether the extended FMU is for all platforms, or only for this machine's.
+    certainty : whether it is asked how sure the sizes are, by fits of their own.
+
+    Raises
+    ------
+    InputError
+        If there are too few recordings, or one has too little that counts; if the library cannot be
+        compiled, or the model is none of this library.
+    """
+    system, effects, report = problem.system, problem.effects, engine.report
+    refuse_too_few(problem.cases, system)
+    with tempfile.TemporaryDirectory() as scratch:
+        everything = Path(scratch) / f"{EVERYTHING}.fmu"
+        report(f"compiling {len(effects)} effects")
+        build_everything(system, problem.library, effects, everything)
+        source = ModelSource(everything, system, given_values(everything, system))
+        with Simulations(source, problem.cases, engine) as simulations:
+            fit = Fit(simulations, effects)
+            diagnosis = conclude(fit, effects, report)
+            base, best = diagnosis.base, diagnosis.best
+            asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
+            assessed = assess(fit, best, report) if asked else None
+            found = _Found(problem, engine, simulations, fit, diagnosis)
+            extension = found.extend(every_platform=every_platform)
+            errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
+            starts = fit.unknowns.starts(best.point)
+            if problem.held_out:
+                report("errors on recordings that were held out")
+                more, their_starts = held_out_errors(
+                    simulations, effects, (base, best), problem.held_out, engine.workers
+                )
+                errors, starts = errors + more, starts | their_starts
+            shown = residuals(simulations, fit, base.linearised, best.linearised)
+            return Outcome(
+                system=system,
+                cases=tuple(simulations.cases),
+                diagnosis=diagnosis,
+                residuals=shown,
+                dependences=dependences(simulations, shown),
+                levels={
+                    key: (float(value), fit.unknowns.level_unit(key))
+                    for key, value in best.point.levels.items()
+                },
+                deviations={
+                    name: dict(zip(fit.unknowns.local, map(float, row), strict=True))
+                    for name, row in zip(fit.unknowns.names, best.point.deviations, strict=True)
+                },
+                set_aside={
+                    recording.name: recording.set_aside for recording in simulations.recordings
+                },
+                observers=found.observers(extension),
+                extension=extension,
+                errors=tuple(errors),
+                starts=_differing(system, extension, starts),
+                rivals=gathered(simulations, fit, base, diagnosis.rivals)
+                if diagnosis.rivals
+                else None,
+                certainty=assessed,
+            )
+
+
+def _differing(
+    system: System, extension: Extension | None, starts: Mapping[str, Mapping[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Of start values by recording, those of the last model that it does not have itself."""
+    with open_model(system) if extension is None else FMU(extension.fmu) as model:
+        return {
+            recording: {
+                name: float(value)
+                for name, value in values.items()
+                if name in model.defaults and value != model.defaults[name]
+            }
+            for recording, values in starts.items()
+        }
+
+
+def build_everything(
+    system: System, library: Library, effects: Sequence[Effect], path: Path
+) -> None:
+    """Write the FMU of the observer model with every effect at zero."""
+    about = "Observer model with every effect, at zero"
+    base = system.models[OBSERVER].name
+    text = ExtendedModel(library, base, EVERYTHING, effects, about).source()
+    build(library, EVERYTHING, text, path, every_platform=False)
+
+
+def given_values(everything: Path, system: System) -> dict[str, float]:
+    """Parameters of the diagnosed model that differ from the library's defaults.
+
+    Raises
+    ------
+    InputError
+        If the model is no observer model of this library.
+    """
+    with FMU(everything) as extended, open_model(system) as diagnosed:
+        compare = system.comparison
+        asked = [*compare.tolerances, *compare.levels, *sorted(system.constants)]
+        if missing := [name for name in asked if name not in diagnosed.defaults]:
+            raise InputError(
+                where=str(diagnosed.path),
+                found=f"no parameter '{missing[0]}'",
+                expected=f"the FMU of {system.models[OBSERVER].name}, or of one that extends it",
+                remedy="give such an FMU with --model",
+            )
+        return {
+            name: value
+            for name, value in diagnosed.defaults.items()
+            if name in extended.parameters and value != extended.defaults[name]
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was found, and with what."""
+
+    problem: Problem
+    engine: Engine
+    simulations: Simulations
+    fit: Fit
+    diagnosis: Diagnosis
+
+    def extend(self, *, every_platform: bool) -> Extension | None:
+        """Write the extended model, compile it, compare its predictions with those of the fit."""
+        if not self.diagnosis.causes:
+            return None
+        self.engine.report("compiling the extended model")
+        simulations, best = self.simulations, self.diagnosis.best
+        library, base = self.problem.library, self.problem.base
+        values = self._values()
+        present = [e for e in self.problem.effects if e.name in values and not e.late]
+        own = {name: value for name, value in simulations.given.items() if "." not in name}
+        own |= self._usual_levels()
+        arrays = {name.partition("[")[0] for name in own if "[" in name}
+        every = {n: v for n, v in simulations.nominal.items() if n.partition("[")[0] in arrays}
+        own = {**every, **own}
+        added = ", ".join(effect.name for effect in present) or "calibrated levels"
+        about = f"{base} with {added}"
+        text = ExtendedModel(library, base, EXTENDED, present, about, values, own).source()
+        folder = self.engine.out / "model"
+        folder.mkdir(parents=True, exist_ok=True)
+        modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
+        write_whole(modelica, text)
+        build(library, EXTENDED, text, path, every_platform=every_platform)
+        difference, system = 0.0, self.problem.system
+        read = {*(delay(name) for name in system.signals), *late_signals(system)}
+        points = self.fit.unknowns.values(best.point)
+        with simulating(simulations.simulated._replace(path=path, system=system)) as extended:
+            for k, evidence in enumerate(best.linearised.evidence):
+                known = {
+                    name: value
+                    for name, value in points[k].items()
+                    if name in extended.parameters or name in read
+                }
+                errors = extended.at(k, known).errors
+                difference = max(difference, float(np.abs(errors - evidence.errors).max()))
+        return Extension(modelica, path, difference)
+
+    def _values(self) -> dict[str, dict[str, float]]:
+        """Parameters of the effects that the extended model has, by effect."""
+        effects = {effect.name: effect for effect in self.problem.effects}
+        values: dict[str, dict[str, float]] = {}
+        for effect in effects.values():
+            for variable, value in self.simulations.given.items():
+                if parameter := parameter_of(effect, variable):
+                    values.setdefault(effect.name, {})[parameter] = value
+        for (name, parameter), value in self.diagnosis.best.point.sizes.items():
+            # An order-locked effect has another phase in each recording; the model turns from zero.
+            known = values.setdefault(name, {})
+            part = "cosine" if parameter == "amplitude" else parameter
+            known[part] = (known.get(part, 0.0) if part in effects[name].sizes else 0.0) + value
+        return values
+
+    def _usual_levels(self) -> dict[str, float]:
+        """Calibrated levels of what is free, where conditions are the usual ones."""
+        system, usual = self.problem.system, {}
+        for (name, choice), value in self.diagnosis.best.point.levels.items():
+            level = system.comparison.levels.get(name)
+            if level is None or np.isfinite(level.spread):
+                continue
+            if not level.by or choice == str(system.condition(level.by).choices[0]):
+                usual[name] = value
+        return usual
+
+    def observers(self, extension: Extension | None) -> dict[str, dict[str, tuple[float, float]]]:
+        """Errors of the judged signal, with the gains of the nominal model in both."""
+        system, cases, best = self.problem.system, self.simulations.cases, self.diagnosis.best
+        report = self.engine.report
+        turning = any(effect.order_locked for effect in best.active)
+        judged = all(system.objective.signal in case for case in cases)
+        if extension is None or turning or not judged:
+            return {}
+        report("observers with both models")
+        gains = {}
+        with open_model(system) as nominal:
+            for estimator in _TRIED:
+                try:
+                    gains[estimator] = estimator.reasoned(nominal, system)
+                except InputError as refused:  # a model may be fit for this, and for no observer
+                    report(f"no {estimator.label}: {refused.found}")
+        errors: dict[str, dict[str, list[float]]] = {}
+        counted = ProgressReporter(report, "runs of observers").part(2 * len(gains) * len(cases))
+        after = (
+            with_model(system, OBSERVER, extension.fmu),
+            [case_in_time(case, system, best.point.sizes) for case in cases],
+        )
+        for used, recorded in ((system, cases), after):
+            with open_model(used) as fmu:
+                for estimator, gain in gains.items():
+                    observer = estimator(fmu, used, gain)
+                    by_case = errors.setdefault(estimator.name, {})
+                    for case in recorded:
+                        error = score(case, replay(case, observer), used).nrmse
+                        by_case.setdefault(case.name, []).append(np.nan if error is None else error)
+                        counted(case)
+        return {
+            name: {case: (pair[0], pair[1]) for case, pair in by_case.items()}
+            for name, by_case in errors.items()
+        }
