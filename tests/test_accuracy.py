@@ -22,9 +22,9 @@ from workbench.machines.wheelset.accuracy import (
     rise_delay,
     slide_error,
 )
-from workbench.machines.wheelset.claims import PeakForce
 from workbench.machines.wheelset.rig import ORDINARY_PADS, Effects, select
 from workbench.machines.wheelset.truth import read_truth
+from workbench.machines.wheelset.validity import PeakForce
 from workbench.observers import Estimator
 from workbench.observers import estimators_of as all_estimators
 from workbench.observers.gains_file import usual_gains

@@ -17,6 +17,7 @@ PUMPS = """
 import hashlib
 from pathlib import Path
 import numpy as np
+from workbench import Plugin
 from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
 
 def read(folder):
@@ -31,6 +32,7 @@ def layout(names):
     checksum = hashlib.sha256(" ".join(names).encode()).hexdigest()
     return FolderLayout("a list", {"pumps.txt": checksum}, read)
 
+PLUGIN = Plugin(published=f"{__name__}:PUBLISHED")
 PUBLISHED = Published("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
 """
 
@@ -47,7 +49,7 @@ def pumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path
         module = tmp_path / "modules" / f"{tmp_path.name}_{number}.py"
         module.write_text(PUMPS.replace("NAMES", repr(names)))
         (tmp_path / "set" / "pumps.txt").write_text(" ".join(names))
-        (tmp_path / "system.toml").write_text(f'title = "Pumps"\ncompanion = "{module.stem}"\n')
+        (tmp_path / "system.toml").write_text(f'title = "Pumps"\nplugin = "{module.stem}:PLUGIN"\n')
         importlib.invalidate_caches()
         return tmp_path / "system.toml"
 
@@ -102,7 +104,7 @@ def test_a_set_says_where_it_is_to_be_had(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_a_system_whose_recordings_nobody_published_says_so() -> None:
-    with pytest.raises(InputError, match="no companion that knows of published recordings"):
+    with pytest.raises(InputError, match="no plugin that knows of published recordings"):
         write_cases("wheelset", Path(), Path())
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.machines.wheelset.claims import PeakForce
+from workbench.machines.wheelset.validity import PeakForce
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.disturbance import DisturbanceObserver

@@ -151,7 +151,7 @@ def test_folders_without_a_truth_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_system_that_reads_no_recorded_sets_says_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no companion that reads what is wrong"):
+    with pytest.raises(InputError, match="no plugin that reads what is wrong"):
         read_recorded_sets(load_system("wheelset"), [tmp_path])
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.studies.distance import Distance as Distance
     from workbench.studies.distance import Effort as Effort
     from workbench.studies.monitoring import MonitoringResult as MonitoringResult
+    from workbench.system.plugins import Plugin as Plugin
     from workbench.system.registry import load_system as load_system
     from workbench.system.system import System as System
     from workbench.tuning import TuningResult as TuningResult

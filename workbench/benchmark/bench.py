@@ -14,7 +14,7 @@ from workbench.benchmark.bench_tuning import bench_tuning
 from workbench.benchmark.calls import points
 from workbench.cli.extras import require_compiler
 from workbench.cli.inputs import given_cases
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.pages.answer import Answer, Measure
 from workbench.pages.provenance import run_of, sources
 from workbench.recordings.case import Case
@@ -32,7 +32,7 @@ _CASE = 2  # of the recordings, on which single observers are timed
 _UNITS = {"steps_per_second": "1/s"}
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Time all of it."""
     require_compiler()
     system = load_system(options.system)
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         return _run(output, system, cases, options.out / "bench.json")
 
 
-def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> Done:
+def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> CommandResult:
     case = cases[min(_CASE, len(cases) - 1)]
     calls = _time_models(system)
     output.result(_format_calls(calls, system.sample_time))
@@ -66,7 +66,7 @@ def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> D
     }
     write_json(path, content)
     output.result(f"written: {path}")
-    return Done(content, _UNITS)
+    return CommandResult(content, _UNITS)
 
 
 def _time_models(system: System) -> "dict[str, CallTimes]":

@@ -1,4 +1,4 @@
-"""Loops that a system's companion has written another way, to measure the compiled laws against."""
+"""Loops that a system's plugin has written another way, to measure the compiled laws against."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from workbench.benchmark.fmpy_loop import open_loop
 from workbench.models.fmu import FMU
 from workbench.observers import Gains
 from workbench.observers.estimators.open_loop import OpenLoop
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin, load
 from workbench.system.system import System
 
 Loop = Callable[..., object]  # of time, u and y, as Estimator.run
@@ -27,7 +27,7 @@ def by_fmpy(
         with open_loop(fmu, system) as alone:
             yield alone
         return
-    module = _companion(system)
+    module = _loops(system)
     if module is None or estimator not in module.LOOPS:
         yield None
         return
@@ -37,9 +37,10 @@ def by_fmpy(
 
 def by_c(estimator: str, fmu: FMU, system: System, gains: Gains) -> Loop | None:
     """The loop of an estimator in C without FMI; None where there is none."""
-    module = _companion(system)
+    module = _loops(system)
     return module.by_c(estimator, fmu, system, gains) if module else None
 
 
-def _companion(system: System) -> ModuleType | None:
-    return companion_part(system.companion, "benchmark")
+def _loops(system: System) -> ModuleType | None:
+    module: ModuleType | None = load(find_plugin(system.plugin).loops)
+    return module

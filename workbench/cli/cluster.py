@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from workbench.cli.extras import require
 from workbench.errors import InputError
+from workbench.system.plugins import place_of
 from workbench.system.system import System
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def open_cluster(
     system: System,
     warn: Callable[[str], None] = lambda message: None,
 ) -> "DaskPool[State]":
-    """Workers of a cluster, which must have the system's companion, too; see DaskPool.
+    """Workers of a cluster, which must have the system's plugin, too; see DaskPool.
 
     Raises
     ------
@@ -33,9 +34,9 @@ def open_cluster(
     require("distributed", "cluster", "which works with a Dask cluster", "command line, --cluster")
     from workbench.runtime.cluster import DaskPool
 
-    companion = [system.companion] if system.companion else []
+    modules = [place_of(system.plugin).partition(":")[0]] if system.plugin else []
     try:
-        return DaskPool(address, begin, given, limit, modules=companion, warn=warn)
+        return DaskPool(address, begin, given, limit, modules=modules, warn=warn)
     except InputError:
         raise
     except (OSError, ValueError) as error:

@@ -4,11 +4,11 @@ import argparse
 import sys
 
 from workbench.cli.extras import require
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.cli.parser import command_line
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Print the script of a shell.
 
     By shtab: it writes all options into a script, so that a key press starts no Python.
@@ -20,4 +20,4 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     output.result(script)
     if sys.stdout.isatty():
         output.progress("put it where the shell looks for it, see --help")
-    return Done({"shell": options.shell, "script": script})
+    return CommandResult({"shell": options.shell, "script": script})

@@ -9,7 +9,7 @@ from typing import Any
 
 from workbench.cli.extras import require_compiler
 from workbench.cli.inputs import given_cases
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.diagnosis import Outcome, Problem, catalogue, choose, diagnose
 from workbench.diagnosis.laws import needs_law, propose
 from workbench.diagnosis.laws.report import PROPOSED, write_proposal
@@ -42,7 +42,7 @@ def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case],
     return [case for case in cases if case not in held_out], held_out
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
     system = load_system(options.system)
     if options.library is not None:
@@ -53,7 +53,9 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     effects = choose(options.effects, catalogue(system, library))
     if options.list:
         output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
-        return Done({"effects": [{"name": effect.name, "text": effect.text} for effect in effects]})
+        return CommandResult(
+            {"effects": [{"name": effect.name, "text": effect.text} for effect in effects]}
+        )
     require_compiler()
     cases, held_out = _parted(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
@@ -78,7 +80,7 @@ def _propose(
     output.result(f"to read: {told}, data and figures beside it")
 
 
-def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Done:
+def _run(options: argparse.Namespace, output: Output, problem: Problem) -> CommandResult:
     system, cases, held_out = problem.system, problem.cases, problem.held_out
     output.stage(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
     outcome = diagnose(
@@ -102,4 +104,4 @@ def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Done:
     output.stage("done")
     output.result(f"to read: {page}, data and figures beside it")
     status = 130 if outcome.diagnosis.interrupted else 0
-    return Done(read_result(options.out / "summary.json"), {}, status, page)
+    return CommandResult(read_result(options.out / "summary.json"), {}, status, page)

@@ -3,7 +3,7 @@
 import argparse
 
 from workbench.cli.inputs import given_cases
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.pages.provenance import models, run_of, software, sources
 from workbench.runtime.engine import Engine
@@ -17,7 +17,7 @@ from workbench.system.system import OBSERVER
 _UNITS = {"distance": "m", "deceleration": "m/s2", "response": "s", "asked": "SI"}
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Predict one stop, and each past one from the others."""
     system = load_system(options.system)
     if options.fmu is not None:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     output.result(found.summary())
     output.result(f"to read: {page}, data and figure beside it")
     result = read_result(options.out / "distance.json")
-    return Done(result, _UNITS, 130 if found.interrupted else 0, page)
+    return CommandResult(result, _UNITS, 130 if found.interrupted else 0, page)
 
 
 def _said(text: str) -> tuple[str, str | float]:

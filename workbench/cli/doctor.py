@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from workbench.cli.arguments import nearby
 from workbench.cli.extras import PURPOSES, missing_packages
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.models.fmu_cache import cache_folder
@@ -50,7 +50,7 @@ class Inspection:
     remedy: str = ""
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Look at everything."""
     findings = []
     for finding in _findings():
@@ -59,7 +59,9 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         if finding.remedy:
             output.result(f"{'':<8} {'':<20} to do: {finding.remedy}")
     wrong = any(finding.state == "wrong" for finding in findings)
-    return Done({"findings": [asdict(finding) for finding in findings]}, status=1 if wrong else 0)
+    return CommandResult(
+        {"findings": [asdict(finding) for finding in findings]}, status=1 if wrong else 0
+    )
 
 
 def _findings() -> Iterator[Inspection]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from workbench.cli.extras import require_compiler
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.observers import Estimator, Gains, choose, estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Write the observer as an FMU, and the package."""
     require_compiler()
     from workbench.models.compiler import PLATFORMS, native
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         write_json(options.out / "summary.json", summary)
     beside = " and ".join([*(file.name for file in files[1:]), "summary.json"])
     output.result(f"written: {options.out / built.path.name}, {beside} beside it")
-    return Done(summary)
+    return CommandResult(summary)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from workbench.cli.arguments import nearby
 from workbench.cli.extras import require_compiler
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.models.checks import CheckResult, check, is_fit, uses
 from workbench.models.description import Description, read_description
@@ -20,12 +20,12 @@ from workbench.system.installed import built_models
 _OMC = Path("build/omc")
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Build, describe or check FMUs."""
     return {"build": _build, "info": _info, "check": _check}[options.job](options, output)
 
 
-def _build(options: argparse.Namespace, output: Output) -> Done:
+def _build(options: argparse.Namespace, output: Output) -> CommandResult:
     require_compiler()
     from workbench.models import compiler  # an extra: everything else runs without it
 
@@ -41,16 +41,18 @@ def _build(options: argparse.Namespace, output: Output) -> Done:
     if options.all and options.check:
         found = compiler.differences(built_models(), fmus())
         output.result("\n".join(found) or f"{nearby(fmus())} matches its sources")
-        return Done({"differences": found}, status=1 if found else 0)
+        return CommandResult({"differences": found}, status=1 if found else 0)
     if options.all:
         _require_checkout()
         all_built = compiler.build_all(built_models(), nearby(fmus()))
-        return Done({"fmus": [_built(output, built.path, built.sha256) for built in all_built]})
+        return CommandResult(
+            {"fmus": [_built(output, built.path, built.sha256) for built in all_built]}
+        )
     _require_model(options)
     out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
     require_writable(out)
     built = compiler.build(options.package, options.model, out, fmi=options.fmi)
-    return Done({"fmus": [_built(output, built.path, built.sha256)]})
+    return CommandResult({"fmus": [_built(output, built.path, built.sha256)]})
 
 
 def _built(output: Output, path: Path, sha256: str) -> dict[str, str]:
@@ -59,7 +61,7 @@ def _built(output: Output, path: Path, sha256: str) -> dict[str, str]:
     return {"file": str(path), "sha256": sha256}
 
 
-def _build_with_omc(options: argparse.Namespace, output: Output) -> Done:
+def _build_with_omc(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.models.compiler.openmodelica import build_with_omc
 
     if options.fmi != 2 or options.check:
@@ -77,7 +79,7 @@ def _build_with_omc(options: argparse.Namespace, output: Output) -> Done:
         for path in build_with_omc(package, models, options.out or _OMC):
             output.result(str(path))
             written.append({"file": path})
-    return Done({"fmus": written})
+    return CommandResult({"fmus": written})
 
 
 def _require_checkout() -> None:
@@ -100,13 +102,13 @@ def _require_model(options: argparse.Namespace) -> None:
         )
 
 
-def _info(options: argparse.Namespace, output: Output) -> Done:
+def _info(options: argparse.Namespace, output: Output) -> CommandResult:
     description = read_description(options.fmu)
     output.result(_format_description(description))
-    return Done(asdict(description) | {"path": description.path.name})
+    return CommandResult(asdict(description) | {"path": description.path.name})
 
 
-def _check(options: argparse.Namespace, output: Output) -> Done:
+def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     description = read_description(options.fmu)
     limits = usual_limits()
     if options.limit is not None:
@@ -132,7 +134,7 @@ def _check(options: argparse.Namespace, output: Output) -> Done:
     }
     listed = [asdict(finding) for finding in findings]
     told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
-    return Done(told, status={True: 0, False: 1, None: 3}[fit])
+    return CommandResult(told, status={True: 0, False: 1, None: 3}[fit])
 
 
 def _show_begin(output: Output, name: str) -> None:

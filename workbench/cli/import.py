@@ -12,7 +12,7 @@ from workbench.cli.arguments import nearby
 from workbench.cli.confirming import confirmed
 from workbench.cli.import_figure import draw_cuts
 from workbench.cli.inputs import recording_options
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.recordings.case import UNKNOWN
 from workbench.recordings.channels import RecordingOptions, stored_columns
@@ -33,7 +33,7 @@ from workbench.system.registry import load_system
 from workbench.system.system import System
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Import files, each by itself; what is refused leaves the others."""
     system = load_system(options.system)
     known = recording_options(options, system)
@@ -55,7 +55,9 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         output.result(f"see {IMPORTED} in {nearby(options.out)}")
         output.result(f"next: workbench simulate --system {options.system} {nearby(options.out)}")
     told_all = {"out": options.out, "imports": record, "refused": refused}
-    return Done(told_all, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
+    return CommandResult(
+        told_all, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0
+    )
 
 
 def _files(

@@ -8,7 +8,7 @@ from typing import Any
 
 from workbench.cli.extras import require_compiler
 from workbench.cli.monitor_fleet import provenance_of, run_fleet
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.diagnosis import Problem, catalogue, diagnose
 from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError
@@ -22,7 +22,7 @@ from workbench.studies.monitoring.report import write_monitoring
 from workbench.system.registry import load_system
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Estimate what is new, and watch all."""
     if options.fleet:
         return run_fleet(options, output)
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         result = read_result(options.out / "summary.json")
         if options.diagnose and found.changes and not found.interrupted:
             result["cause"] = _cause(options, output, found, provenance)
-    return Done(result, {"work": "J"}, 130 * found.interrupted, page)
+    return CommandResult(result, {"work": "J"}, 130 * found.interrupted, page)
 
 
 def _cause(

@@ -10,7 +10,7 @@ import pandas as pd
 
 from workbench.cli.cluster import open_cluster
 from workbench.cli.extras import require
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.provenance import models, run_of, software
@@ -39,7 +39,7 @@ def provenance_of(system: System, history: Path) -> dict[str, Any]:
     }
 
 
-def run_fleet(options: argparse.Namespace, output: Output) -> Done:
+def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
     """Watch all machines."""
     if options.diagnose:
         raise InputError(
@@ -73,7 +73,7 @@ def run_fleet(options: argparse.Namespace, output: Output) -> Done:
             told = f"{one.alarms} alarms" if not one.refusal else f"no result: {one.refusal}"
             output.result(f"  {one.machine}: {told}")
     output.result(f"to read: {options.out / 'fleet.csv'}, a folder for each machine beside it")
-    return Done(summary, {"seconds": "s"}, 130 * interrupted)
+    return CommandResult(summary, {"seconds": "s"}, 130 * interrupted)
 
 
 def _written(provenance: dict[str, Any], found: MonitoringResult, out: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.cli.extras import require_compiler
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.diagnosis.inference.rivals import Rivals, read_rivals
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
@@ -20,7 +20,7 @@ from workbench.system.registry import load_system
 _SUMMARY = "summary.json"
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Rank the experiments that a system allows."""
     file = options.result / _SUMMARY
     summary = _read(file)
@@ -39,7 +39,9 @@ def run(options: argparse.Namespace, output: Output) -> Done:
     output.stage("done")
     output.result(found.summary())
     output.result(f"to read: {page}, data and figure beside it")
-    return Done(read_result(options.out / "next.json"), {"duration": "s", "every": "s"}, page=page)
+    return CommandResult(
+        read_result(options.out / "next.json"), {"duration": "s", "every": "s"}, page=page
+    )
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from workbench.arrays import Vector
 from workbench.cli.inputs import chosen_system
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.observers.observability import CaseObservability, case_observability, linear_test
 from workbench.observers.observability_report import (
     draw_observability,
@@ -26,7 +26,7 @@ from workbench.system.registry import open_model
 from workbench.system.system import FULL, OBSERVER, System
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Show what the outputs of the recordings tell."""
     system, cases = chosen_system(options)
     with locked_folder(options.out):
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
 
 def _run(
     options: argparse.Namespace, output: Output, system: System, cases: Sequence[Case]
-) -> Done:
+) -> CommandResult:
     linear = {}
     for role in (role for role in (OBSERVER, FULL) if role in system.models):
         with open_model(system, role) as fmu:
@@ -70,7 +70,7 @@ def _run(
         page = write_observability_page(summary, done, len(cases), options.out)
         told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
         output.result(told)
-    return Done(summary, _units(system), 130 if interrupted else 0, page)
+    return CommandResult(summary, _units(system), 130 if interrupted else 0, page)
 
 
 def _units(system: System) -> dict[str, str]:

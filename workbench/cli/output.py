@@ -14,7 +14,7 @@ from workbench.errors import InputError
 
 
 @dataclass(frozen=True)
-class Done:
+class CommandResult:
     """How a command ended.
 
     Attributes
@@ -66,7 +66,7 @@ class Output:
         left = elapsed / done * (total - done)
         self.progress(f"[{done:>3}/{total}] {name:<28} {elapsed:5.1f} s, about {left:.0f} s left")
 
-    def close(self, command: str, done: Done) -> int:
+    def close(self, command: str, done: CommandResult) -> int:
         """Print the document, if it is asked for; returns the status."""
         if self.json:
             told = {"units": done.units, "result": done.result}

@@ -6,8 +6,8 @@ A command's module of the same name, one package up, runs it: `run(options, outp
 import argparse
 from importlib import import_module
 
-import workbench.cli
-from workbench.system.installed import companion_part, companions
+from workbench.cli import COMMANDS
+from workbench.system.installed import installed_plugins
 
 
 def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
@@ -25,14 +25,16 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=release)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    parts = [companion_part(name, "commands") for name in companions()]
-    for package in (workbench.cli, *(part for part in parts if part)):
-        for name, text in package.COMMANDS.items():
-            if asked and name not in asked:
-                commands.add_parser(name, help=text)
-                continue
-            own = import_module(f"{package.__name__}.options.{name}").add(commands, text)
-            own.set_defaults(work=f"{package.__name__}.{name}")
+    known = {name: (f"workbench.cli.{name}", text) for name, text in COMMANDS.items()}
+    for plugin in installed_plugins():
+        known |= plugin.commands
+    for name, (module, text) in known.items():
+        if asked and name not in asked:
+            commands.add_parser(name, help=text)
+            continue
+        package, _, own = module.rpartition(".")
+        options = f"{package}.options.{own}" if package.startswith("workbench.") else module
+        import_module(options).add(commands, text).set_defaults(work=module)
     for one in parsers(parser):
         one.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
         _add_output(one)

@@ -1,17 +1,17 @@
-"""Recordings of a machine whose companion can plant effects: of `workbench rig`, any system."""
+"""Recordings of a machine whose plugin can inject effects: of `workbench rig`, any system."""
 
 import argparse
 import json
 from typing import Any
 
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.runtime.files import write_whole
 from workbench.studies.power.planting import assigned
 from workbench.studies.power.virtual_rig import open_virtual_rig
 from workbench.system.system import System
 
 
-def make_planted(options: argparse.Namespace, output: Output, system: System) -> Done:
+def make_planted(options: argparse.Namespace, output: Output, system: System) -> CommandResult:
     """Make a set of recordings of one machine, or list what can be made.
 
     What is planted stands in `truth.json` beside them, which nothing reads.
@@ -27,7 +27,9 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
         recordings = "\n".join(f"  {name}" for name in rig.recordings)
         effects = "\n".join(f"  {f'{n} [{one.unit}]':<28} {one.effect}" for n, one in known.items())
         output.result(f"recordings:\n{recordings}\n\neffects, zero if not given:\n{effects}")
-        return Done({"recordings": rig.recordings, "effects": {n: known[n].effect for n in known}})
+        return CommandResult(
+            {"recordings": rig.recordings, "effects": {n: known[n].effect for n in known}}
+        )
     gains = assigned(options.effect, known)
     rig.write(rig.simulate(options.seed, gains), gains, options.out)
     truth: dict[str, Any] = {
@@ -41,4 +43,4 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
     write_whole(options.out / "truth.json", json.dumps(truth, indent=1) + "\n")
     count = len(rig.recordings)
     output.result(f"{count} recordings in {options.out}")
-    return Done({"out": options.out, "cases": count, "of": count})
+    return CommandResult({"out": options.out, "cases": count, "of": count})

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.cli.extras import require_compiler
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.diagnosis.inference.thresholds import of_system
 from workbench.errors import InputError, closest
 from workbench.pages.provenance import run_of
@@ -51,7 +51,7 @@ from workbench.system.registry import load_system, model_path
 from workbench.system.system import REFERENCE
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make, diagnose and count."""
     require_compiler()
     system = load_system(options.system)
@@ -122,7 +122,7 @@ def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
 
 def _usual(
     options: argparse.Namespace, output: Output, study: PowerStudy, groups: Sequence[Group]
-) -> Done:
+) -> CommandResult:
     results, interrupted = _diagnosed(options, output, groups, study, options.out)
     summary = summarise(results, Repertoire(study.rig.plantables, tuple(study.effects)))
     write_power(summary, study.effects, _provenance(options, study, interrupted), options.out)
@@ -132,7 +132,7 @@ def _usual(
     return replace(done, page=options.out / "index.html")
 
 
-def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     out = options.out / "sheet_error"
     groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)
     results, interrupted = _diagnosed(options, output, groups, study, out)
@@ -141,7 +141,7 @@ def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy)
     return _told(output, format_sheet(rows), out / "sheet_error.json", interrupted)
 
 
-def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     out = options.out / "left_out"
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
     engine = Engine(options.workers, output.stage)
@@ -151,7 +151,7 @@ def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) ->
     return _told(output, format_left_out(summary, rows), out / "left_out.json", interrupted)
 
 
-def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     sets = some(_planned(options, study), options.sets, options.seed)
     results, interrupted = vary_sets(sets, study, Engine(options.workers, output.stage))
     usual = values(of_system(study.system.comparison, len(study.effects)))
@@ -160,7 +160,7 @@ def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) 
     return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)
 
 
-def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     out = options.out / "plan"
     sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
     output.stage("one set without any effect is made and diagnosed")
@@ -169,7 +169,7 @@ def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStud
     return _told(output, format_plan(rows, sizes), out / "plan.json", False)
 
 
-def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> Done:
+def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     out = options.out / "followed"
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
     engine = Engine(options.workers, output.stage)
@@ -179,16 +179,16 @@ def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) ->
     return _told(output, format_followed(summary, rows), out / "followed.json", interrupted)
 
 
-def _told(output: Output, text: str, path: Path, interrupted: bool) -> Done:
+def _told(output: Output, text: str, path: Path, interrupted: bool) -> CommandResult:
     """Say what was found and where it is written."""
     output.result(text)
     output.result(f"data: {path.parent}")
     return _written(path, interrupted)
 
 
-def _written(path: Path, interrupted: bool) -> Done:
+def _written(path: Path, interrupted: bool) -> CommandResult:
     """What was written; sizes are in the unit that stands beside them, or of `matters`."""
-    return Done(read_result(path), {"seconds": "s"}, 130 if interrupted else 0)
+    return CommandResult(read_result(path), {"seconds": "s"}, 130 if interrupted else 0)
 
 
 def _diagnosed(

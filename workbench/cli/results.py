@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.pages.runs import (
     RunRecord,
@@ -17,12 +17,12 @@ from workbench.pages.runs import (
 )
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """List the runs of a folder, or compare them with those of another."""
     found = read_runs(options.folder, _warn)
     if options.other is None:
         output.result(format_runs(found))
-        return Done({"runs": [one.to_dict() for one in found]})
+        return CommandResult({"runs": [one.to_dict() for one in found]})
     told: list[dict[str, Any]] = []
     for before, after in _pairs(found, read_runs(options.other, _warn), options.other):
         changes = compare_runs(before, after)
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
                 "changes": [change.to_dict() for change in changes],
             }
         )
-    return Done({"comparisons": told})
+    return CommandResult({"comparisons": told})
 
 
 def _warn(error: InputError) -> None:

@@ -19,8 +19,9 @@ from workbench.studies.distance.plain import PlainLevel
 from workbench.studies.power import following, left_out
 from workbench.studies.power.planned import EffectChance
 from workbench.studies.power.sensitivity import VerdictChange
-from workbench.system.installed import companion_part, companions
+from workbench.system.installed import installed_plugins
 from workbench.system.parts import FIRST, LARGEST, Condition
+from workbench.system.plugins import load
 from workbench.system.stopping import COMMAND, END, SPEED
 from workbench.system.system import System
 from workbench.tuning.validation import Fold
@@ -263,7 +264,8 @@ def system_schema() -> Schema:
     entries = {
         "name": NAMED,
         "title": NAMED,
-        "companion": NAMED,
+        "plugin": NAMED,
+        "companion": {**NAMED, "deprecated": True, "description": "the name of 'plugin' until 0.1"},
         "reported": listed(NAMED),
         "models": {**by_name(closed({"class": NAMED, "fmu": NAMED}, optional="fmu"))},
         "parameters": quantities,
@@ -543,7 +545,7 @@ def _plan() -> Schema:
 
 
 def summaries() -> dict[str, Schema]:
-    """Schema of each summary, by the command that writes it, also those of companions."""
+    """Schema of each summary, by the command that writes it, also those of plugins."""
     own = {
         "simulate": _simulate(),
         "tune": _tune(),
@@ -556,9 +558,8 @@ def summaries() -> dict[str, Schema]:
         "fleet": _fleet(),
         "bench": _bench(),
     }
-    for name in companions():
-        if part := companion_part(name, "schemas"):
-            own |= {command: made() for command, made in part.SUMMARIES.items()}
+    for plugin in installed_plugins():
+        own |= {command: made() for command, made in (load(plugin.summaries) or {}).items()}
     return own
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.cli.inputs import chosen_system
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.observers import choose
 from workbench.observers.live import LiveWindow
@@ -23,7 +23,7 @@ from workbench.runtime.files import locked_folder, write_json
 from workbench.system.system import OBSERVER, System
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Run all estimators on the recordings."""
     system, cases = chosen_system(options)
     window = LiveWindow(system) if options.live else None
@@ -37,7 +37,7 @@ def _run(
     system: System,
     cases: Sequence[Case],
     window: LiveWindow | None,
-) -> Done:
+) -> CommandResult:
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
@@ -83,13 +83,13 @@ def _run(
         raise failure
     units = _units(system)
     if interrupted:
-        return Done(summary, units, 130, page)
+        return CommandResult(summary, units, 130, page)
     idle = _idle(done)
     for name in idle:
         print(
             f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
         )
-    return Done(summary, units, 1 if idle else 0, page)
+    return CommandResult(summary, units, 1 if idle else 0, page)
 
 
 def _units(system: System) -> dict[str, str]:

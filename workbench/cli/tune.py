@@ -14,7 +14,7 @@ import numpy as np
 
 from workbench.cli.cluster import open_cluster
 from workbench.cli.inputs import given_cases, model_names
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError, WorkerError
 from workbench.pages.answer import with_answer
 from workbench.pages.provenance import run_of, sources
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Search the gains."""
     system = load_system(options.system)
     kind = tunable(system, options.estimator)
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
 
 def _run(
     options: argparse.Namespace, output: Output, problem: Problem, cases: int, out: Path
-) -> Done:
+) -> CommandResult:
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     output.stage(
@@ -91,19 +91,19 @@ def _run(
         raise WorkerError(f"{error}; nothing was evaluated") from None
     if tuned is None:
         output.progress("interrupted before the first generation was evaluated; nothing is written")
-        return Done(status=130)
+        return CommandResult(status=130)
     content = summarise_tuning(tuned, options.folds)
     content["provenance"] |= {"run": run_of("tune", problem.job.system, sources(problem.cases))}
     summary = with_answer(tuning_answer(headline(content), content), content)
     if not (progress.kept and _written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
-        return Done(status=1)
+        return CommandResult(status=1)
     draw_convergence(tuned.search.history, out / "convergence.png")
     draw_cases(summary["cases"], out / "cases.png")
     output.result(format_tuned(summary))
     page = write_tuning_page(summary, out)
     output.result(f"written: {page}, gains.toml, summary and figures beside it")
     status = 130 if tuned.interrupted else 0
-    return Done(summary, {"seconds": "s", "bandwidth": "Hz"}, status, page)
+    return CommandResult(summary, {"seconds": "s", "bandwidth": "Hz"}, status, page)
 
 
 def _check(options: argparse.Namespace, cases: Sequence[Case]) -> None:

@@ -12,7 +12,7 @@ from types import ModuleType
 from workbench.errors import InputError, closest
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin
 from workbench.system.system import System
 
 __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators_of", "label"]
@@ -26,9 +26,8 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
     InputError
         If the system has bands of an estimator that there is not.
     """
-    own = companion_part(system.companion, "estimators")
-    packages = [f"{__name__}.estimators"] + ([own.__name__] if own else [])
-    found = [kind for package in packages for kind in _estimators(package)]
+    packages = (f"{__name__}.estimators", find_plugin(system.plugin).estimators)
+    found = [kind for package in packages if package for kind in _estimators(package)]
     known = {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
     for name in system.bands:
         _refuse_unknown(name, known, f"{system.source}, [bands.{name}]")

@@ -12,7 +12,7 @@ from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin
 from workbench.system.system import System
 from workbench.system.tables import LARGEST, read_table, shown
 
@@ -79,7 +79,7 @@ def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> s
 def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     """Gains of an estimator where none are given.
 
-    Those that the system's companion brings serve the model that they were tuned on; another one
+    Those that the system's plugin brings serve the model that they were tuned on; another one
     gets gains that follow from its linearisation. The FMU is left at an operating point.
     """
     reasoned = kind.reasoned(fmu, system)
@@ -92,9 +92,9 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
 
 
 def tuned_file(system: System, name: str) -> Path | None:
-    """The file of tuned gains that a system's companion brings for an estimator, if it does."""
-    gains = companion_part(system.companion, "gains")
-    path = Path(gains.__path__[0]) / f"{name}.toml" if gains else None
+    """The file of tuned gains that a system's plugin brings for an estimator, if it does."""
+    gains = find_plugin(system.plugin).gains
+    path = gains / f"{name}.toml" if gains else None
     return path if path and path.exists() else None
 
 

@@ -13,7 +13,7 @@ from workbench.observers import Estimate, Estimator, Gains
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.run import Ending, Run
 from workbench.recordings.case import Case
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin, load
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
@@ -98,9 +98,8 @@ def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix
 
 
 def _rules(estimator: Estimator) -> Mapping[str, object]:
-    """Rules of the system's companion on when a quantity is shown, by its name."""
-    part = companion_part(estimator.system.companion, "claims")
-    return part.CLAIMS if part else {}
+    """Rules of the system's plugin on when a quantity is shown, by its name."""
+    return load(find_plugin(estimator.system.plugin).validity) or {}
 
 
 def _doubted(estimator: Estimator) -> list[str]:

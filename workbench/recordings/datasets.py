@@ -1,7 +1,7 @@
-"""Published recordings become case folders: the publisher's own files, checked by their checksums.
+"""PublishedSet recordings become case folders: the publisher's own files, checked by their checksums.
 
 The workbench holds none of them. What it knows of a set is a `PublishedSet`, which a system's
-companion has as `PUBLISHED`, a package in its module `published`.
+plugin has as `published`.
 """
 
 import hashlib
@@ -9,7 +9,6 @@ import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +20,8 @@ from workbench.recordings.case import KEYS, Case, read_case
 from workbench.recordings.csv import cell
 from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.resources import commit
-from workbench.system.installed import companion_part
-from workbench.system.registry import system_path
+from workbench.system.installed import system_path
+from workbench.system.plugins import find_plugin, load, plugin_of
 from workbench.system.system import System
 from workbench.system.tables import read_table
 
@@ -121,7 +120,7 @@ class PublishedSet:
 
 
 def published(which: str) -> PublishedSet:
-    """What a system's companion knows of its published recordings.
+    """What a system's plugin knows of its published recordings.
 
     Parameters
     ----------
@@ -133,25 +132,16 @@ def published(which: str) -> PublishedSet:
         If there is no such system, or its recordings were not published.
     """
     path = system_path(which)
-    companion = read_table(path, "name a system", 'title = "..."').text("companion", "")
-    if (found := _known(companion)) is None:
+    table = read_table(path, "name a system", 'title = "..."')
+    known: PublishedSet | None = load(find_plugin(plugin_of(table)).published)
+    if known is None:
         raise InputError(
             where=str(path),
-            found="no companion that knows of published recordings",
-            expected="a Python module with a 'PUBLISHED'",
+            found="no plugin that knows of published recordings",
+            expected="a plugin with a 'published'",
             remedy="choose another system; write case folders for your own recordings",
         )
-    return found
-
-
-def _known(companion: str) -> PublishedSet | None:
-    """What a companion knows of published recordings, if there is one, and it does."""
-    if not companion:
-        return None
-    # A package has it in a part of its own: commands ask each package whether it has some, too.
-    own = companion_part(companion, "published") or import_module(companion)
-    found = getattr(own, "PUBLISHED", None)
-    return found if isinstance(found, PublishedSet) else None
+    return known
 
 
 def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]:
@@ -210,7 +200,7 @@ def read_recorded(folder: Path, system: System) -> Case:
         If it cannot be read.
     """
     document = read_table(folder / _CASE, "repair the folder, or remove it", 'title = "..."')
-    known = _known(system.companion)
+    known: PublishedSet | None = load(find_plugin(system.plugin).published)
     layouts = known.layouts if known else ()
     readers = [layout.one for layout in layouts if layout.one is not None]
     if set(document.content) <= set(KEYS) or not readers:

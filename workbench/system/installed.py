@@ -1,39 +1,24 @@
-"""The systems that come with the workbench, by name, and the packages that they bring along.
-
-Reading their files needs no model, no numbers, and nothing that takes long to import: the command
-line asks here before it knows its command.
-"""
+"""Systems and plugins that are installed; finding them imports nothing that takes time."""
 
 import tomllib
+from contextlib import suppress
 from functools import cache
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+from workbench.errors import InputError, closest
 from workbench.runtime import resources
+from workbench.system.plugins import Plugin, distributed_plugins, find_plugin
 
 FILE = "system.toml"
 
 
-def companion_part(companion: str, name: str) -> ModuleType | None:
-    """A module of a companion package; None where it has none.
-
-    Parameters
-    ----------
-    companion : dotted name, empty for none. Only a part that is there is imported.
-    """
-    spec = find_spec(companion) if companion else None
-    if spec is None or spec.submodule_search_locations is None:
-        return None
-    part = f"{companion}.{name}"
-    return import_module(part) if find_spec(part) else None
-
-
 def system_files() -> dict[str, Path]:
-    """System files by name."""
-    return {content.get("name", path.parent.name): path for path, content in _contents().items()}
+    """System files by name: those of the workbench, then those of installed plugins."""
+    return {
+        content.get("name", path.parent.name): path
+        for path, content in {**_own(), **_brought()}.items()
+    }
 
 
 def usual_system() -> str:
@@ -41,25 +26,48 @@ def usual_system() -> str:
 
     Commands without any arguments work on it.
     """
-    with_cases = [path for path, content in _contents().items() if "cases" in content]
+    with_cases = [path for path, content in _own().items() if "cases" in content]
     return next(name for name, path in system_files().items() if path in with_cases)
+
+
+def installed_plugins() -> list[Plugin]:
+    """Plugins of the workbench's own systems, then those of installed distributions."""
+    own = (content["plugin"] for content in _own().values() if "plugin" in content)
+    return list({**{place: find_plugin(place) for place in own}, **distributed_plugins()}.values())
 
 
 def built_models() -> dict[Path, list[str]]:
     """Models whose FMUs come with the workbench: dotted names by library, its `package.mo`."""
     found = {}
-    for path, content in _contents().items():
+    for path, content in _own().items():
         models = content["models"].values()
         built = [model["class"] for model in models if _is_kept(path.parent / model.get("fmu", ""))]
         if built:
-            found[path.with_name("package.mo")] = [f"{path.parent.name}.{one}" for one in built]
+            found[path.with_name("package.mo")] = [f"{path.parent.name}.{name}" for name in built]
     return found
 
 
-def companions() -> list[str]:
-    """Python packages that these systems bring along."""
-    found = (content.get("companion") for content in _contents().values())
-    return [name for name in found if name]
+def system_path(which: str | Path) -> Path:
+    """The file of a system, by its name, its file, or the folder that holds its file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known, path = system_files(), Path(which)
+    if str(which) in known:
+        return known[str(which)]
+    with suppress(OSError):  # a name that is too long is none
+        path = path / FILE if path.is_dir() else path
+        if path.is_file():
+            return path
+    raise InputError(
+        where=f"system '{which}'",
+        found=f"no such file, and no system of this name{closest(str(which), known)}",
+        expected=f"a system file, or one of {', '.join(known)}",
+        remedy="correct the name or path; 'workbench systems' lists what is installed",
+    )
 
 
 def _is_kept(fmu: Path) -> bool:
@@ -67,6 +75,15 @@ def _is_kept(fmu: Path) -> bool:
 
 
 @cache
-def _contents() -> dict[Path, dict[str, Any]]:
-    paths = sorted(resources.modelica().glob(f"*/{FILE}"))
+def _own() -> dict[Path, dict[str, Any]]:
+    return _contents(sorted(resources.modelica().glob(f"*/{FILE}")))
+
+
+def _brought() -> dict[Path, dict[str, Any]]:
+    """System files that come with plugins of installed distributions."""
+    found = (plugin.system for plugin in distributed_plugins().values())
+    return _contents([path for path in found if path is not None])
+
+
+def _contents(paths: list[Path]) -> dict[Path, dict[str, Any]]:
     return {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in paths}

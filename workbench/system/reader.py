@@ -56,6 +56,7 @@ from workbench.system.parts import (
     Tolerance,
     View,
 )
+from workbench.system.plugins import plugin_of
 from workbench.system.stopping import (
     COMMAND,
     END,
@@ -909,7 +910,7 @@ def read_system(path: Path) -> System:
     """
     file = read_table(path, "give a system file, or the name of an installed one", 'title = "..."')
     file.refuse_unknown(
-        "name title companion reported models parameters inputs outputs judged aids derived "
+        "name title plugin companion reported models parameters inputs outputs judged aids derived "
         "estimated states feedback points conditions objective tuning diagnosis figures "
         "export shortest fewest sample_time cases sampling redundancies next cutting distance work "
         "loggers bands"
@@ -1029,7 +1030,7 @@ def _signals(file: Table, path: Path, models: Mapping[str, Model]) -> System:
         comparison=Comparison(
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (), None, None, None, {}, {}, {}, (), ()
         ),
-        companion=file.text("companion", ""),
+        plugin=plugin_of(file),
         shortest=file.number("shortest", "s", 0.0),
         fewest=round(file.number("fewest", "1", 20.0)),
         cases=path.parent / cases if (cases := file.text("cases", "")) else None,

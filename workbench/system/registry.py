@@ -1,13 +1,12 @@
 """Systems by name or file, and their models."""
 
-from contextlib import suppress
 from pathlib import Path
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError
 from workbench.models import fmu_cache
 from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
-from workbench.system.installed import FILE, system_files
+from workbench.system.installed import system_path
 from workbench.system.parts import Model
 from workbench.system.reader import read_system, with_built
 from workbench.system.system import OBSERVER, System
@@ -25,29 +24,6 @@ def load_system(which: str | Path) -> System:
         If there is none of this name, or its file or its library has a mistake.
     """
     return _built(read_system(system_path(which)))
-
-
-def system_path(which: str | Path) -> Path:
-    """The file of a system, by its name, its file, or the folder that holds its file.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    known, path = system_files(), Path(which)
-    if str(which) in known:
-        return known[str(which)]
-    with suppress(OSError):  # a name that is too long is none
-        path = path / FILE if path.is_dir() else path
-        if path.is_file():
-            return path
-    raise InputError(
-        where=f"system '{which}'",
-        found=f"no such file, and no system of this name{closest(str(which), known)}",
-        expected=f"a system file, or one of {', '.join(known)}",
-        remedy="correct the name or path; 'workbench systems' lists what is installed",
-    )
 
 
 def _built(system: System) -> System:

@@ -102,7 +102,7 @@ class System:
     intermittent : measured at times, and missing in others: they correct Kalman filters alone.
     reported : outputs of the model that estimates hold, with their units.
     export : estimators as FMUs.
-    companion : Python package with a virtual rig and more estimators, or a module; empty: none.
+    plugin : what is of this machine alone, by the name or the place of a `Plugin`; empty: none.
     shortest : [s] that a recording must last.
     fewest : samples that a recording must have.
     settles : [s] in which a model comes to rest at an operating point.
@@ -149,7 +149,7 @@ class System:
     following: StepTracking | None = None
     panels: tuple[View, ...] = ()
     export: Export = field(default_factory=lambda: Export({}, OperatingPoint({}, {}, {})))
-    companion: str = ""
+    plugin: str = ""
     shortest: float = 0.0
     fewest: int = 20
     settles: float = 10.0

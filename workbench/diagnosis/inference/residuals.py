@@ -1,7 +1,7 @@
 """Where and when a simulation is wrong: what its errors go with, and balances of the machine.
 
 These are for people. Balances are formed from smoothed measurements and show an effect where it
-acts; a system's companion knows them. The search does not use them, because noise that a balance
+acts; a system's plugin knows them. The search does not use them, because noise that a balance
 shares with its explanation fakes causes; it uses prediction errors.
 """
 
@@ -17,7 +17,7 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearised import Linearised
 from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.recordings.case import Case, sign
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin, load
 from workbench.system.system import Channel, System
 
 BEGINNING, DIRECTION = "time since the beginning", "direction"
@@ -46,9 +46,9 @@ class Balance:
 
 
 class Balances(Protocol):
-    """What a companion knows of its machine."""
+    """What a plugin knows of its machine."""
 
-    def balances(
+    def __call__(
         self, system: System, case: Case, recorded: Samples, values: Mapping[str, float]
     ) -> Sequence[Balance]:
         """Balances of one recording, with these parameters of the model."""
@@ -62,7 +62,7 @@ class Residuals:
     ----------
     name : of the recording.
     time : (n,) [s] of the balances.
-    balances : that the system's companion knows.
+    balances : that the system's plugin knows.
     channels : that are compared, and that it has.
     block_time : (b,) [s].
     before, after : (b, c) prediction errors of the nominal and of the last model, by channel.
@@ -111,7 +111,7 @@ def residuals(
             Residuals(
                 name=case.name,
                 time=case.time,
-                balances=tuple(known.balances(system, case, recording, fitted)) if known else (),
+                balances=tuple(known(system, case, recording, fitted)) if known else (),
                 channels=tuple(formed[c] for c in told),
                 block_time=case.time[recording.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
@@ -123,9 +123,9 @@ def residuals(
 
 
 def _balances(system: System) -> Balances | None:
-    """Balances that the system's companion knows."""
-    found: Balances | None = companion_part(system.companion, "balances")
-    return found
+    """Balances that the system's plugin knows."""
+    known: Balances | None = load(find_plugin(system.plugin).balances)
+    return known
 
 
 def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[Dependence]:

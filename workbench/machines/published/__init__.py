@@ -1,1 +1,17 @@
-"""What was published of systems: where recordings are to be had, and readers of them."""
+"""Machines whose recordings others have published: a module for each set, and its plugin here."""
+
+from workbench.system.plugins import Plugin
+
+
+def _set_of(module: str) -> Plugin:
+    return Plugin(published=f"{__name__}.{module}:PUBLISHED")
+
+
+AIR_SUPPLY = _set_of("air_supply")
+CASCADED_TANKS = _set_of("cascaded_tanks")
+ELECTRONIC_OSCILLATOR = _set_of("electronic_oscillator")
+HEATED_HOUSE = _set_of("heated_house")
+LEAKING_CHAMBER = _set_of("leaking_chamber")
+POSITIONING_STAGE = _set_of("positioning_stage")
+SEAL_FRICTION = _set_of("seal_friction")
+SERVO_PENDULUM = _set_of("servo_pendulum")

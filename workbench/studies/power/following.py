@@ -65,7 +65,7 @@ def follow_proposals(
     """
     if not isinstance(study.rig, FollowingRig):
         raise InputError(
-            where=f"{study.system.source}, the companion's module 'planting'",
+            where=f"{study.system.source}, the plugin's 'virtual_rig'",
             found="a virtual rig that makes no experiments",
             expected="one with the method 'following'",
             remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",

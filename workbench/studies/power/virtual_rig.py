@@ -1,4 +1,4 @@
-"""What a system's companion provides for recordings in which something is planted."""
+"""What a system's plugin provides for recordings in which effects are injected."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,17 +6,16 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 from workbench.errors import InputError
 from workbench.studies.power.planting import Group, Plantable, SheetError
-from workbench.system.installed import companion_part
+from workbench.system.plugins import find_plugin, load
 from workbench.system.system import System
 
 
 class VirtualRig(Protocol):
     """Makes sets of recordings; it is sent to worker processes.
 
-    A companion has one in its module `planting`, which it opens by
-    `virtual_rig(names, model) -> VirtualRig`: the recordings that a set is made of, the usual ones
-    if none is named, and the FMU that makes them, None where there is none. Wrong names or files it
-    refuses there.
+    A plugin opens one by its `virtual_rig(names, model) -> VirtualRig`: the recordings that a set
+    is made of, the usual ones if none is named, and the FMU that makes them, None where there is
+    none. Wrong names or files it refuses there.
     """
 
     @property
@@ -69,23 +68,22 @@ def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -
     InputError
         If the system has none, or it refuses what is asked.
     """
-    planting = companion_part(system.companion, "planting")
-    if planting is None:
+    make = load(find_plugin(system.plugin).virtual_rig)
+    if make is None:
         raise InputError(
             where=str(system.source),
-            found="no companion that can plant effects",
-            expected="a Python package with a module 'planting', which makes recordings",
-            remedy='name it as companion = "...", or choose a system that has one',
+            found="no plugin that can inject effects",
+            expected="a plugin with a 'virtual_rig', which makes recordings",
+            remedy='name it as plugin = "...", or choose a system that has one',
         )
-    found: VirtualRig = planting.virtual_rig(names, model)
-    return found
+    rig: VirtualRig = make(names, model)
+    return rig
 
 
 class RecordedSets(VirtualRig, Protocol):
     """Sets that were recorded, of which somebody says what is wrong in them.
 
-    A companion has them in its module `recorded`, which it reads by
-    `recorded_sets(folders) -> RecordedSets`.
+    A plugin reads them by its `recorded_sets(folders) -> RecordedSets`.
     """
 
     @property
@@ -99,15 +97,15 @@ def read_recorded_sets(system: System, folders: Sequence[Path]) -> RecordedSets:
     Raises
     ------
     InputError
-        If the system's companion reads none, or a folder is not understood.
+        If the system's plugin reads none, or a folder is not understood.
     """
-    recorded = companion_part(system.companion, "recorded")
-    if recorded is None:
+    read = load(find_plugin(system.plugin).recorded_sets)
+    if read is None:
         raise InputError(
             where=f"{system.source}, --recorded",
-            found="no companion that reads what is wrong in recorded sets",
-            expected="a Python package with a module 'recorded'",
+            found="no plugin that reads what is wrong in recorded sets",
+            expected="a plugin with 'recorded_sets'",
             remedy="leave --recorded out: sets are made on the virtual rig",
         )
-    found: RecordedSets = recorded.recorded_sets(folders)
-    return found
+    sets: RecordedSets = read(folders)
+    return sets

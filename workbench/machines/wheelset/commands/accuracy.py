@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.metadata import version
 
 from workbench.cli.inputs import given_cases
-from workbench.cli.output import Done, Output, read_result
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.machines.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
 from workbench.machines.wheelset.accuracy_page import write_accuracy_page
@@ -27,7 +27,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Judge the estimators."""
     system = load_system(options.system)
     # Of a wheelset, which has no like parts, the block filter is the extended one.
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         page = write_accuracy_page(system, summary, stops, options.out)
     output.result(f"to read: {page}; every stop: accuracy.csv, accuracy.json beside it")
     units = {name: quantity["unit"] for name, quantity in summary["quantities"].items()}
-    return Done(summary, units, page=page)
+    return CommandResult(summary, units, page=page)
 
 
 def _stops(options: argparse.Namespace, system: System) -> list[Case]:

@@ -9,9 +9,10 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.cli.output import Done, Output
+from workbench.cli.output import CommandResult, Output
 from workbench.cli.planted import make_planted
 from workbench.errors import InputError
+from workbench.machines.wheelset import PLUGIN
 from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     ORDINARY_PADS,
@@ -29,10 +30,9 @@ from workbench.machines.wheelset.rig import (
 from workbench.models.fmu import CoSimulation
 from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
+from workbench.system.plugins import find_plugin
 from workbench.system.registry import load_system, model_path
 from workbench.system.system import REFERENCE, System
-
-COMPANION = "workbench.machines.wheelset"
 
 
 def _listed() -> str:
@@ -55,14 +55,14 @@ effects, zero if not given:
   Ordinary pads have {pads}."""
 
 
-def run(options: argparse.Namespace, output: Output) -> Done:
+def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make the recordings, or list what can be made."""
     system = load_system(options.system)
-    if system.companion != COMPANION:
+    if find_plugin(system.plugin) is not PLUGIN:
         return _of_another(options, output, system)
     if options.list:
         output.result(_listed())
-        return Done(
+        return CommandResult(
             {
                 "scenarios": {name: scenario.title for name, scenario in SCENARIOS.items()},
                 "effects": {
@@ -77,8 +77,8 @@ def run(options: argparse.Namespace, output: Output) -> Done:
         return _recorded(options, output, system, scenarios, effects)
 
 
-def _of_another(options: argparse.Namespace, output: Output, system: System) -> Done:
-    """What another machine's companion makes, which has nothing of this rig's own."""
+def _of_another(options: argparse.Namespace, output: Output, system: System) -> CommandResult:
+    """What another machine's plugin makes, which has nothing of this rig's own."""
     own = {"next": None, "pads": "ordinary", "rate": 200, "truth_every": 1}
     for name, usual in own.items():
         if getattr(options, name) != usual:
@@ -97,7 +97,7 @@ def _recorded(
     system: System,
     scenarios: Sequence[Scenario],
     effects: Effects,
-) -> Done:
+) -> CommandResult:
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
     fmu = options.reference or model_path(system, REFERENCE)
     with CoSimulation(fmu):
@@ -120,7 +120,7 @@ def _recorded(
     kept = sum(task.done() and not task.cancelled() for task in tasks)
     output.result(f"{kept} of {len(tasks)} cases in {options.out}")
     status = 130 if interrupted else 0
-    return Done({"out": options.out, "cases": kept, "of": len(tasks)}, status=status)
+    return CommandResult({"out": options.out, "cases": kept, "of": len(tasks)}, status=status)
 
 
 @dataclass(frozen=True)

@@ -117,4 +117,4 @@ def _adhesion(fmu: FMU, system: System, values: Matrix) -> NDArray[np.bool_]:
 
 
 # By estimated quantity: where an estimate, (n, w), is one, (n,).
-CLAIMS = {"muWR": _adhesion}
+VALIDITY = {"muWR": _adhesion}
