@@ -18,7 +18,7 @@ import hashlib
 from pathlib import Path
 import numpy as np
 from workbench import Plugin
-from workbench.recordings.datasets import FolderLayout, Published, PublishedRecording
+from workbench.recordings.datasets import FolderLayout, PublishedSet, PublishedRecording
 
 def read(folder):
     names = (folder / "pumps.txt").read_text().split()
@@ -33,7 +33,7 @@ def layout(names):
     return FolderLayout("a list", {"pumps.txt": checksum}, read)
 
 PLUGIN = Plugin(published=f"{__name__}:PUBLISHED")
-PUBLISHED = Published("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
+PUBLISHED = PublishedSet("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
 """
 
 

@@ -1,4 +1,4 @@
-"""PublishedSet recordings become case folders: the publisher's own files, checked by their checksums.
+"""Published recordings become case folders: the publisher's own files, checked by their checksums.
 
 The workbench holds none of them. What it knows of a set is a `PublishedSet`, which a system's
 plugin has as `published`.
