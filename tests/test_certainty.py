@@ -22,9 +22,9 @@ from workbench.diagnosis import build_everything, read_effects
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.certainty import assess
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.selection import anew
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 from workbench.system.registry import load_system
 
@@ -121,21 +121,21 @@ def fits(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fit]]:
             y = SCALE * u + law(u) + NOISE * rng.standard_normal(t.size)
             columns = {"time [s]": t, "u [m]": u, "y [N]": y}
             cases.append(case_from_frame(system, pd.DataFrame(columns), name=f"{period:g} s"))
-        opened.append(Simulations(ModelSource(path, system, {}), cases))
+        opened.append(ResidualModel(ModelSource(path, system, {}), cases))
         fits[name] = Fit(opened[-1], effects)
     yield fits
     for one in opened:
         one.__exit__(None, None, None)
 
 
-def begun(fit: Fit, name: str, size: float) -> Fitted:
+def begun(fit: Fit, name: str, size: float) -> FittedModel:
     """A fit with one effect that begins at a size."""
     effect = fit.unknowns.effects[name]
     point = replace(fit.unknowns.start(), sizes={(name, effect.label): size})
     return anew(fit, point, (effect,))
 
 
-def least(fit: Fit, best: Fitted, size: float) -> float:
+def least(fit: Fit, best: FittedModel, size: float) -> float:
     """Chi-squared with the size held, as a search over the scale finds it without derivatives."""
     (key,), (level,) = best.point.sizes, best.point.levels
 

@@ -22,7 +22,7 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.problem import Problem
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, Effects, plant, select
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
@@ -99,7 +99,7 @@ def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
     def run(cases: Sequence[Case], system: System = SYSTEM) -> Diagnosis:
         effects = catalogue(system, LIBRARY)
         # Alone: the tests themselves run side by side.
-        with Simulations(ModelSource(everything, system, {}), cases) as simulations:
+        with ResidualModel(ModelSource(everything, system, {}), cases) as simulations:
             return conclude(Fit(simulations, effects), effects, lambda _: None)
 
     return run
@@ -235,7 +235,7 @@ def test_stops_by_one_clock_show_none_that_is_late(
     clock = next(one for one in catalogue(SYSTEM, LIBRARY) if "omegaW" in one.late)
     ratios = []
     for cases in (clean, *(recorded(tmp_path / str(seed), Effects(), seed) for seed in (32, 33))):
-        with Simulations(ModelSource(everything, SYSTEM, {}), cases) as simulations:
+        with ResidualModel(ModelSource(everything, SYSTEM, {}), cases) as simulations:
             fit = Fit(simulations, [clock])
             nominal = anew(fit, fit.unknowns.start(), ())
             lin = fit.linearise(nominal.linearised, (), [(clock, {})])

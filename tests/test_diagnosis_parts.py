@@ -24,7 +24,7 @@ from workbench.diagnosis.effects.extension import (
     variables,
 )
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised, Point, slowness
+from workbench.diagnosis.inference.linearized import LinearizedPoint, Point, slowness
 from workbench.diagnosis.inference.quadratic import (
     Joint,
     Quadratic,
@@ -34,13 +34,18 @@ from workbench.diagnosis.inference.quadratic import (
     minimum,
     minimum_within,
 )
+from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import extended, joined
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import SOUND
-from workbench.diagnosis.inference.trial import Prospect
-from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
-from workbench.diagnosis.simulation.simulator import Evidence, Simulated, delay, simulating
+from workbench.diagnosis.simulation.residual_model import ResidualModel
+from workbench.diagnosis.simulation.simulator import (
+    SimulatorSetup,
+    WhitenedResiduals,
+    delay,
+    simulating,
+)
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.modelica import read_library
@@ -123,9 +128,9 @@ def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(
     )
     speeds = replace(case.without(["Fx"]), name="speeds")
     values = {"muWR": 0.4}
-    with Simulations(ModelSource(everything, SYSTEM, {}), [case, speeds]) as both:
+    with ResidualModel(ModelSource(everything, SYSTEM, {}), [case, speeds]) as both:
         told, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
-    with Simulations(ModelSource(everything, SYSTEM, {}), [speeds]) as alone:
+    with ResidualModel(ModelSource(everything, SYSTEM, {}), [speeds]) as alone:
         (without,) = alone.at([values])
     assert silent.blocks.tolist() == [*without.blocks, 0]
     assert np.array_equal(silent.errors[:, :2], without.errors)
@@ -396,11 +401,13 @@ def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> 
     np.testing.assert_allclose([*step, *np.concatenate(local)], best, rtol=1e-5, atol=1e-7)
 
 
-def linearised(errors: Matrix) -> Linearised:
-    evidence = (
-        Evidence(errors, 0.0, np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))),
+def linearised(errors: Matrix) -> LinearizedPoint:
+    residuals = (
+        WhitenedResiduals(
+            errors, 0.0, np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))
+        ),
     )
-    return Linearised(Point({}, {}, np.zeros((1, 5)), {}), (), evidence, 20, np.ones(3), 0.0)
+    return LinearizedPoint(Point({}, {}, np.zeros((1, 5)), {}), (), residuals, 20, np.ones(3), 0.0)
 
 
 def test_deviance_is_chi_squared_where_errors_are_noise() -> None:
@@ -462,7 +469,7 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
     cases = read_cases([ROOT / "cases" / name for name in named], SYSTEM)
 
     def asked(of: list[Case]) -> tuple[list[bool], list[bool], list[float | None], str]:
-        with Simulations(ModelSource(everything, SYSTEM, {}), of) as simulations:
+        with ResidualModel(ModelSource(everything, SYSTEM, {}), of) as simulations:
             fit = Fit(simulations, EFFECTS)
             point = replace(fit.unknowns.start(), sizes={("WaterFilm", "film"): 0.3})
             values = fit.unknowns.values(point)
@@ -506,7 +513,7 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
 def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
-    with simulating(Simulated(MINIMAL, SYSTEM, (samples,))) as simulator:
+    with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
         with FMU(MINIMAL) as fmu:
             nominal = {name: fmu.defaults[name] for name in steps} | point
         found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
@@ -525,7 +532,7 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
 
 def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
-    with simulating(Simulated(MINIMAL, SYSTEM, (samples,))) as simulator:
+    with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
         # An inertia less than none: the wheel runs away from what presses it on, yet stays a
         # number.
         runaway = {**point, "JW": -55.0}
@@ -539,17 +546,17 @@ def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything:
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
     values = given_values(everything, SYSTEM)
 
-    def evidence(case: Case, model: OpenModel | None) -> Evidence:
-        with Simulations(
+    def residuals(case: Case, model: OpenModel | None) -> WhitenedResiduals:
+        with ResidualModel(
             ModelSource(everything, SYSTEM, values), [case], model=model
         ) as simulations:
             fit = Fit(simulations, [inertia])
-            (found,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).evidence
+            (found,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).residuals
         return found
 
     with opened(ModelSource(everything, SYSTEM, values)) as model:
         for case in (noisy(6), noisy(7)):
-            alone, shared = evidence(case, None), evidence(case, model)
+            alone, shared = residuals(case, None), residuals(case, model)
             np.testing.assert_array_equal(shared.errors, alone.errors)
             np.testing.assert_array_equal(shared.jacobian, alone.jacobian)
 
@@ -557,14 +564,14 @@ def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything:
 def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None:
     """An effect is given up, and not the diagnosis, where a step leads beyond what a model can."""
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
-    with Simulations(
+    with ResidualModel(
         ModelSource(everything, SYSTEM, given_values(everything, SYSTEM)), [noisy(6)]
     ) as simulations:
         fit = Fit(simulations, [inertia])
         nominal = anew(fit, fit.unknowns.start(), ())
         # Half the inertia is a machine; less than none is not, though its motion stays finite.
         half, none = (
-            Prospect(inertia, {}, size, 0.1, {}, 0.0, 0.0, 0.0, np.zeros(1), np.zeros(0))
+            CandidateScore(inertia, {}, size, 0.1, {}, 0.0, 0.0, 0.0, np.zeros(1), np.zeros(0))
             for size in (-0.5, -1.5)
         )
         assert extended(fit, nominal, half, rounds=1) is not None
@@ -578,7 +585,7 @@ def test_states_of_effects_that_are_absent_change_no_derivative(everything: Path
     present = {variables(fade, "fade")[0]: 4e-4, "muWR": 0.4}
     columns = [Variation((name,)) for name in ("muDC", "Fz", "JW")]
     samples = ready(simulated(everything, present))
-    with simulating(Simulated(everything, SYSTEM, (samples,))) as simulator:
+    with simulating(SimulatorSetup(everything, SYSTEM, (samples,))) as simulator:
         values = {delay("Fx"): 0.002, **present}
         every = simulator.derivatives(0, values, columns)
         less = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
@@ -613,7 +620,7 @@ def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path: P
     path = tmp_path / "AllEffects.fmu"
     build_everything(system, library, effects, path)
     name = "outlet.risingLeak.rate"
-    with Simulations(ModelSource(path, system, given_values(path, system)), cases) as simulations:
+    with ResidualModel(ModelSource(path, system, given_values(path, system)), cases) as simulations:
         unknowns = Fit(simulations, effects).unknowns
         (values,) = unknowns.values(unknowns.start())
         sizes = sizes_by_component(effects)

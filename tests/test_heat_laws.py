@@ -16,12 +16,12 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.laws.forms import WrittenForm, candidates
+from workbench.diagnosis.laws.forms import ClosedForm, candidates
 from workbench.diagnosis.laws.places import CLOCK, Place, laws, places
 from workbench.diagnosis.laws.scan import watching
 from workbench.diagnosis.laws.splines import Knots
 from workbench.diagnosis.laws.writing import extended_library
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.fmu import FMU
 from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case
@@ -53,7 +53,7 @@ def braking(pads: Place) -> tuple[Vector, dict[str, Vector]]:
     return time, {f"padFriction.{name}": course for name, course in watched.items()}
 
 
-def of_heat(pads: Place) -> dict[float, WrittenForm]:
+def of_heat(pads: Place) -> dict[float, ClosedForm]:
     """Laws in proportion to heat, that multiply the coefficient, by time constant [s]."""
     found = {}
     for law in laws(pads, [braking(pads)], 0.25):
@@ -88,7 +88,7 @@ def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
     build(extended, "Heat", text, path, every_platform=False)
     with FMU(path) as fmu:
         (clock,) = (name for name in fmu.states if name.endswith(CLOCK))
-    with Simulations(
+    with ResidualModel(
         ModelSource(path, system, given_values(path, system)), [dry_case]
     ) as simulations:
         unknowns = Fit(simulations, [own]).unknowns

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Thresholds
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.system.registry import load_system
@@ -104,7 +104,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
         of = block(tmp_path / name, more)
         effects, path = library_effects(of), tmp_path / f"{name}.fmu"
         build_everything(of, effects, path)
-        with Simulations(ModelSource(path, of, of.given), cases(of, [frame])) as simulations:
+        with ResidualModel(ModelSource(path, of, of.given), cases(of, [frame])) as simulations:
             variances.append(simulations.recordings[0].whitening[-1, 0, 0] ** -2)
             size = of.comparison.block
     moved = steady(0.5 * (1.0 + share)) - steady(0.5)
@@ -122,7 +122,7 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: P
     build_everything(of, effects, path)
     steps = {}
     for name, system in (("free", of), ("known", known)):
-        with Simulations(
+        with ResidualModel(
             ModelSource(path, system, system.given), cases(system, [warm])
         ) as simulations:
             fit = Fit(simulations, effects)

@@ -22,8 +22,8 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.laws.periods import strongest_period
 from workbench.diagnosis.laws.places import LawInfluence, places
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
-from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Variation
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 from workbench.recordings.case import read_cases
 from workbench.studies.power.left_out import SHARES, summarise_left_out
@@ -336,7 +336,7 @@ def test_a_law_acts_as_its_class_does(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "AllEffects.fmu"
     build_everything(system, library, [seepage], path)
     given = given_values(path, system)
-    with Simulations(ModelSource(path, system, given), cases) as simulations:
+    with ResidualModel(ModelSource(path, system, given), cases) as simulations:
         values = Fit(simulations, [seepage]).unknowns
         points = values.values(values.start())
         column = Variation(variables(seepage, "k"))

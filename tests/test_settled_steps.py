@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
 
@@ -67,7 +67,9 @@ def test_a_fading_swing_leaves_noise_alone(samples: int, fine: bool, tmp_path: P
     path = tmp_path / "Mass.fmu"
     build_here(tmp_path / "package.mo", "Swing.Mass", path)
     values = {"w": omega, "a": FADES, "y": 1.0, "v": 0.0}
-    with Simulations(ModelSource(path, system, values), read_cases([case], system)) as simulations:
+    with ResidualModel(
+        ModelSource(path, system, values), read_cases([case], system)
+    ) as simulations:
         assert (simulations.simulated.parts > 1) == fine
         ((rms,), _) = simulations.at([values])[0].sizes
     # Noise of a thousand samples is known to 2.2 %; steps may add a thousandth of its square.

@@ -16,9 +16,9 @@ from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.verdict import conclude
-from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Predictor
-from workbench.diagnosis.simulation.simulator import Simulated, simulating
+from workbench.diagnosis.simulation.residual_model import ResidualModel
+from workbench.diagnosis.simulation.simulator import SimulatorSetup, simulating
 from workbench.machines.wheelset.rig import SCENARIOS, Effects, Scenario
 from workbench.machines.wheelset.rig.scenarios import Patch
 from workbench.models.fmu import FMU, CoSimulation
@@ -120,9 +120,9 @@ def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
     judged = tuple(replace(signal, mode=None) for signal in system.reference_signals)
     system = replace(system, reference_signals=judged)
     samples = ready(sliding(1.0), system)
-    with simulating(Simulated(MINIMAL, system, (samples,))) as simulator:
+    with simulating(SimulatorSetup(MINIMAL, system, (samples,))) as simulator:
         weighed = simulator.weighed(0, WET)
-    with simulating(Simulated(MINIMAL, system, (weighed,))) as simulator:
+    with simulating(SimulatorSetup(MINIMAL, system, (weighed,))) as simulator:
         errors = simulator.at(0, WET).errors
     spans = weighed.restarted
     # Of some 150 blocks, the standard deviation of a mean square is an eighth; the noise itself is
@@ -130,7 +130,7 @@ def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
     squares = np.square(errors[spans]).mean(axis=0)
     assert squares[:2] == pytest.approx([1.0] * 2, abs=0.45)
     assert squares[2] < 2.0
-    with simulating(Simulated(MINIMAL, system, (samples,))) as simulator:
+    with simulating(SimulatorSetup(MINIMAL, system, (samples,))) as simulator:
         unweighed = simulator.at(0, WET).errors
     assert np.square(unweighed[spans])[:, 0].mean() > 3.0
 
@@ -150,7 +150,7 @@ def diagnosed(
 ) -> tuple[Diagnosis, list[dict[str, int]]]:
     for scenario in scenarios:
         record(scenario, seed, effects, folder / scenario.name)
-    with Simulations(
+    with ResidualModel(
         ModelSource(everything, SYSTEM, {}), read_cases([folder], SYSTEM)
     ) as simulations:
         found = conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)

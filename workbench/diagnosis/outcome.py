@@ -19,9 +19,9 @@ from workbench.diagnosis.inference.certainty import Certainty
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.diagnosis.inference.sample_errors import Errors
+from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import Step
-from workbench.diagnosis.inference.timing import Late
-from workbench.diagnosis.inference.trial import Prospect
+from workbench.diagnosis.inference.timing import LateSignals
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
 from workbench.observers.simulation import CaseResult, case_figure
@@ -303,7 +303,7 @@ class Outcome:
 
     def _lasting_errors(self) -> dict[str, dict[str, float]]:
         before, after = (
-            one.linearised.inflation for one in (self.diagnosis.base, self.diagnosis.best)
+            one.linearised.variance_factors for one in (self.diagnosis.base, self.diagnosis.best)
         )
         return {
             channel.name: {"before": float(b), "after": float(a)}
@@ -311,7 +311,7 @@ class Outcome:
         }
 
 
-def _late(late: Late) -> str:
+def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
     if not late.signals:
         return "several signals are late by different times; say in [loggers] which share a logger"
@@ -382,7 +382,7 @@ def _model(extension: Extension | None) -> dict[str, Any]:
     }
 
 
-def _candidate(score: Prospect) -> dict[str, Any]:
+def _candidate(score: CandidateScore) -> dict[str, Any]:
     return {
         "effect": score.effect.name,
         "shape": dict(score.shape),
@@ -417,7 +417,7 @@ _ROOM = 1.1  # of a panel over its largest value
 
 
 @dataclass(frozen=True, eq=False)
-class Lasting:
+class LastingErrors:
     """Prediction errors of a recording that last some blocks, at the middle of each.
 
     Attributes
@@ -444,7 +444,7 @@ def lasting_blocks(system: System) -> int:
     return max(1, round(0.5 * system.comparison.lasting / system.comparison.block))
 
 
-def lasting(residuals: Residuals, span: int) -> Lasting:
+def lasting(residuals: Residuals, span: int) -> LastingErrors:
     """Running means over a number of blocks, none across what was set aside."""
     before, after, sigma = (np.empty_like(residuals.sigma) for _ in range(3))
     for run in _runs(residuals.block_time):
@@ -457,7 +457,7 @@ def lasting(residuals: Residuals, span: int) -> Lasting:
         sigma[run] = np.sqrt(_sums(residuals.sigma[run] ** 2, span)) / _sums(
             np.ones_like(residuals.sigma[run]), span
         )
-    return Lasting(before, after, sigma)
+    return LastingErrors(before, after, sigma)
 
 
 def at_blocks(residuals: Residuals) -> dict[str, Vector]:
@@ -663,7 +663,7 @@ def _measured(
 
 def _errors(
     channel: Channel,
-    errors: Lasting,
+    errors: LastingErrors,
     column: int,
     extended: bool,
     parted: Callable[[Vector], Vector],
@@ -698,7 +698,9 @@ def _symmetric(
     return Panel(f"{title} [{unit}]", unit, -reach, reach, height, tuple(curves))
 
 
-def _finding(channels: Sequence[Channel], errors: Lasting, extension: str, seconds: float) -> str:
+def _finding(
+    channels: Sequence[Channel], errors: LastingErrors, extension: str, seconds: float
+) -> str:
     """Errors of each channel in units of their noise, and the largest in its own unit."""
     before, after = errors.noises()
     worst = int(np.argmax(before))

@@ -20,7 +20,7 @@ from workbench.diagnosis.inference.sample_errors import errors_of, held_out_erro
 from workbench.diagnosis.inference.verdict import Diagnosis, conclude
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.problem import Problem
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import delay, simulating
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
@@ -64,7 +64,7 @@ def diagnose(
         report(f"compiling {len(effects)} effects")
         build_everything(system, problem.library, effects, everything)
         source = ModelSource(everything, system, given_values(everything, system))
-        with Simulations(source, problem.cases, engine) as simulations:
+        with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
             base, best = diagnosis.base, diagnosis.best
@@ -165,7 +165,7 @@ class _Found:
 
     problem: Problem
     engine: Engine
-    simulations: Simulations
+    simulations: ResidualModel
     fit: Fit
     diagnosis: Diagnosis
 
@@ -195,14 +195,14 @@ class _Found:
         read = {*(delay(name) for name in system.signals), *late_signals(system)}
         points = self.fit.unknowns.values(best.point)
         with simulating(simulations.simulated._replace(path=path, system=system)) as extended:
-            for k, evidence in enumerate(best.linearised.evidence):
+            for k, residuals in enumerate(best.linearised.residuals):
                 known = {
                     name: value
                     for name, value in points[k].items()
                     if name in extended.parameters or name in read
                 }
                 errors = extended.at(k, known).errors
-                difference = max(difference, float(np.abs(errors - evidence.errors).max()))
+                difference = max(difference, float(np.abs(errors - residuals.errors).max()))
         return Extension(modelica, path, difference)
 
     def _values(self) -> dict[str, dict[str, float]]:

@@ -20,7 +20,7 @@ _EARLY = 50  # samples at usual rates, before anything is applied
 
 
 @dataclass(frozen=True, eq=False)
-class Counted:
+class CountedSamples:
     """The signals of a recording made clean, and which samples count.
 
     Attributes
@@ -65,7 +65,7 @@ class Counted:
 
 def count(
     case: Case, system: System, names: Sequence[str], sound: Soundness, *, restarting: bool
-) -> Counted:
+) -> CountedSamples:
     """Tell which samples of a recording count, by these signals.
 
     Parameters
@@ -104,7 +104,7 @@ def count(
     refuse_too_short(case, system, blocks, excluded)
     deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
     missing = int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1)))
-    return Counted(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
+    return CountedSamples(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
 
 
 def refuse_too_few(cases: Sequence[Case], system: System) -> None:

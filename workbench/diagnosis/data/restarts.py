@@ -12,7 +12,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.diagnosis.data.cleaning import Mask, runs
-from workbench.diagnosis.data.counting import Counted
+from workbench.diagnosis.data.counting import CountedSamples
 from workbench.diagnosis.data.whitening import parts_of_noise
 from workbench.system.system import System
 
@@ -33,7 +33,7 @@ class Restarts:
     uncertain: Mapping[str, float]
 
 
-def restarts_of(system: System, counted: Counted) -> Restarts | None:
+def restarts_of(system: System, counted: CountedSamples) -> Restarts | None:
     """Restarts before each block that would not count otherwise, or None if all would.
 
     Where such a span goes on without blocks, there are as many.

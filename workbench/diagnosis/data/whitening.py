@@ -7,7 +7,7 @@ from scipy.optimize import nnls
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, deviation_of
-from workbench.diagnosis.data.counting import Counted
+from workbench.diagnosis.data.counting import CountedSamples
 from workbench.system.system import System
 
 _NEAR = 5  # blocks, of which a jump and its ringing are one
@@ -15,7 +15,7 @@ _NEAR = 5  # blocks, of which a jump and its ringing are one
 
 def whitening(
     system: System,
-    counted: Counted,
+    counted: CountedSamples,
     signals: tuple[str, ...],
     slopes: Matrix,
     ahead: NDArray[np.float64],
@@ -71,7 +71,7 @@ def _ringing(means: Vector, late: float) -> Vector:
     return found
 
 
-def _growing(channel: Vector, signal: Vector, counted: Counted, least: float) -> Vector:
+def _growing(channel: Vector, signal: Vector, counted: CountedSamples, least: float) -> Vector:
     """Variance of a channel's samples in each block, part of which grows with a signal, (b,)."""
     fixed, share = parts_of_noise(channel, signal, counted.usable)
     means = np.array([np.abs(signal[first:end]).mean() for first, end in counted.blocks])

@@ -8,7 +8,7 @@ from workbench.errors import InputError, closest
 
 
 @dataclass(frozen=True)
-class Said:
+class AnnotationReader:
     """Part of an annotation, whose keys are asked for by type.
 
     Attributes
@@ -54,10 +54,10 @@ class Said:
             raise self._wrong(key, expected)
         return values
 
-    def part(self, key: str) -> "Said":
+    def part(self, key: str) -> "AnnotationReader":
         """What stands in its parentheses."""
         content = self._of(key, dict, f"{key}(...)", None)
-        return Said(f"{self.where}({key})", content)
+        return AnnotationReader(f"{self.where}({key})", content)
 
     def _array(self, key: str, of: type, expected: str) -> tuple[Any, ...]:
         values = tuple(self._of(key, tuple, expected, None))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.arrays import Matrix
-from workbench.diagnosis.effects.annotation import Said
+from workbench.diagnosis.effects.annotation import AnnotationReader
 from workbench.diagnosis.effects.slots import Slot, read_slots
 from workbench.errors import InputError, closest
 from workbench.models.modelica import Class, Library
@@ -155,7 +155,7 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
     for one in library.classes.values():
         if not one.name.startswith(f"{library.name}."):
             continue
-        said = Said(f"{one.where}, __Workbench", one.vendor)
+        said = AnnotationReader(f"{one.where}, __Workbench", one.vendor)
         said.only("effect")
         if "effect" not in one.vendor:
             continue
@@ -222,7 +222,7 @@ def _placed(library: Library, effect: Effect) -> list[Effect]:
     return [replace(effect, name=name, place=k, places=int(count)) for k, name in names]
 
 
-def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Effect:
+def _read(library: Library, slots: Sequence[Slot], one: Class, said: AnnotationReader) -> Effect:
     said.only(
         *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
         *("where", "unless", "falling", "restarted"),
@@ -232,7 +232,7 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Ef
         size = _TURNING[0]
     else:
         size = said.text("size")
-    shapes = said.part("shapes") if "shapes" in said.content else Said(said.where, {})
+    shapes = said.part("shapes") if "shapes" in said.content else AnnotationReader(said.where, {})
     effect = Effect(
         name=one.name.rpartition(".")[2],
         model=one.name,
@@ -253,7 +253,9 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> Ef
     return effect
 
 
-def _slots(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> tuple[str, ...]:
+def _slots(
+    library: Library, slots: Sequence[Slot], one: Class, said: AnnotationReader
+) -> tuple[str, ...]:
     extended = library.ancestors(one.name)
     # A class that adds inputs to the partial class of a slot is for one that has them.
     parts = library.components(one.name).items()
@@ -281,7 +283,7 @@ def _slots(library: Library, slots: Sequence[Slot], one: Class, said: Said) -> t
     return tuple(name for name in fitting if name in chosen)
 
 
-def _where(said: Said) -> Where | None:
+def _where(said: AnnotationReader) -> Where | None:
     if "where" not in said.content:
         return None
     part = said.part("where")
@@ -289,7 +291,7 @@ def _where(said: Said) -> Where | None:
     return Where(part.text("condition"), part.text("is"), part.text("share", ""))
 
 
-def _unless(said: Said) -> Unless | None:
+def _unless(said: AnnotationReader) -> Unless | None:
     if "unless" not in said.content:
         return None
     part = said.part("unless")
@@ -297,7 +299,7 @@ def _unless(said: Said) -> Unless | None:
     return Unless(part.text("condition"), part.text("is"), part.text("because"))
 
 
-def _falling(said: Said) -> Falling | None:
+def _falling(said: AnnotationReader) -> Falling | None:
     if "falling" not in said.content:
         return None
     part = said.part("falling")
@@ -305,7 +307,7 @@ def _falling(said: Said) -> Falling | None:
     return Falling(part.text("signal"), part.text("because"))
 
 
-def _restarted(said: Said) -> str:
+def _restarted(said: AnnotationReader) -> str:
     if "restarted" not in said.content:
         return ""
     part = said.part("restarted")

@@ -15,9 +15,9 @@ import numpy as np
 
 from workbench.arrays import Matrix
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised, Point
+from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import ROUNDS, Fitted, differentiable, fitted
+from workbench.diagnosis.inference.search import ROUNDS, FittedModel, differentiable, fitted
 from workbench.runtime.engine import Reporter
 from workbench.system.units import BAND
 
@@ -97,12 +97,12 @@ class Certainty:
         }
 
 
-def assess(fit: Fit, best: Fitted, report: Reporter) -> Certainty:
+def assess(fit: Fit, best: FittedModel, report: Reporter) -> Certainty:
     """Ask how sure the sizes of a fit are."""
     report("sizes held, and fits from elsewhere")
     # A fit ends where a step is not worth one: the last of it would be missing in every rise.
     lin = fit.linearise(fit.refine(best.linearised, best.active, 1), best.active)
-    joint = fit.quadratics(replace(lin, inflation=lin.spread))
+    joint = fit.quadratics(replace(lin, variance_factors=lin.spread))
     spread = joint.covariance()
     sigma = np.sqrt(np.diag(spread))
     reach = {key: BAND * float(sigma[joint.shared.index(key)]) for key in lin.point.sizes}
@@ -126,7 +126,9 @@ def _bounds(fit: Fit, key: Key) -> tuple[float, float]:
     return fit.unknowns.bounds(effect, effect.size if key[1] == effect.label else key[1])
 
 
-def _end(fit: Fit, best: Fitted, lin: Linearised, side: tuple[Key, float]) -> float | None:
+def _end(
+    fit: Fit, best: FittedModel, lin: LinearizedPoint, side: tuple[Key, float]
+) -> float | None:
     """Where chi-squared has risen as far as 95 % allow; held there as the derivatives have it."""
     (key, step), value = side, lin.point.sizes[side[0]]
     low, high = _bounds(fit, key)
@@ -162,7 +164,7 @@ def _elsewhere(fit: Fit, point: Point) -> Sequence[Point]:
     return starts
 
 
-def _behind(fit: Fit, best: Fitted, lin: Linearised, point: Point) -> float | None:
+def _behind(fit: Fit, best: FittedModel, lin: LinearizedPoint, point: Point) -> float | None:
     """Chi-squared that a fit from a point leaves beyond the best."""
     start = fit.tried(point)
     if start is None:

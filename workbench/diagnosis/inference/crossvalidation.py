@@ -11,9 +11,9 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import lasting
+from workbench.diagnosis.inference.linearized import lasting
 from workbench.diagnosis.inference.quadratic import Quadratic, add, minimum
-from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.inference.search import FittedModel
 
 _ROUNDS = 3  # of a fit without one part, which begins where all parts were fitted
 
@@ -23,9 +23,9 @@ class CrossValidation:
 
     def __init__(self, fit: Fit) -> None:
         self._fit = fit
-        self._known: dict[int, tuple[Fitted, list[Matrix]]] = {}
+        self._known: dict[int, tuple[FittedModel, list[Matrix]]] = {}
 
-    def squares(self, fitted: Fitted, *, fast: bool) -> Vector:
+    def squares(self, fitted: FittedModel, *, fast: bool) -> Vector:
         """Mean square of errors of each recording, fitted to the others, (K,); noise leaves 1.
 
         Parameters
@@ -42,28 +42,28 @@ class CrossValidation:
             ]
         )
 
-    def explained(self, less: Fitted, best: Fitted, *, fast: bool) -> tuple[float, float]:
+    def explained(self, less: FittedModel, best: FittedModel, *, fast: bool) -> tuple[float, float]:
         """Share of the explainable by which two fits differ; mean square error of the first."""
         before, after = (float(self.squares(one, fast=fast).mean()) for one in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
-    def _told(self, fitted: Fitted) -> list[Mask]:
+    def _told(self, fitted: FittedModel) -> list[Mask]:
         """Channels that are told, of each recording or part."""
-        told = [evidence.blocks > 0 for evidence in fitted.linearised.evidence]
+        told = [residuals.blocks > 0 for residuals in fitted.linearised.residuals]
         return told * self._fit.parts if self._fit.unknowns.count == 1 else told
 
-    def _errors(self, fitted: Fitted) -> list[Matrix]:
+    def _errors(self, fitted: FittedModel) -> list[Matrix]:
         if self._fit.unknowns.count == 1:
             return self._fit.together(partial(self._refitted, fitted), range(self._fit.parts))
         return self._extrapolated(fitted)
 
-    def _refitted(self, fitted: Fitted, part: int) -> Matrix:
+    def _refitted(self, fitted: FittedModel, part: int) -> Matrix:
         """Whitened errors of one part, after a fit without it: laws may bend much within one."""
         hidden = self._fit.without(part)
         lin = hidden.refine(hidden.hide(fitted.linearised), fitted.active, _ROUNDS)
-        return self._fit.at(lin.point).evidence[0].errors[self._fit.blocks_of(part)]
+        return self._fit.at(lin.point).residuals[0].errors[self._fit.blocks_of(part)]
 
-    def _extrapolated(self, fitted: Fitted) -> list[Matrix]:
+    def _extrapolated(self, fitted: FittedModel) -> list[Matrix]:
         """Whitened errors of each recording, by one step from the fit to all of them."""
         joint = self._fit.quadratics(self._fit.linearise(fitted.linearised, fitted.active))
         stops = joint.stops()
@@ -71,5 +71,5 @@ class CrossValidation:
         found = []
         for stop, system in zip(stops, joint.systems, strict=True):
             z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-            found.append(system.errors(z) * np.sqrt(fitted.linearised.inflation))
+            found.append(system.errors(z) * np.sqrt(fitted.linearised.variance_factors))
         return found

@@ -16,7 +16,13 @@ from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import own_clocks, reference
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
-from workbench.diagnosis.inference.linearised import Linearised, Point, between, lasting, slowness
+from workbench.diagnosis.inference.linearized import (
+    LinearizedPoint,
+    Point,
+    between,
+    lasting,
+    slowness,
+)
 from workbench.diagnosis.inference.quadratic import (
     Joint,
     Key,
@@ -26,9 +32,9 @@ from workbench.diagnosis.inference.quadratic import (
 )
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
 from workbench.diagnosis.inference.unknowns import SENSOR, Unknowns
-from workbench.diagnosis.simulation.evidence import Item, Result, Simulations
 from workbench.diagnosis.simulation.prediction import Variation
-from workbench.diagnosis.simulation.simulator import Evidence
+from workbench.diagnosis.simulation.residual_model import Item, ResidualModel, Result
+from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import FMUError, InputError
 from workbench.recordings.case import Case
 
@@ -60,7 +66,7 @@ class Fit:
 
     def __init__(
         self,
-        simulations: Simulations,
+        simulations: ResidualModel,
         effects: Sequence[Effect],
         decides: Thresholds | None = None,
         beside: Sequence[Case] = (),
@@ -112,14 +118,14 @@ class Fit:
         edges = part_edges(len(self._simulations.recordings[0].blocks), self.parts)
         return slice(edges[part], edges[part + 1])
 
-    def hide(self, lin: Linearised) -> Linearised:
+    def hide(self, lin: LinearizedPoint) -> LinearizedPoint:
         """The same, as if what is hidden from this fit had neither errors nor derivatives."""
-        return replace(lin, evidence=tuple(self._shown(lin.evidence)))
+        return replace(lin, residuals=tuple(self._shown(lin.residuals)))
 
-    def _shown(self, evidence: Sequence[Evidence]) -> Sequence[Evidence]:
+    def _shown(self, residuals: Sequence[WhitenedResiduals]) -> Sequence[WhitenedResiduals]:
         if self._hidden == slice(0):
-            return evidence
-        (one,) = evidence
+            return residuals
+        (one,) = residuals
         errors, jacobian = one.errors.copy(), one.jacobian.copy()
         errors[self._hidden] = 0.0
         jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
@@ -135,13 +141,15 @@ class Fit:
         """Blocks from which on an error is no noise."""
         return max(1, round(self._compare.lasting / self._compare.block))
 
-    def at(self, point: Point) -> Linearised:
+    def at(self, point: Point) -> LinearizedPoint:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
-        evidence = self._shown(self._simulations.at(self.unknowns.values(point)))
+        residuals = self._shown(self._simulations.at(self.unknowns.values(point)))
         known = self._prior(point, [*point.sizes, *point.levels])
         away = float(np.square(point.deviations).sum()) + known.c
-        slow, excess = slowness(evidence, self.lasting), self.decides.excess
-        return Linearised(point, self.delays, tuple(evidence), self.lasting, slow, away, excess)
+        slow, excess = slowness(residuals, self.lasting), self.decides.excess
+        return LinearizedPoint(
+            point, self.delays, tuple(residuals), self.lasting, slow, away, excess
+        )
 
     @property
     def restarted(self) -> list[int]:
@@ -149,13 +157,13 @@ class Fit:
         found = self._simulations.recordings
         return [k for k, one in enumerate(found) if one.restarted.any()]
 
-    def astray(self, lin: Linearised) -> list[int]:
+    def astray(self, lin: LinearizedPoint) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""
         found = []
-        for k, (recording, evidence) in enumerate(
-            zip(self._simulations.recordings, lin.evidence, strict=True)
+        for k, (recording, residuals) in enumerate(
+            zip(self._simulations.recordings, lin.residuals, strict=True)
         ):
-            errors = evidence.errors[recording.restarted]
+            errors = residuals.errors[recording.restarted]
             if not len(errors):
                 continue
             squares = lasting(errors, min(self.lasting, len(errors)))
@@ -168,10 +176,10 @@ class Fit:
         return found
 
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
-        """See `Simulations.count_restarted`; what was fitted before has to be fitted anew."""
+        """See `ResidualModel.count_restarted`; what was fitted before has to be fitted anew."""
         self._simulations.count_restarted(numbers, counting=counting)
 
-    def tried(self, point: Point) -> Linearised | None:
+    def tried(self, point: Point) -> LinearizedPoint | None:
         """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""
         try:
             return self.at(point)
@@ -180,10 +188,10 @@ class Fit:
 
     def linearise(
         self,
-        lin: Linearised,
+        lin: LinearizedPoint,
         active: Sequence[Effect],
         candidates: Sequence[tuple[Effect, Mapping[str, float]]] = (),
-    ) -> Linearised:
+    ) -> LinearizedPoint:
         """Add the derivatives that are not there yet.
 
         Parameters
@@ -213,7 +221,7 @@ class Fit:
         more = self._simulations.derivatives(values, list(missing.values()), sizes)
         return self.hide(lin.extended(missing, more))
 
-    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+    def quadratics(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.
 
         Parameters
@@ -238,16 +246,16 @@ class Fit:
         """Of a single recording, each long enough for an error that lasts."""
         return min(_PARTS, len(self._simulations.recordings[0].blocks) // self.lasting)
 
-    def apart(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+    def apart(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
         """As `quadratics`, in what is held out in turn."""
         return self.quadratics(lin, extra).apart(self.parts)
 
-    def _system(self, lin: Linearised, k: int, shared: Sequence[Key]) -> RecordingSystem:
+    def _system(self, lin: LinearizedPoint, k: int, shared: Sequence[Key]) -> RecordingSystem:
         point, case = lin.point, self._simulations.cases[k]
-        evidence = lin.evidence[k]
-        b, m = evidence.errors.shape
-        weight = np.append(np.tile(1.0 / np.sqrt(lin.inflation), b), 1.0)
-        at = {key: evidence.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
+        residuals = lin.residuals[k]
+        b, m = residuals.errors.shape
+        weight = np.append(np.tile(1.0 / np.sqrt(lin.variance_factors), b), 1.0)
+        at = {key: residuals.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + 1, len(shared))), []
         for j, key in enumerate(shared):
             if key in point.levels and key[1] == SENSOR:
@@ -273,7 +281,7 @@ class Fit:
         free = np.zeros((b * m + 1, 0))
         local = np.column_stack([free, *tolerances, *P])
         furthest = np.repeat([self.decides.furthest, _TURN], [len(tolerances), len(P)])
-        r, deviations = evidence.residual * weight, point.deviations[k]
+        r, deviations = residuals.residual * weight, point.deviations[k]
         return RecordingSystem(r, J, local, deviations, furthest, m)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
@@ -298,12 +306,12 @@ class Fit:
 
     def refine(
         self,
-        best: Linearised,
+        best: LinearizedPoint,
         active: Sequence[Effect],
         rounds: int,
         spread: Vector | None = None,
         held: Mapping[Key, float] = MappingProxyType({}),
-    ) -> Linearised:
+    ) -> LinearizedPoint:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
         Parameters
@@ -340,8 +348,12 @@ class Fit:
         return best
 
     def least(
-        self, best: Linearised, active: Sequence[Effect], inflation: Vector, right: float = np.inf
-    ) -> tuple[float, Linearised]:
+        self,
+        best: LinearizedPoint,
+        active: Sequence[Effect],
+        variance_factors: Vector,
+        right: float = np.inf,
+    ) -> tuple[float, LinearizedPoint]:
         """Least chi-squared, tolerances included, and its point, where derivatives may be missing.
 
         Gauss-Newton; a worse step is halved. Two small falls end it: in a bent valley one may be.
@@ -352,14 +364,21 @@ class Fit:
         inflation : (m,) variance of what is wrong in each channel over that of white noise.
         right : what a right model leaves, if known; noise moves what is beyond by twice its root.
         """
-        best, fall = self.linearise(replace(best, inflation=inflation), active), np.inf
+        best, fall = (
+            self.linearise(replace(best, variance_factors=variance_factors), active),
+            np.inf,
+        )
         least, point = self.quadratics(best).chi_squared, best.point
         for _ in range(_ROUNDS):
             best = self.linearise(best, active)
-            point = self.stepped(best, inflation, {}) if fall > 0.0 else between(best.point, point)
+            point = (
+                self.stepped(best, variance_factors, {})
+                if fall > 0.0
+                else between(best.point, point)
+            )
             before, fall = abs(fall), -np.inf
             if (tried := self.tried(point)) is not None:
-                tried = replace(tried, inflation=inflation)
+                tried = replace(tried, variance_factors=variance_factors)
                 fall = least - self.quadratics(tried.derived_as(best)).chi_squared
                 if fall > 0.0:
                     best, least = tried, least - fall
@@ -367,9 +386,9 @@ class Fit:
                 break
         return least, best
 
-    def stepped(self, lin: Linearised, spread: Vector, held: Mapping[Key, float]) -> Point:
+    def stepped(self, lin: LinearizedPoint, spread: Vector, held: Mapping[Key, float]) -> Point:
         """Where derivatives have the best point, beside what is held at values of its own."""
-        joint, point = self.quadratics(replace(lin, inflation=spread)), lin.point
+        joint, point = self.quadratics(replace(lin, variance_factors=spread)), lin.point
         at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
         reach = [
             (held[key], held[key]) if key in held else self._reach(point, key)

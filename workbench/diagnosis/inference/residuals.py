@@ -14,8 +14,8 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.samples import Samples, channels
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.inference.linearized import LinearizedPoint
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import Case, sign
 from workbench.system.plugins import find_plugin, load
 from workbench.system.system import Channel, System
@@ -90,7 +90,7 @@ class Dependence:
 
 
 def residuals(
-    simulations: Simulations, fit: Fit, before: Linearised, after: Linearised
+    simulations: ResidualModel, fit: Fit, before: LinearizedPoint, after: LinearizedPoint
 ) -> list[Residuals]:
     """Residuals of all recordings, with the levels of the nominal model as fitted."""
     values = fit.unknowns.values(before.point)
@@ -102,7 +102,7 @@ def residuals(
         told = np.flatnonzero(~recording.silent)
         inverse = np.linalg.inv(recording.whitening[:, told[:, None], told])
         unwhitened: list[Matrix] = [
-            np.einsum("bij,bj->bi", inverse, lin.evidence[k].errors[:, told])
+            np.einsum("bij,bj->bi", inverse, lin.residuals[k].errors[:, told])
             for lin in (before, after)
         ]
         formed = channels(system, recording.signals)
@@ -128,7 +128,7 @@ def _balances(system: System) -> Balances | None:
     return known
 
 
-def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[Dependence]:
+def dependences(simulations: ResidualModel, found: Sequence[Residuals]) -> list[Dependence]:
     """What prediction errors go with, strongest before first."""
     system = simulations.system
     influences = [_influences(simulations, k) for k in range(len(found))]
@@ -155,7 +155,7 @@ def dependences(simulations: Simulations, found: Sequence[Residuals]) -> list[De
     return sorted(table, key=lambda one: -one.before)
 
 
-def _influences(simulations: Simulations, k: int) -> dict[str, Vector]:
+def _influences(simulations: ResidualModel, k: int) -> dict[str, Vector]:
     """Each influence at the blocks of one recording."""
     case, one, system = simulations.cases[k], simulations.recordings[k], simulations.system
     time, h = case.time, np.gradient(case.time)

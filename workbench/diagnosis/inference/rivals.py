@@ -13,8 +13,8 @@ from scipy.linalg import block_diag
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key, Quadratic, RecordingSystem, add
-from workbench.diagnosis.inference.search import Fitted, beyond
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.inference.search import FittedModel, beyond
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Rivals:
     effects: tuple[str, ...]
     given: Mapping[str, float]
     signals: tuple[str, ...]
-    inflation: Vector
+    variance_factors: Vector
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; `read_rivals` reads it again."""
@@ -130,11 +130,13 @@ class Rivals:
             "effects": list(self.effects),
             "given": dict(self.given),
             "signals": list(self.signals),
-            "inflation": self.inflation.tolist(),
+            "inflation": self.variance_factors.tolist(),
         }
 
 
-def gathered(simulations: Simulations, fit: Fit, base: Fitted, fits: Sequence[Fitted]) -> Rivals:
+def gathered(
+    simulations: ResidualModel, fit: Fit, base: FittedModel, fits: Sequence[FittedModel]
+) -> Rivals:
     """What fits leave undecided.
 
     Parameters
@@ -142,18 +144,20 @@ def gathered(simulations: Simulations, fit: Fit, base: Fitted, fits: Sequence[Fi
     base : the nominal model, fitted.
     fits : of the models; the first is the one that was named.
     """
-    inflation = fits[0].linearised.inflation
+    variance_factors = fits[0].linearised.variance_factors
     return Rivals(
-        models=tuple(_rival(fit, base, one, inflation) for one in fits),
+        models=tuple(_rival(fit, base, one, variance_factors) for one in fits),
         effects=tuple(fit.unknowns.effects),
         given=simulations.given,
         signals=tuple(simulations.recordings[0].signals),
-        inflation=inflation,
+        variance_factors=variance_factors,
     )
 
 
-def _rival(fit: Fit, base: Fitted, fitted: Fitted, inflation: Vector) -> Rival:
-    lin = replace(fit.linearise(fitted.linearised, fitted.active), inflation=inflation)
+def _rival(fit: Fit, base: FittedModel, fitted: FittedModel, variance_factors: Vector) -> Rival:
+    lin = replace(
+        fit.linearise(fitted.linearised, fitted.active), variance_factors=variance_factors
+    )
     joint = fit.quadratics(lin)
     still = np.zeros(len(joint.shared))
     return Rival(
@@ -221,5 +225,5 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
         effects=tuple(map(str, said["effects"])),
         given={str(name): float(value) for name, value in said["given"].items()},
         signals=tuple(map(str, said["signals"])),
-        inflation=np.array(said["inflation"], float),
+        variance_factors=np.array(said["inflation"], float),
     )

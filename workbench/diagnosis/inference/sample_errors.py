@@ -8,9 +8,9 @@ import numpy as np
 from workbench.diagnosis.data.samples import channels
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised
-from workbench.diagnosis.inference.search import ROUNDS, Fitted
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.inference.linearized import LinearizedPoint
+from workbench.diagnosis.inference.search import ROUNDS, FittedModel
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 
@@ -36,12 +36,12 @@ class Errors:
 
 
 def errors_of(
-    simulations: Simulations, before: Linearised, after: Linearised, *, held_out: bool
+    simulations: ResidualModel, before: LinearizedPoint, after: LinearizedPoint, *, held_out: bool
 ) -> list[Errors]:
     """Errors of all recordings by two models."""
     found = []
     for k, recording in enumerate(simulations.recordings):
-        sizes = [lin.evidence[k].sizes for lin in (before, after)]
+        sizes = [lin.residuals[k].sizes for lin in (before, after)]
         samples = int(recording.told.sum())
         for c, channel in enumerate(channels(simulations.system, recording.signals)):
             if recording.silent[c]:
@@ -54,9 +54,9 @@ def errors_of(
 
 
 def held_out_errors(
-    fitted: Simulations,
+    fitted: ResidualModel,
     effects: Sequence[Effect],
-    ends: tuple[Fitted, Fitted],
+    ends: tuple[FittedModel, FittedModel],
     cases: Sequence[Case],
     workers: int,
 ) -> tuple[list[Errors], dict[str, dict[str, float]]]:
@@ -75,10 +75,10 @@ def held_out_errors(
     errors : of both models.
     starts : of the last model, by recording, see `Unknowns.starts`.
     """
-    with Simulations(fitted.source, cases, Engine(workers), restarting=False) as simulations:
+    with ResidualModel(fitted.source, cases, Engine(workers), restarting=False) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
 
-        def apart(model: Fitted) -> Linearised:
+        def apart(model: FittedModel) -> LinearizedPoint:
             start, known = fit.unknowns.start(), model.point
             levels = {key: known.levels.get(key, usual) for key, usual in start.levels.items()}
             phases = {name: np.zeros(len(cases)) for name in known.phases}

@@ -10,9 +10,15 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised, Point
+from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
+from workbench.diagnosis.inference.score_test import (
+    Candidate,
+    CandidateScore,
+    ScoreTest,
+    score_test,
+    shapes,
+)
 from workbench.diagnosis.inference.thresholds import Thresholds
-from workbench.diagnosis.inference.trial import Option, Prospect, Trial, shapes, tried
 from workbench.errors import FMUError
 from workbench.runtime.engine import Reporter
 
@@ -24,7 +30,7 @@ ROUNDS = 12  # of Gauss-Newton, most
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedModel:
     """A set of effects, fitted in full.
 
     Attributes
@@ -34,7 +40,7 @@ class Fitted:
 
     active: tuple[Effect, ...]
     point: Point
-    linearised: Linearised
+    linearised: LinearizedPoint
     misfit: float
 
 
@@ -48,19 +54,19 @@ class Step:
     rivals : fitted in full; the first was taken, the others best first.
     """
 
-    before: Fitted
-    scores: tuple[Prospect, ...]
-    rivals: tuple[Fitted, ...]
+    before: FittedModel
+    scores: tuple[CandidateScore, ...]
+    rivals: tuple[FittedModel, ...]
 
 
-def seek(
+def forward_selection(
     fit: Fit,
     catalogue: Sequence[Effect],
-    best: Fitted,
+    best: FittedModel,
     steps: list[Step],
     dropped: Collection[Effect],
     report: Reporter,
-) -> tuple[Fitted, Trial, bool]:
+) -> tuple[FittedModel, ScoreTest, bool]:
     """Find what is missing.
 
     Parameters
@@ -93,7 +99,7 @@ def seek(
 
 
 def _step(
-    fit: Fit, catalogue: Sequence[Effect], best: Fitted, trial: Trial, report: Reporter
+    fit: Fit, catalogue: Sequence[Effect], best: FittedModel, trial: ScoreTest, report: Reporter
 ) -> Step | None:
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
     scores = tuple(score for score in trial.scores() if score.effect in catalogue)
@@ -109,22 +115,26 @@ def _step(
     return Step(best, scores, (first, *(fit for fit in fits if fit is not first)))
 
 
-def _gains(fit: Fit, before: Fitted, after: Fitted) -> bool:
+def _gains(fit: Fit, before: FittedModel, after: FittedModel) -> bool:
     """Whether an effect is worth a step."""
     return before.linearised.deviance - after.linearised.deviance > fit.decides.fall
 
 
-def beyond(fitted: Fitted, other: Fitted) -> float:
+def beyond(fitted: FittedModel, other: FittedModel) -> float:
     """Chi-squared that one leaves and another does not.
 
     Each channel in units of the lesser of what they leave wrong there: where both leave much, that
     one leaves a little more means nothing.
     """
-    inflation = np.minimum(fitted.linearised.inflation, other.linearised.inflation)
-    return fitted.linearised.weighed(inflation) - other.linearised.weighed(inflation)
+    variance_factors = np.minimum(
+        fitted.linearised.variance_factors, other.linearised.variance_factors
+    )
+    return fitted.linearised.weighed(variance_factors) - other.linearised.weighed(variance_factors)
 
 
-def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[Fitted]:
+def _fits(
+    fit: Fit, best: FittedModel, rivals: Sequence[Sequence[CandidateScore]]
+) -> list[FittedModel]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
     tried = fit.together(partial(_begun, fit, best), rivals)
     begun = [one for one in tried if one is not None]
@@ -134,7 +144,7 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     near = left < fit.decides.behind * left.min()
     worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
 
-    def finished(one: Fitted) -> Fitted | None:
+    def finished(one: FittedModel) -> FittedModel | None:
         return differentiable(partial(fitted, fit, one.linearised, one.active))
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
@@ -143,13 +153,13 @@ def _fits(fit: Fit, best: Fitted, rivals: Sequence[Sequence[Prospect]]) -> list[
     return [every[i] for i in order if _gains(fit, best, every[i])]
 
 
-def misfits(fits: Sequence[Fitted]) -> Vector:
+def misfits(fits: Sequence[FittedModel]) -> Vector:
     """Chi-squared of each, channels in units of the least that any of them leaves wrong, (f,)."""
-    inflation = np.min([fit.linearised.inflation for fit in fits], axis=0)
-    return np.array([fit.linearised.weighed(inflation) for fit in fits])
+    variance_factors = np.min([fit.linearised.variance_factors for fit in fits], axis=0)
+    return np.array([fit.linearised.weighed(variance_factors) for fit in fits])
 
 
-def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | None:
+def _begun(fit: Fit, best: FittedModel, variants: Sequence[CandidateScore]) -> FittedModel | None:
     """First rounds of a fit with one more effect, begun elsewhere where that gained nothing.
 
     A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.
@@ -165,7 +175,9 @@ def _begun(fit: Fit, best: Fitted, variants: Sequence[Prospect]) -> Fitted | Non
     return min(tried, key=lambda one: one.linearised.deviance, default=None)
 
 
-def extended(fit: Fit, before: Fitted, rival: Prospect, rounds: int = ROUNDS) -> Fitted | None:
+def extended(
+    fit: Fit, before: FittedModel, rival: CandidateScore, rounds: int = ROUNDS
+) -> FittedModel | None:
     """Fit with one more effect, begun where it was fitted without; None: not even begun."""
     start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
     if start is None:
@@ -183,8 +195,8 @@ def differentiable(fitting: Callable[[], Result]) -> Result | None:
 
 
 def examine(
-    fit: Fit, best: Fitted, catalogue: Sequence[Effect], report: Reporter
-) -> tuple[Fitted, Trial]:
+    fit: Fit, best: FittedModel, catalogue: Sequence[Effect], report: Reporter
+) -> tuple[FittedModel, ScoreTest]:
     """Try every effect that the data can show and the point does not have.
 
     Returns
@@ -192,7 +204,7 @@ def examine(
     best : with the derivatives by all of them.
     trial : of all of them.
     """
-    candidates: list[Option] = [
+    candidates: list[Candidate] = [
         (effect, shape)
         for effect in catalogue
         if effect not in best.active and not fit.unknowns.presence.unseen(effect)
@@ -200,17 +212,17 @@ def examine(
     ]
     report(f"signatures of {len(candidates)} candidates")
     lin = fit.linearise(best.linearised, best.active, candidates)
-    return replace(best, linearised=lin), tried(fit, lin, candidates)
+    return replace(best, linearised=lin), score_test(fit, lin, candidates)
 
 
 def pruned(
     fit: Fit,
     catalogue: Sequence[Effect],
-    best: Fitted,
-    known: Mapping[frozenset[Effect], Fitted],
-    trial: Trial,
+    best: FittedModel,
+    known: Mapping[frozenset[Effect], FittedModel],
+    trial: ScoreTest,
     report: Reporter,
-) -> tuple[Fitted, Trial, dict[Effect, Fitted]]:
+) -> tuple[FittedModel, ScoreTest, dict[Effect, FittedModel]]:
     """Drop effects that, beside the others, do not matter or are not significant.
 
     What forms of laws fake must be exceeded beside others, and where states are restarted.
@@ -222,9 +234,9 @@ def pruned(
     Returns
     -------
     best, trial : of the effects that are left.
-    less : see `lesser`.
+    less : see `leave_one_out_fits`.
     """
-    while less := lesser(fit, best, known):
+    while less := leave_one_out_fits(fit, best, known):
         sigma = np.sqrt(np.diag(trial.covariance()))
         ratios = {}
         for effect in best.active:
@@ -243,9 +255,9 @@ def pruned(
     return best, trial, less
 
 
-def lesser(
-    fit: Fit, best: Fitted, known: Mapping[frozenset[Effect], Fitted]
-) -> dict[Effect, Fitted]:
+def leave_one_out_fits(
+    fit: Fit, best: FittedModel, known: Mapping[frozenset[Effect], FittedModel]
+) -> dict[Effect, FittedModel]:
     """The best fit without each of the effects, with all derivatives.
 
     Parameters
@@ -253,7 +265,7 @@ def lesser(
     known : fits by their effects, with all derivatives, which need not be made again.
     """
 
-    def refitted(effect: Effect) -> Fitted:
+    def refitted(effect: Effect) -> FittedModel:
         kept = tuple(other for other in best.active if other is not effect)
         if frozenset(kept) in known:
             return known[frozenset(kept)]
@@ -278,17 +290,17 @@ def without(point: Point, effect: Effect) -> Point:
 
 def fitted(
     fit: Fit,
-    start: Linearised,
+    start: LinearizedPoint,
     active: tuple[Effect, ...],
     rounds: int = ROUNDS,
     spread: Vector | None = None,
-) -> Fitted:
+) -> FittedModel:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""
     lin = fit.refine(start, active, rounds, spread)
-    return Fitted(active, lin.point, lin, lin.misfit)
+    return FittedModel(active, lin.point, lin, lin.misfit)
 
 
-def joined(point: Point, rival: Prospect) -> Point:
+def joined(point: Point, rival: CandidateScore) -> Point:
     """The point with one more effect."""
     name = rival.effect.name
     sizes = {**point.sizes, (name, rival.effect.label): rival.size}
@@ -299,16 +311,18 @@ def joined(point: Point, rival: Prospect) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _rivals(scores: Sequence[Prospect], best: Fitted, decides: Thresholds) -> list[list[Prospect]]:
+def _rivals(
+    scores: Sequence[CandidateScore], best: FittedModel, decides: Thresholds
+) -> list[list[CandidateScore]]:
     """Variants, best first, of effects that are large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
     What levels could stand for must be there without any one of the stops, too.
     """
-    hinted = best.linearised.inflation.max() > decides.wrong
+    hinted = best.linearised.variance_factors.max() > decides.wrong
     clear = decides.hint if hinted else decides.significant
-    able: dict[str, list[Prospect]] = {}
+    able: dict[str, list[CandidateScore]] = {}
     for score in scores:
         phases = len(score.phases) if score.effect.order_locked else 0
         needed = 0.0 if hinted else decides.fall_of(1 + phases)

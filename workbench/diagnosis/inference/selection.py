@@ -14,18 +14,18 @@ from workbench.arrays import Matrix
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Point
+from workbench.diagnosis.inference.linearized import Point
+from workbench.diagnosis.inference.score_test import CandidateScore, ScoreTest, shapes
 from workbench.diagnosis.inference.search import (
-    Fitted,
+    FittedModel,
     Step,
     beyond,
     examine,
     extended,
     fitted,
+    forward_selection,
     pruned,
-    seek,
 )
-from workbench.diagnosis.inference.trial import Prospect, Trial, shapes
 from workbench.runtime.engine import Reporter
 
 
@@ -45,12 +45,12 @@ class Selection:
     validation : of the fits.
     """
 
-    base: Fitted
-    best: Fitted
-    less: Mapping[Effect, Fitted]
+    base: FittedModel
+    best: FittedModel
+    less: Mapping[Effect, FittedModel]
     steps: tuple[Step, ...]
-    trial: Trial
-    twins: Mapping[Effect, Mapping[str, Fitted]]
+    trial: ScoreTest
+    twins: Mapping[Effect, Mapping[str, FittedModel]]
     names: tuple[str, ...]
     cosines: Matrix
     interrupted: bool
@@ -58,7 +58,7 @@ class Selection:
 
 
 @dataclass(frozen=True, eq=False)
-class Sought:
+class ForwardSelection:
     """What a search has come to, before anything is dropped or exchanged.
 
     Attributes
@@ -67,27 +67,29 @@ class Sought:
     begun : where it went on, when other samples counted.
     """
 
-    best: Fitted
+    best: FittedModel
     steps: list[Step]
-    trial: Trial
+    trial: ScoreTest
     interrupted: bool
     begun: Selection | None
 
 
 def search(
     fit: Fit, catalogue: Sequence[Effect], report: Reporter, begun: Selection | None = None
-) -> Sought:
+) -> ForwardSelection:
     """Find what is missing, or what is missing beside what was when other samples counted."""
     if begun is None:
         report("nominal model, levels calibrated")
         best, steps = anew(fit, fit.unknowns.start(), ()), list[Step]()
     else:
         best, steps = anew(fit, begun.best.point, begun.best.active), list(begun.steps)
-    best, trial, interrupted = seek(fit, catalogue, best, steps, (), report)
-    return Sought(best, steps, trial, interrupted, begun)
+    best, trial, interrupted = forward_selection(fit, catalogue, best, steps, (), report)
+    return ForwardSelection(best, steps, trial, interrupted, begun)
 
 
-def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Reporter) -> Selection:
+def select(
+    fit: Fit, catalogue: Sequence[Effect], sought: ForwardSelection, report: Reporter
+) -> Selection:
     """Find what a set of recordings needs.
 
     An effect that was dropped beside others is not taken up again; one that explains clearly more
@@ -113,7 +115,9 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
             best, trial, less = pruned(fit, catalogue, best, known, trial, report)
         if (gone := before - set(best.active)) and not interrupted:
             dropped |= gone
-            best, trial, interrupted = seek(fit, catalogue, best, steps, dropped, report)
+            best, trial, interrupted = forward_selection(
+                fit, catalogue, best, steps, dropped, report
+            )
             continue
         names, cosines = _confusability(trial, catalogue)
         alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
@@ -122,7 +126,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
         if interrupted or beyond(best, better) < fit.decides.needed:
             break
         report(f"{better.active[-1].name} explains more than what it replaces")
-        best, trial, interrupted = seek(fit, catalogue, better, steps, dropped, report)
+        best, trial, interrupted = forward_selection(fit, catalogue, better, steps, dropped, report)
     twins = {
         one: dict(
             sorted(
@@ -137,7 +141,7 @@ def select(fit: Fit, catalogue: Sequence[Effect], sought: Sought, report: Report
     )
 
 
-def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
+def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> FittedModel:
     """A fit that begins at a point, with all derivatives."""
     # A point of its own, by which it is told from a fit to other samples.
     one = fitted(fit, fit.at(replace(point)), active)
@@ -145,7 +149,7 @@ def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> Fitted:
 
 
 def _idle(
-    fit: Fit, validation: CrossValidation, best: Fitted, less: Mapping[Effect, Fitted]
+    fit: Fit, validation: CrossValidation, best: FittedModel, less: Mapping[Effect, FittedModel]
 ) -> Effect | None:
     """A cause that beside others explains next to nothing on held-out stops, if there is one."""
     if len(best.active) < 2:
@@ -161,12 +165,12 @@ def _idle(
 def _alike(
     fit: Fit,
     effect: Effect,
-    best: Fitted,
-    less: Fitted,
+    best: FittedModel,
+    less: FittedModel,
     steps: Sequence[Step],
     names: Sequence[str],
     cosines: Matrix,
-) -> dict[str, Fitted]:
+) -> dict[str, FittedModel]:
     """Fits of effects in place of one, beside the other causes, by name.
 
     Of those with a like signature, and of rivals that it met in a step; where it was named and they
@@ -178,7 +182,7 @@ def _alike(
     """
     row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
     alike = {name for name in names if row[name] > 1.0 - fit.decides.twin}
-    found: dict[str, Fitted] = {}
+    found: dict[str, FittedModel] = {}
     for step in steps:
         winner = step.rivals[0]
         rivals = {rival.active[-1].name: rival for rival in step.rivals}
@@ -193,7 +197,7 @@ def _alike(
     active = {one.name for one in best.active}
     found = {name: one for name, one in found.items() if name not in active}
     alike -= active | set(found)
-    others: dict[str, Prospect] = {}
+    others: dict[str, CandidateScore] = {}
     for score in (score for step in steps for score in step.scores):
         if score.effect.name in alike:
             others.setdefault(score.effect.name, score)
@@ -202,13 +206,13 @@ def _alike(
     return found | {name: one for name, one in tried if one is not None}
 
 
-def _close(fit: Fit, before: Fitted, fitted: Fitted, best: Fitted) -> bool:
+def _close(fit: Fit, before: FittedModel, fitted: FittedModel, best: FittedModel) -> bool:
     """Whether chi-squared does not tell two effects apart, either of which explains."""
     form = max(fit.decides.form, fit.decides.form_share * beyond(before, best))
     return beyond(fitted, best) < form
 
 
-def _confusability(trial: Trial, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
+def _confusability(trial: ScoreTest, catalogue: Sequence[Effect]) -> tuple[tuple[str, ...], Matrix]:
     """Cosines of the signatures of all effects, beside levels and tolerances; 1 is a twin."""
     joint = trial.joint
     total = joint.total().N

@@ -13,11 +13,11 @@ import numpy as np
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import covariance, minimum
-from workbench.diagnosis.inference.search import Fitted, beyond, fitted
+from workbench.diagnosis.inference.search import FittedModel, beyond, fitted
 
 
 @dataclass(frozen=True)
-class Late:
+class LateSignals:
     """Signals that are late together against all others, by themselves.
 
     Attributes
@@ -31,7 +31,9 @@ class Late:
     sigma: float
 
 
-def by_themselves(fit: Fit, base: Fitted, best: Fitted, *, clean: bool) -> Late | None:
+def by_themselves(
+    fit: Fit, base: FittedModel, best: FittedModel, *, clean: bool
+) -> LateSignals | None:
     """Signals whose clocks explain clearly more than what was found; None: no clocks do.
 
     Several causes that explain no more than clocks are less likely than these.
@@ -48,13 +50,13 @@ def by_themselves(fit: Fit, base: Fitted, best: Fitted, *, clean: bool) -> Late 
         return None
     sizes = {(clock.name, clock.size): 0.0 for clock in clocks}
     one = fitted(other, other.at(replace(base.point, sizes=sizes)), tuple(clocks))
-    explains = float(one.linearised.inflation.max()) < fit.decides.wrong
+    explains = float(one.linearised.variance_factors.max()) < fit.decides.wrong
     if not explains or beyond(best, one) < needed:
         return None
     return _together(other, clocks, one)
 
 
-def _fall(fit: Fit, clocks: Sequence[Effect], best: Fitted) -> float:
+def _fall(fit: Fit, clocks: Sequence[Effect], best: FittedModel) -> float:
     """By how much chi-squared falls with clocks beside what was found, linearised."""
     lin = fit.linearise(best.linearised, best.active, [(clock, {}) for clock in clocks])
     joint = fit.quadratics(lin, [(clock.name, clock.size) for clock in clocks])
@@ -63,7 +65,7 @@ def _fall(fit: Fit, clocks: Sequence[Effect], best: Fitted) -> float:
     return known.at(minimum(known)) - total.at(minimum(total))
 
 
-def _together(fit: Fit, clocks: Sequence[Effect], fitted: Fitted) -> Late:
+def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel) -> LateSignals:
     """The fewest signals that, late together, explain as well as each by its own clock.
 
     The clock of the one signal that has none is what the others are late against.
@@ -84,5 +86,7 @@ def _together(fit: Fit, clocks: Sequence[Effect], fitted: Fitted) -> Late:
             tried.append((float(left @ N @ left), skew, information, chosen))
         behind, skew, information, chosen = min(tried)
         if behind < fit.decides.form:
-            return Late(tuple(names[j] for j in chosen), skew, float(1.0 / np.sqrt(information)))
-    return Late((), 0.0, 0.0)
+            return LateSignals(
+                tuple(names[j] for j in chosen), skew, float(1.0 / np.sqrt(information))
+            )
+    return LateSignals((), 0.0, 0.0)

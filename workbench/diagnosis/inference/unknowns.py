@@ -13,9 +13,9 @@ from workbench.diagnosis.data.cleaning import ALONG
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.presence import Presence
-from workbench.diagnosis.inference.linearised import Point
+from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import delay
 from workbench.recordings.case import Case, Value
 from workbench.system.system import System
@@ -41,7 +41,7 @@ class Unknowns:
     """
 
     def __init__(
-        self, simulations: Simulations, effects: Sequence[Effect], beside: Sequence[Case]
+        self, simulations: ResidualModel, effects: Sequence[Effect], beside: Sequence[Case]
     ) -> None:
         self._simulations = simulations
         self._compare = simulations.system.comparison

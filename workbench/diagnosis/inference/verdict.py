@@ -11,10 +11,10 @@ from scipy.stats import bootstrap
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import BEGUN, Fitted, Step, extended, misfits
+from workbench.diagnosis.inference.score_test import CandidateScore
+from workbench.diagnosis.inference.search import BEGUN, FittedModel, Step, extended, misfits
 from workbench.diagnosis.inference.selection import Selection, search, select
-from workbench.diagnosis.inference.timing import Late, by_themselves
-from workbench.diagnosis.inference.trial import Prospect
+from workbench.diagnosis.inference.timing import LateSignals, by_themselves
 from workbench.errors import InputError
 from workbench.runtime.engine import Reporter
 from workbench.system.units import BAND
@@ -101,12 +101,12 @@ class Diagnosis:
     causes: tuple[Cause, ...]
     gain: Gain | None
     partial: tuple[str, ...]
-    late: Late | None
-    base: Fitted
-    best: Fitted
-    rivals: tuple[Fitted, ...]
+    late: LateSignals | None
+    base: FittedModel
+    best: FittedModel
+    rivals: tuple[FittedModel, ...]
     steps: tuple[Step, ...]
-    scores: tuple[Prospect, ...]
+    scores: tuple[CandidateScore, ...]
     names: tuple[str, ...]
     cosines: Matrix
     not_visible: Mapping[str, str]
@@ -116,7 +116,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     """Diagnose a set of recordings."""
     chosen, astray = _selected(fit, catalogue, report)
     base, best = chosen.base, chosen.best
-    clean = float(best.linearised.inflation.max()) < fit.decides.wrong
+    clean = float(best.linearised.variance_factors.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
     explained = _share(base, best) > 1.0 - fit.decides.left
     if astray or (not clean and not (best.active and (chosen.interrupted or explained))):
@@ -127,7 +127,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         late = by_themselves(fit, base, best, clean=clean)
         verdict = verdict if late is None else "unexplained"
     causes: list[Cause] = []
-    rivals: tuple[Fitted, ...] = ()
+    rivals: tuple[FittedModel, ...] = ()
     gain = None
     if verdict == "found":
         report("held-out recordings")
@@ -205,9 +205,9 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     return ordered
 
 
-def _share(before: Fitted, after: Fitted) -> float:
+def _share(before: FittedModel, after: FittedModel) -> float:
     """Share of lasting errors, over noise, that is gone; of the channel that fares worst."""
-    was, left = before.linearised.inflation - 1.0, after.linearised.inflation - 1.0
+    was, left = before.linearised.variance_factors - 1.0, after.linearised.variance_factors - 1.0
     return float(1.0 - left.max() / max(was.max(), 1e-9))
 
 

@@ -22,17 +22,17 @@ from workbench.diagnosis import (
 )
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import Fitted, Step, beyond, seek
+from workbench.diagnosis.inference.search import FittedModel, Step, beyond, forward_selection
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
 from workbench.diagnosis.inference.verdict import Diagnosis
-from workbench.diagnosis.laws.forms import WrittenForm, candidates
+from workbench.diagnosis.laws.forms import ClosedForm, candidates
 from workbench.diagnosis.laws.free import FittedLaw, estimated
 from workbench.diagnosis.laws.outcome import Proposal, description_length
 from workbench.diagnosis.laws.places import Law
-from workbench.diagnosis.laws.scan import LawProspect, Scan
+from workbench.diagnosis.laws.scan import LawScore, Scan
 from workbench.diagnosis.laws.writing import PACKAGE, extended_library, package
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
@@ -53,7 +53,7 @@ def needs_law(before: Outcome) -> bool:
 
 def _more(found: Diagnosis) -> bool:
     """Whether beside the one cause that was found errors last: it explains most, and not all."""
-    lasting = float(found.best.linearised.inflation.max())
+    lasting = float(found.best.linearised.variance_factors.max())
     return len(found.causes) == 1 and lasting >= Thresholds.wrong
 
 
@@ -105,7 +105,7 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
     return proposal
 
 
-def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
+def _turning(prospects: Sequence[LawScore]) -> list[FittedLaw]:
     """Laws that begin anew with each period, if one is likelier than all others.
 
     They are small beside what they change, so that about what is known they are fitted well enough.
@@ -122,17 +122,17 @@ def _turning(prospects: Sequence[LawProspect]) -> list[FittedLaw]:
     ]
 
 
-def _turns(prospect: LawProspect) -> bool:
+def _turns(prospect: LawScore) -> bool:
     return prospect.law.influence is not None and prospect.law.influence.turns
 
 
-def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
+def _likeliest(prospects: Sequence[LawScore]) -> list[LawScore]:
     """The best law of each place and of what it depends on, however it is carried.
 
     Of heat there are all, with every time constant: which is right, small changes about what is
     known hardly tell.
     """
-    best: dict[tuple[str, ...], LawProspect] = {}
+    best: dict[tuple[str, ...], LawScore] = {}
     for prospect in prospects:
         influence = prospect.law.influence
         if prospect.smoothness.evidence <= 0.0 or _turns(prospect):
@@ -140,7 +140,7 @@ def _likeliest(prospects: Sequence[LawProspect]) -> list[LawProspect]:
         factors = () if influence is None else tuple(part.name for part in influence.factors)
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
         best.setdefault((prospect.law.place.name, kind, *factors), prospect)
-    of_place: dict[str, list[LawProspect]] = {}
+    of_place: dict[str, list[LawScore]] = {}
     for one in best.values():
         of_place.setdefault(one.law.place.name, []).append(one)
     kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
@@ -161,7 +161,7 @@ def _called(law: Law) -> tuple[str, ...]:
     return law.place.name, carrier, law.influence.name
 
 
-def _forms(estimate: FittedLaw) -> list[WrittenForm]:
+def _forms(estimate: FittedLaw) -> list[ClosedForm]:
     """Closed forms of a law."""
     prospect = estimate.prospect
     # Of an output that is nominally zero, what it seems to be.
@@ -170,8 +170,8 @@ def _forms(estimate: FittedLaw) -> list[WrittenForm]:
 
 
 def _surviving(
-    problem: Problem, forms: Mapping[str, WrittenForm], about: Fitted, engine: Engine
-) -> dict[str, WrittenForm]:
+    problem: Problem, forms: Mapping[str, ClosedForm], about: FittedModel, engine: Engine
+) -> dict[str, ClosedForm]:
     """The closed form with the shortest description, first, and those that are as good.
 
     They are found as causes are, by what they predict of recordings that they were not fitted to.
@@ -186,10 +186,12 @@ def _surviving(
         build_everything(system, extended, every, path)
         steps: list[Step] = []
         source = ModelSource(path, system, given_values(path, system))
-        with Simulations(source, problem.cases, engine) as simulations:
+        with ResidualModel(source, problem.cases, engine) as simulations:
             decides = of_system(system.comparison, len(own))
             fit = Fit(simulations, every, replace(decides, most=len(about.active) + 1))
-            seek(fit, own, anew(fit, about.point, about.active), steps, (), engine.report)
+            forward_selection(
+                fit, own, anew(fit, about.point, about.active), steps, (), engine.report
+            )
     if not steps:
         return {}
     before, rivals = steps[0].before, steps[0].rivals
@@ -200,7 +202,7 @@ def _surviving(
 
 
 def _as_effects(
-    problem: Problem, forms: Mapping[str, WrittenForm], folder: Path
+    problem: Problem, forms: Mapping[str, ClosedForm], folder: Path
 ) -> tuple[Library, list[Effect]]:
     """A library with closed forms, and these: the likelier law and the simpler form first."""
     extended = extended_library(problem.library, [form.written for form in forms.values()], folder)
@@ -209,7 +211,7 @@ def _as_effects(
     return extended, sorted(own, key=lambda effect: order.index(effect.name))
 
 
-def _diagnosed(problem: Problem, forms: Mapping[str, WrittenForm], engine: Engine) -> Outcome:
+def _diagnosed(problem: Problem, forms: Mapping[str, ClosedForm], engine: Engine) -> Outcome:
     """Diagnose with the first closed form beside the catalogue; of equals, that has its name."""
     first = dict(list(forms.items())[:1])
     engine.report(f"{', '.join(first)} beside {len(problem.effects)} effects")

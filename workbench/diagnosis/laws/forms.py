@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.diagnosis.laws.places import CLOCK, Law, LawInfluence
 from workbench.diagnosis.laws.splines import Knots
-from workbench.diagnosis.laws.writing import Written, clock, effect, number, unit_of
+from workbench.diagnosis.laws.writing import LawClass, clock, effect, number, unit_of
 
 MARK = "proposed, not known physics"
 _ROUNDED = 0.01  # of the range, over which a kink is rounded: no event, and below what is resolved
@@ -79,12 +79,12 @@ CONSTANT = Form("Constant", "always alike", "1.0")
 
 
 @dataclass(frozen=True)
-class WrittenForm:
+class ClosedForm:
     """A closed form of a law."""
 
     law: Law
     form: Form
-    written: Written
+    written: LawClass
 
     @property
     def text(self) -> str:
@@ -92,7 +92,7 @@ class WrittenForm:
         return f"{self.law.text}: {self.form.text}"
 
 
-def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenForm]:
+def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[ClosedForm]:
     """Closed forms of a law.
 
     Parameters
@@ -101,19 +101,19 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[WrittenF
     scale : of the output, where the law is added to it.
     """
     if law.influence is not None and law.influence.turns:
-        yield WrittenForm(law, HARMONIC, _harmonic(law, law.influence, scale))
+        yield ClosedForm(law, HARMONIC, _harmonic(law, law.influence, scale))
         return
     if knots is None or law.influence is None:
-        yield WrittenForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
+        yield ClosedForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
     signed = (SIDES,) if knots.low < 0.0 < knots.high else ()
     for form in (*FORMS, *signed):
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
-            yield WrittenForm(law, form, _written(law, form, knots, scale))
+            yield ClosedForm(law, form, _written(law, form, knots, scale))
 
 
-def _harmonic(law: Law, influence: LawInfluence, scale: float) -> Written:
+def _harmonic(law: Law, influence: LawInfluence, scale: float) -> LawClass:
     """A harmonic of a period that errors have; its phase differs from recording to recording."""
     declared, equations = clock(influence)
     unit = _unit(law, scale)
@@ -124,7 +124,7 @@ def _harmonic(law: Law, influence: LawInfluence, scale: float) -> Written:
         f'{period} "As errors have it";',
     ]
     angle = f"{number(2.0 * np.pi)}*{CLOCK}/period"
-    return Written(
+    return LawClass(
         name=_name(law, HARMONIC),
         about=f"{MARK}: {law.text}: {HARMONIC.text}",
         place=law.place,
@@ -151,7 +151,7 @@ def _name(law: Law, form: Form) -> str:
     return f"{name}{where}{form.name}"
 
 
-def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
+def _written(law: Law, form: Form, knots: Knots, scale: float) -> LawClass:
     largest = max(abs(knots.low), abs(knots.high))
     declared, equations = clock(law.influence)
     quantity = "" if law.influence is None else law.influence.expression
@@ -172,7 +172,7 @@ def _written(law: Law, form: Form, knots: Knots, scale: float) -> Written:
         shapes = {form.shape: values}
         given = _bounded(own, low, high)
         lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
-    return Written(
+    return LawClass(
         name=_name(law, form),
         about=f"{MARK}: {law.text}: {form.text}",
         place=law.place,

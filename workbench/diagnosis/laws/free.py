@@ -14,16 +14,16 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import Fitted, fitted
+from workbench.diagnosis.inference.search import FittedModel, fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.places import Law
-from workbench.diagnosis.laws.scan import LawProspect, effect_at, eliminated
+from workbench.diagnosis.laws.scan import LawScore, effect_at, eliminated
 from workbench.diagnosis.laws.splines import COEFFICIENTS, smoothest
-from workbench.diagnosis.laws.writing import Written, clock, extended_library, number, unit_of
+from workbench.diagnosis.laws.writing import LawClass, clock, extended_library, number, unit_of
 from workbench.diagnosis.problem import Problem
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
@@ -34,7 +34,7 @@ _POINTS = 101  # of a function that is drawn
 
 
 @dataclass(frozen=True)
-class Free(Effect):
+class FreeFunction(Effect):
     """An effect that is a free function.
 
     Attributes
@@ -69,7 +69,7 @@ class FittedLaw:
         cosine and sine of each recording.
     """
 
-    prospect: LawProspect
+    prospect: LawScore
     evidence: float
     coefficients: Vector
     posterior: Matrix
@@ -102,19 +102,19 @@ class FittedLaw:
         return values, basis @ self.coefficients, whole, shape
 
 
-def _written(name: str, prospect: LawProspect) -> Written:
+def _written(name: str, prospect: LawScore) -> LawClass:
     """The class of a free function."""
     law, knots = prospect.law, prospect.knots
     about = f"Free function: {law.text}"
     if law.influence is None or knots is None:
         declared_ = f"parameter Real c0({unit_of(law.carrier.unit)}) = 0.0;"
         change = f"{law.carrier.expression}*c0"
-        return Written(name, about, law.place, (declared_,), (), change)
+        return LawClass(name, about, law.place, (declared_,), (), change)
     last = COEFFICIENTS - 3
     declared, equations = clock(law.influence)
     terms = " + ".join(f"c{k}*({_bump(k - 1)})" for k in range(COEFFICIENTS))
     inside = f"({law.influence.expression} - ({number(knots.low)}))/{number(knots.step)}"
-    return Written(
+    return LawClass(
         name=name,
         about=about,
         place=law.place,
@@ -138,7 +138,7 @@ def _bump(knot: int) -> str:
 
 
 def estimated(
-    problem: Problem, prospects: Sequence[LawProspect], about: Fitted, engine: Engine
+    problem: Problem, prospects: Sequence[LawScore], about: FittedModel, engine: Engine
 ) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
@@ -153,7 +153,7 @@ def estimated(
             return []
         effects = _effects(problem.library, able)
         source = ModelSource(path, problem.system, given_values(path, problem.system))
-        with Simulations(source, problem.cases, engine) as simulations:
+        with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, [*about.active, *effects])
             engine.report("fitting free functions")
             job = partial(_estimate, simulations, anew(fit, about.point, about.active))
@@ -162,9 +162,9 @@ def estimated(
     return sorted(found, key=lambda one: -one.evidence)
 
 
-def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
+def _effects(library: Library, prospects: Sequence[LawScore]) -> list[FreeFunction]:
     return [
-        Free(
+        FreeFunction(
             **vars(effect_at(f"Free{k}", library, prospect.law.place, "c0")),
             count=len(prospect.smoothness.coefficients),
         )
@@ -173,8 +173,8 @@ def _effects(library: Library, prospects: Sequence[LawProspect]) -> list[Free]:
 
 
 def _compiled(
-    problem: Problem, prospects: Sequence[LawProspect], path: Path, known: Sequence[Effect]
-) -> list[LawProspect]:
+    problem: Problem, prospects: Sequence[LawScore], path: Path, known: Sequence[Effect]
+) -> list[LawScore]:
     """Build the FMU of free functions; returns those that it has.
 
     What a law depends on may depend on it: a loop that is not linear, which no FMU of ours solves.
@@ -197,7 +197,7 @@ def _compiled(
 
 
 def _estimate(
-    simulations: Simulations, base: Fitted, item: tuple[Free, LawProspect]
+    simulations: ResidualModel, base: FittedModel, item: tuple[FreeFunction, LawScore]
 ) -> FittedLaw | None:
     """Fit one function; None if it leads where the model has no solution."""
     try:
@@ -207,7 +207,7 @@ def _estimate(
 
 
 def _fitted(
-    simulations: Simulations, base: Fitted, effect: Free, prospect: LawProspect
+    simulations: ResidualModel, base: FittedModel, effect: FreeFunction, prospect: LawScore
 ) -> FittedLaw:
     """The likelier of all rounds: smoothness about a point may promise what bends away from it."""
     smoothness, best = prospect.smoothness, base
@@ -234,7 +234,9 @@ def _fitted(
     return max(found, key=lambda one: one.evidence)
 
 
-def _started(fit: Fit, best: Fitted, keys: Sequence[Key], coefficients: Vector) -> Linearised:
+def _started(
+    fit: Fit, best: FittedModel, keys: Sequence[Key], coefficients: Vector
+) -> LinearizedPoint:
     """Where a fit with a free function begins: as much of it as lowers the deviance."""
     before = best.linearised.deviance
     for share in _BEGUN:

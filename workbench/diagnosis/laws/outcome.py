@@ -10,10 +10,10 @@ import pandas as pd
 from scipy.stats import ttest_rel
 
 from workbench.diagnosis import Cause, Outcome
-from workbench.diagnosis.inference.search import Fitted
-from workbench.diagnosis.laws.forms import MARK, WrittenForm
+from workbench.diagnosis.inference.search import FittedModel
+from workbench.diagnosis.laws.forms import MARK, ClosedForm
 from workbench.diagnosis.laws.free import FittedLaw
-from workbench.diagnosis.laws.scan import LawProspect
+from workbench.diagnosis.laws.scan import LawScore
 from workbench.system.units import BAND
 
 if TYPE_CHECKING:
@@ -39,10 +39,10 @@ class Proposal:
     """
 
     before: Outcome
-    prospects: tuple[LawProspect, ...]
+    prospects: tuple[LawScore, ...]
     estimates: tuple[FittedLaw, ...]
     tied: tuple[FittedLaw, ...]
-    forms: Mapping[str, WrittenForm]
+    forms: Mapping[str, ClosedForm]
     outcome: Outcome | None
 
     @property
@@ -209,12 +209,12 @@ class Proposal:
         return functions_figure(self)
 
 
-def description_length(best: Fitted) -> float:
+def description_length(best: FittedModel) -> float:
     """What recordings and the sizes of causes take to be told [nat], up to a constant.
 
     Half the deviance, and half the logarithm of the number of means that last for each parameter.
     Source: J. Rissanen (1978), Automatica 14, 465-471; G. Schwarz (1978), Ann. Stat. 6, 461-464.
     """
     lin = best.linearised
-    count = sum(recording.blocks.sum() for recording in lin.evidence) / lin.lasting
+    count = sum(recording.blocks.sum() for recording in lin.residuals) / lin.lasting
     return 0.5 * lin.deviance + 0.5 * len(best.point.sizes) * math.log(count)

@@ -15,7 +15,7 @@ from workbench.diagnosis.effects.extension import ExtendedModel, build, variable
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Joint, Key
-from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.periods import Period, strongest_period
 from workbench.diagnosis.laws.places import (
@@ -28,10 +28,10 @@ from workbench.diagnosis.laws.places import (
     turning_laws,
 )
 from workbench.diagnosis.laws.splines import APART, COEFFICIENTS, Knots, Smoothness, smoothest
-from workbench.diagnosis.laws.writing import PACKAGE, Written, extended_library, unit_of
+from workbench.diagnosis.laws.writing import PACKAGE, LawClass, extended_library, unit_of
 from workbench.diagnosis.problem import Problem
-from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Variation
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 
@@ -44,7 +44,7 @@ _SIZE = "d"  # of a probe
 
 
 @dataclass(frozen=True, eq=False)
-class LawProspect:
+class LawScore:
     """A law, as a free function about what is known.
 
     Attributes
@@ -83,9 +83,9 @@ def effect_at(name: str, library: Library, place: Place, size: str) -> Effect:
     )
 
 
-def _probe(place: Place) -> Written:
+def _probe(place: Place) -> LawClass:
     declared = f"parameter Real {_SIZE}({unit_of(place.output.unit)}) = 0.0;"
-    return Written(place.name, "Probe", place, (declared,), (), _SIZE)
+    return LawClass(place.name, "Probe", place, (declared,), (), _SIZE)
 
 
 class Scan:
@@ -100,7 +100,7 @@ class Scan:
     prospects : of all laws, the likeliest first.
     """
 
-    def __init__(self, problem: Problem, about: Fitted, engine: Engine) -> None:
+    def __init__(self, problem: Problem, about: FittedModel, engine: Engine) -> None:
         system, library, base = problem.system, problem.library, problem.base
         self._lasting = system.comparison.lasting
         where = tuple(places(library, base, read_slots(library, base)))
@@ -116,7 +116,7 @@ class Scan:
             engine.report(f"compiling probes in {len(where)} places")
             build(extended, "Probes", watching(text, names), path, every_platform=False)
             source = ModelSource(path, system, given_values(path, system))
-            with Simulations(source, problem.cases, engine) as simulations:
+            with ResidualModel(source, problem.cases, engine) as simulations:
                 self._fit = Fit(simulations, effects)
                 self.base = anew(self._fit, about.point, about.active)
                 values = self._fit.unknowns.values(self.base.point)
@@ -134,12 +134,12 @@ class Scan:
 
     def _judged(
         self,
-        simulations: Simulations,
+        simulations: ResidualModel,
         values: Sequence[Mapping[str, float]],
         every: Sequence[Law],
-    ) -> list[LawProspect]:
+    ) -> list[LawScore]:
         lin = self.base.linearised
-        found: list[LawProspect] = []
+        found: list[LawScore] = []
         each = max(1, _AT_ONCE // COEFFICIENTS)
         for first in range(0, len(every), each):
             part = every[first : first + each]
@@ -161,16 +161,16 @@ class Scan:
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
                 largest = self._largest(law.place)
                 smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
-                found.append(LawProspect(law, knots, smoothness, largest))
+                found.append(LawScore(law, knots, smoothness, largest))
                 at += count
         return found
 
     def _turning(
         self,
-        simulations: Simulations,
+        simulations: ResidualModel,
         values: Sequence[Mapping[str, float]],
         where: Sequence[Place],
-    ) -> list[LawProspect]:
+    ) -> list[LawScore]:
         """Laws that begin anew with the period that errors have most of, each phase its own.
 
         Of all periods that are told apart each is as likely beforehand.
@@ -208,11 +208,11 @@ class Scan:
             likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
             evidence = likeliest.evidence - float(np.log(period.tried))
             likeliest = replace(likeliest, evidence=evidence)
-            found.append(LawProspect(law, None, likeliest, largest))
+            found.append(LawScore(law, None, likeliest, largest))
         return found
 
     def _period(
-        self, simulations: Simulations, place: Place, influence: LawInfluence
+        self, simulations: ResidualModel, place: Place, influence: LawInfluence
     ) -> Period | None:
         """The period that errors have most of, along an influence."""
         middles = [
@@ -224,7 +224,7 @@ class Scan:
         ]
         lin = self.base.linearised
         return strongest_period(
-            [recording.errors for recording in lin.evidence], clocks, lin.lasting
+            [recording.errors for recording in lin.residuals], clocks, lin.lasting
         )
 
     def _waves(self, law: Law, period: Period) -> list[Matrix]:

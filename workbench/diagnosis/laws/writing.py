@@ -13,7 +13,7 @@ PACKAGE = "Proposed"  # of the classes, within the library
 
 
 @dataclass(frozen=True)
-class Written:
+class LawClass:
     """A generated class.
 
     Attributes
@@ -74,7 +74,7 @@ def clock(influence: LawInfluence | None) -> tuple[tuple[str, ...], tuple[str, .
     return tuple(declared), (f"der({CLOCK}) = {influence.rate};",)
 
 
-def package(library: Library, classes: Iterable[Written]) -> str:
+def package(library: Library, classes: Iterable[LawClass]) -> str:
     """Source of a package with classes of slots of a library."""
     every = list(classes)
     slots = [one.place.slot for one in every]
@@ -90,7 +90,7 @@ def package(library: Library, classes: Iterable[Written]) -> str:
     )
 
 
-def extended_library(library: Library, classes: Iterable[Written], folder: Path) -> Library:
+def extended_library(library: Library, classes: Iterable[LawClass], folder: Path) -> Library:
     """A copy of a library, in a folder, that has such a package."""
     file = copied(library, folder)
     write_whole(file.with_name(f"{PACKAGE}.mo"), package(library, classes))

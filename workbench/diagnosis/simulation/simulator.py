@@ -27,7 +27,7 @@ def delay(signal: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class WhitenedResiduals:
     """One recording, linearised about a point.
 
     Attributes
@@ -56,7 +56,7 @@ class Evidence:
         return np.append(self.errors.ravel(), self.rest)
 
 
-class Simulated(NamedTuple):
+class SimulatorSetup(NamedTuple):
     """What a simulator is made from: an FMU and the recordings."""
 
     path: Path
@@ -68,7 +68,7 @@ class Simulated(NamedTuple):
 class Simulator:
     """An FMU along recordings, in one process; the FMU must outlive it."""
 
-    def __init__(self, given: Simulated, fmu: FMU) -> None:
+    def __init__(self, given: SimulatorSetup, fmu: FMU) -> None:
         self._fmu = fmu
         self._recordings = given.recordings
         self._system, self._parts = given.system, given.parts
@@ -109,7 +109,7 @@ class Simulator:
         """Start values of states that a recording's outputs show."""
         return self._predictor.begin(self._recordings[number])
 
-    def at(self, number: int, values: Mapping[str, float]) -> Evidence:
+    def at(self, number: int, values: Mapping[str, float]) -> WhitenedResiduals:
         """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
 
         Parameters
@@ -126,7 +126,7 @@ class Simulator:
             late = self._whitened(number, self._read(number, simulated, delayed))
             columns.append(np.append((late - errors).ravel() / step, 0.0))
         jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
-        return Evidence(errors, rest, self._recordings[number].sizes(read_), jacobian)
+        return WhitenedResiduals(errors, rest, self._recordings[number].sizes(read_), jacobian)
 
     def derivatives(
         self,
@@ -311,7 +311,7 @@ def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[lis
 
 
 @contextmanager
-def simulating(given: Simulated) -> Iterator[Simulator]:
+def simulating(given: SimulatorSetup) -> Iterator[Simulator]:
     """Open an FMU and simulate with it."""
     with FMU(given.path) as fmu:
         yield Simulator(given, fmu)

@@ -1,6 +1,6 @@
 """Which samples of a recording that a model predicts would count, and why others would not."""
 
-from workbench.diagnosis.data.counting import Counted, count
+from workbench.diagnosis.data.counting import CountedSamples, count
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.recordings.case import Case
@@ -23,7 +23,7 @@ def left_claims(case: Case, system: System) -> set[str] | None:
     return {reason for reason in reasons if counted.excluded[reason].any()}
 
 
-def _counted(case: Case, system: System, *, restarting: bool) -> Counted | None:
+def _counted(case: Case, system: System, *, restarting: bool) -> CountedSamples | None:
     try:
         return count(case, system, tuple(case.signals), SOUND, restarting=restarting)
     except InputError:

@@ -13,10 +13,10 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.motion import ModelSource, OpenModel
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised, Point
+from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
 from workbench.diagnosis.inference.quadratic import Joint, Quadratic, RecordingSystem, add, minimum
 from workbench.diagnosis.inference.rivals import Rival, Rivals
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import Case
 from workbench.studies.design.candidates import Experiment
 from workbench.studies.design.recorded import start_of
@@ -122,7 +122,7 @@ def predicted(
     case : a recording of it as the first rival predicts it.
     in_full : whether rivals are fitted again, or taken as they are linearised where they are.
     """
-    with Simulations(asked.source, [case], model=model) as simulations:
+    with ResidualModel(asked.source, [case], model=model) as simulations:
         fit = Fit(simulations, list(asked.effects.values()), beside=[case])
         begun = _begun(fit, start_of(asked.system, asked.experiments, candidate))
         rows = [_linearised(fit, asked, model, begun) for model in asked.rivals.models]
@@ -150,7 +150,7 @@ class _Row:
     """
 
     active: tuple[Effect, ...]
-    lin: Linearised
+    lin: LinearizedPoint
     joint: Joint
     so_far: RecordingSystem
     bare: RecordingSystem
@@ -189,13 +189,13 @@ def _linearised(fit: Fit, asked: DesignProblem, rival: Rival, begun: Matrix) -> 
     active = tuple(effects[name] for name in rival.effects)
     lin = fit.linearise(fit.at(point), active)
     # A further sensor has noise alone.
-    inflation = np.ones(lin.inflation.size)
-    inflation[: rivals.inflation.size] = rivals.inflation
-    lin = replace(lin, inflation=inflation)
-    (one,), (without,) = lin.evidence, fit.at(Point({}, levels, begun, {})).evidence
+    variance_factors = np.ones(lin.variance_factors.size)
+    variance_factors[: rivals.variance_factors.size] = rivals.variance_factors
+    lin = replace(lin, variance_factors=variance_factors)
+    (one,), (without,) = lin.residuals, fit.at(Point({}, levels, begun, {})).residuals
     bare = replace(one, errors=without.errors, rest=without.rest)
     joint = fit.quadratics(lin)
-    (unexplained,) = fit.quadratics(replace(lin, evidence=(bare,))).systems
+    (unexplained,) = fit.quadratics(replace(lin, residuals=(bare,))).systems
     so_far = rival.so_far(joint.shared, fit.decides.furthest_level)
     return _Row(active, lin, joint, so_far, unexplained)
 
@@ -208,7 +208,7 @@ def _once(true: _Row, other: _Row) -> tuple[float, Matrix]:
 
 
 def _prediction(
-    simulations: Simulations,
+    simulations: ResidualModel,
     fit: Fit,
     rivals: Rivals,
     rows: Sequence[_Row],

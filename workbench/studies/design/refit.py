@@ -8,7 +8,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.inference.quadratic import Joint, Key, RecordingSystem
 
 
@@ -25,11 +25,13 @@ class Refit(Fit):
     so_far : the recordings so far, over the rival's common unknowns.
     """
 
-    def __init__(self, fit: Fit, begun: Linearised, true: Vector, so_far: RecordingSystem) -> None:
+    def __init__(
+        self, fit: Fit, begun: LinearizedPoint, true: Vector, so_far: RecordingSystem
+    ) -> None:
         self.__dict__.update(vars(fit))
         self._begun, self._true, self._so_far = begun, true, so_far
 
-    def quadratics(self, lin: Linearised, extra: Sequence[Key] = ()) -> Joint:
+    def quadratics(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
         """As of `Fit`: away from the true model, and from where the rival began."""
         joint = super().quadratics(lin, extra)
         (one,), begun = joint.systems, self._begun.point
@@ -48,6 +50,6 @@ class Refit(Fit):
         errors : whitened, of the experiment by block and channel, (b, c).
         """
         right = self._so_far.chi_squared + self.quadratics(self._begun).prior.c
-        value, lin = self.least(self._begun, active, self._begun.inflation, right)
+        value, lin = self.least(self._begun, active, self._begun.variance_factors, right)
         system = self.quadratics(lin.derived_as(self._begun)).systems[0]
         return value - right, system.r[:-1].reshape(-1, system.channels)

@@ -15,7 +15,7 @@ from workbench.diagnosis.inference.quadratic import Joint, Key, Quadratic, add, 
 from workbench.diagnosis.inference.search import ROUNDS
 from workbench.diagnosis.inference.thresholds import of_system
 from workbench.diagnosis.inference.unknowns import choice_of
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.recordings.case import Case, Value
 from workbench.runtime.engine import Engine
@@ -81,7 +81,7 @@ def fitted(system: System, cases: Sequence[Case], engine: Engine) -> PastFit:
     path = system.model(OBSERVER).path
     assert path is not None
     source = ModelSource(path, system, system.given)
-    with Simulations(source, cases, engine, restarting=False) as simulations:
+    with ResidualModel(source, cases, engine, restarting=False) as simulations:
         # Of effects none is tried; the thresholds bound steps alone.
         fit = Fit(simulations, [], of_system(system.comparison, 1))
         best = fit.refine(fit.at(fit.unknowns.start()), [], ROUNDS)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.counting import Counted, count
+from workbench.diagnosis.data.counting import CountedSamples, count
 from workbench.diagnosis.data.samples import compared
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
@@ -162,6 +162,6 @@ def _parameters(case: Case, system: System) -> dict[str, float]:
     return {name: value for name, value in found.items() if name not in estimated}
 
 
-def _seconds(counted: Counted, time: Vector) -> float:
+def _seconds(counted: CountedSamples, time: Vector) -> float:
     """Time of the samples that count [s]."""
     return float(counted.usable.sum() * np.median(np.diff(time)))

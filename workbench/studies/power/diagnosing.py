@@ -11,9 +11,9 @@ from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.rivals import Rivals, gathered
-from workbench.diagnosis.inference.search import Fitted, examine, extended
+from workbench.diagnosis.inference.search import FittedModel, examine, extended
 from workbench.diagnosis.inference.verdict import conclude
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
 from workbench.runtime.engine import silent
@@ -82,15 +82,15 @@ def distances_in_set(
     with _fit(system, effects, everything, cases) as (_, fit):
         found = conclude(fit, effects, silent)
         base, trial = examine(fit, found.base, effects, silent)
-        fits: dict[str, Fitted | None] = {}
+        fits: dict[str, FittedModel | None] = {}
         for score in trial.scores():
             name = score.effect.name
             if name in (true, *others) and name not in fits:
                 fits[name] = extended(fit, base, score)
         if (right := fits.get(true)) is None:
             return found, {}
-        _, settled = fit.least(right.linearised, right.active, right.linearised.inflation)
-        units = fit.at(settled.point).inflation
+        _, settled = fit.least(right.linearised, right.active, right.linearised.variance_factors)
+        units = fit.at(settled.point).variance_factors
         least = {
             name: fit.least(one.linearised, one.active, units)[0]
             for name, one in fits.items()
@@ -107,6 +107,6 @@ def distance(chi_squared: float) -> float:
 @contextmanager
 def _fit(
     system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
-) -> Iterator[tuple[Simulations, Fit]]:
-    with Simulations(ModelSource(everything, system, system.given), cases) as simulations:
+) -> Iterator[tuple[ResidualModel, Fit]]:
+    with ResidualModel(ModelSource(everything, system, system.given), cases) as simulations:
         yield simulations, Fit(simulations, effects)

@@ -12,11 +12,11 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import Fitted
+from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.laws import Proposal
 from workbench.diagnosis.laws.scan import watching
 from workbench.diagnosis.laws.writing import extended_library
-from workbench.diagnosis.simulation.evidence import Simulations
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 
 
 def function_error(
@@ -55,7 +55,7 @@ def function_error(
         output = f"{law.place.slot.name}.{law.place.output.name}"
         build(extended, "Both", watching(text, [output]), path, every_platform=False)
         both = ModelSource(path, problem.system, given_values(path, problem.system))
-        with Simulations(both, problem.cases) as simulations:
+        with ResidualModel(both, problem.cases) as simulations:
             fit = Fit(simulations, effects)
             without, right, seen = (
                 _along(simulations, fit, one) for one in (known.diagnosis.base, true, proposed)
@@ -63,7 +63,7 @@ def function_error(
     return float(np.sqrt(np.mean((seen - right) ** 2)) / np.ptp(right - without))
 
 
-def _along(simulations: Simulations, fit: Fit, fitted: Fitted) -> Vector:
+def _along(simulations: ResidualModel, fit: Fit, fitted: FittedModel) -> Vector:
     """What is watched, along all recordings, as a model was fitted, each recording as usual."""
     usual = np.zeros((fit.unknowns.count, fitted.point.deviations.shape[1]))
     point = replace(fitted.point, deviations=usual)

@@ -16,9 +16,9 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, of_system
 from workbench.diagnosis.inference.verdict import conclude
-from workbench.diagnosis.simulation.evidence import Simulations
 from workbench.diagnosis.simulation.prediction import Variation
-from workbench.diagnosis.simulation.simulator import Evidence
+from workbench.diagnosis.simulation.residual_model import ResidualModel
+from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, silent
@@ -79,17 +79,17 @@ def changed(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
     return dataclasses.replace(thresholds, **change)
 
 
-class Remembering(Simulations):
-    """Simulations that are made once: most thresholds lead a diagnosis along the same points."""
+class Remembering(ResidualModel):
+    """What is simulated once: most thresholds lead a diagnosis along the same points."""
 
     def __init__(
         self, path: Path, system: System, cases: Sequence[Case], samples: Soundness
     ) -> None:
         super().__init__(ModelSource(path, system, system.given), cases, sound=samples)
-        self._points: dict[Any, list[Evidence]] = {}
+        self._points: dict[Any, list[WhitenedResiduals]] = {}
         self._columns: dict[Any, list[Matrix]] = {}
 
-    def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
+    def at(self, points: Sequence[Mapping[str, float]]) -> list[WhitenedResiduals]:
         """Errors of every recording at its own point."""
         key = _key(points)
         if key not in self._points:

@@ -8,14 +8,14 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearised import Linearised
+from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.inference.quadratic import Joint, Quadratic, add, covariance, minimum
 
-Option = tuple[Effect, Mapping[str, float]]
+Candidate = tuple[Effect, Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Prospect:
+class CandidateScore:
     """What one effect would explain, linearised.
 
     Attributes
@@ -63,17 +63,17 @@ def shapes(effect: Effect) -> list[dict[str, float]]:
     return tried
 
 
-def tried(fit: Fit, lin: Linearised, candidates: Sequence[Option]) -> "Trial":
+def score_test(fit: Fit, lin: LinearizedPoint, candidates: Sequence[Candidate]) -> "ScoreTest":
     """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
     extra = [
         (variant(effect, shape), parameter)
         for effect, shape in candidates
         for parameter in effect.sizes
     ]
-    return Trial(fit, fit.apart(lin, extra), candidates)
+    return ScoreTest(fit, fit.apart(lin, extra), candidates)
 
 
-class Trial:
+class ScoreTest:
     """All candidates about one point.
 
     Each may be present at a size that does not matter, as part of the baseline: a candidate must
@@ -86,7 +86,7 @@ class Trial:
         self,
         fit: Fit,
         joint: Joint,
-        candidates: Sequence[Option],
+        candidates: Sequence[Candidate],
     ) -> None:
         self._fit, self.joint, self._candidates = fit, joint, candidates
         self._stops = joint.stops()
@@ -159,12 +159,12 @@ class Trial:
         known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
         return known
 
-    def scores(self) -> list[Prospect]:
+    def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
         found = [self._score(effect, shape) for effect, shape in self._candidates]
         return sorted(found, key=lambda one: -one.score)
 
-    def _score(self, effect: Effect, shape: Mapping[str, float]) -> Prospect:
+    def _score(self, effect: Effect, shape: Mapping[str, float]) -> CandidateScore:
         at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
         phases = np.zeros(len(self._stops))
         own = {at[0]: np.ones(len(self._stops))}
@@ -189,7 +189,7 @@ class Trial:
         if not low <= single <= high:
             single = float(np.clip(single, low, high))
             alone, own_prior = [_fixed(stop, single) for stop in alone], _fixed(own_prior, single)
-        return Prospect(
+        return CandidateScore(
             effect=effect,
             shape=shape,
             size=size,

@@ -9,7 +9,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.thresholds import Thresholds
-from workbench.diagnosis.simulation.simulator import Evidence
+from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
+class LinearizedPoint:
     """Evidence of all stops about a point.
 
     Attributes
@@ -47,39 +47,39 @@ class Linearised:
 
     point: Point
     keys: tuple[Key, ...]
-    evidence: tuple[Evidence, ...]
+    residuals: tuple[WhitenedResiduals, ...]
     lasting: int
-    inflation: Vector
+    variance_factors: Vector
     away: float
     excess: float = Thresholds.excess
     settled: bool = False
 
-    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "Linearised":
+    def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "LinearizedPoint":
         """The same with more columns, (b*m + 1, p) of each stop."""
-        evidence = tuple(
+        residuals = tuple(
             replace(recording, jacobian=np.column_stack([recording.jacobian, more]))
-            for recording, more in zip(self.evidence, jacobians, strict=True)
+            for recording, more in zip(self.residuals, jacobians, strict=True)
         )
-        return replace(self, keys=(*self.keys, *keys), evidence=evidence)
+        return replace(self, keys=(*self.keys, *keys), residuals=residuals)
 
-    def derived_as(self, other: "Linearised") -> "Linearised":
+    def derived_as(self, other: "LinearizedPoint") -> "LinearizedPoint":
         """The same with derivatives at another point, where errors alone are asked for."""
-        evidence = tuple(
+        residuals = tuple(
             replace(recording, jacobian=there.jacobian)
-            for recording, there in zip(self.evidence, other.evidence, strict=True)
+            for recording, there in zip(self.residuals, other.residuals, strict=True)
         )
-        return replace(self, keys=other.keys, evidence=evidence)
+        return replace(self, keys=other.keys, residuals=residuals)
 
     @property
     def misfit(self) -> float:
         """Chi-squared of all stops at the point, in units of the noise."""
-        return float(sum(recording.residual @ recording.residual for recording in self.evidence))
+        return float(sum(recording.residual @ recording.residual for recording in self.residuals))
 
     @property
     def _squares(self) -> tuple[Vector, Vector]:
         """Number of blocks that are told, and mean square of their errors, by channel (m,)."""
-        errors = np.concatenate([recording.errors for recording in self.evidence])
-        return _told(self.evidence), _share(self.evidence) * np.square(errors).mean(axis=0)
+        errors = np.concatenate([recording.errors for recording in self.residuals])
+        return _told(self.residuals), _share(self.residuals) * np.square(errors).mean(axis=0)
 
     @property
     def deviance(self) -> float:
@@ -92,7 +92,7 @@ class Linearised:
         count, mean = self._squares
         noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
-        rest = sum(recording.rest**2 for recording in self.evidence)
+        rest = sum(recording.rest**2 for recording in self.residuals)
         return float((noise + wrong).sum()) + rest + self.away
 
     @property
@@ -101,12 +101,12 @@ class Linearised:
         wrong: Vector = np.maximum(0.0, self._squares[1] - (1.0 + self.excess))
         return 1.0 + self.lasting * wrong
 
-    def weighed(self, inflation: Vector) -> float:
+    def weighed(self, variance_factors: Vector) -> float:
         """Chi-squared, each channel in units of what is wrong with it, (m,)."""
         return float(
             sum(
-                (recording.errors**2 / inflation).sum() + recording.rest**2
-                for recording in self.evidence
+                (recording.errors**2 / variance_factors).sum() + recording.rest**2
+                for recording in self.residuals
             )
         )
 
@@ -119,26 +119,26 @@ def lasting(errors: Matrix, blocks: int) -> Matrix:
     return squares
 
 
-def slowness(evidence: Sequence[Evidence], blocks: int) -> Vector:
+def slowness(residuals: Sequence[WhitenedResiduals], blocks: int) -> Vector:
     """Variance of errors that last over that of white noise, by channel, at least 1.
 
     What a model lacks leaves more than noise does, and then priors and tolerances must be weighed
     against that, not against the noise.
     """
-    squares = np.concatenate([lasting(recording.errors, blocks) for recording in evidence])
-    slow: Vector = np.maximum(1.0, _share(evidence) * squares.mean(axis=0))
+    squares = np.concatenate([lasting(recording.errors, blocks) for recording in residuals])
+    slow: Vector = np.maximum(1.0, _share(residuals) * squares.mean(axis=0))
     return slow
 
 
-def _told(evidence: Sequence[Evidence]) -> Vector:
+def _told(residuals: Sequence[WhitenedResiduals]) -> Vector:
     """Number of blocks that are told, by channel (m,)."""
-    counts: Vector = np.sum([recording.blocks for recording in evidence], axis=0)
+    counts: Vector = np.sum([recording.blocks for recording in residuals], axis=0)
     return counts
 
 
-def _share(evidence: Sequence[Evidence]) -> Vector:
+def _share(residuals: Sequence[WhitenedResiduals]) -> Vector:
     """Blocks over those that are told, by channel (m,): silent ones have no errors."""
-    share: Vector = sum(len(recording.errors) for recording in evidence) / _told(evidence)
+    share: Vector = sum(len(recording.errors) for recording in residuals) / _told(residuals)
     return share
 
 

@@ -20,9 +20,9 @@ from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.simulator import (
-    Evidence,
-    Simulated,
     Simulator,
+    SimulatorSetup,
+    WhitenedResiduals,
     settled_parts,
     simulating,
 )
@@ -37,7 +37,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-class Simulations:
+class ResidualModel:
     """A model along all recordings, in worker processes if there are more than one.
 
     Parameters
@@ -80,7 +80,7 @@ class Simulations:
             self._model = model or stack.enter_context(opened(source))
             self._tell(self._model.fmu)
             self.recordings = [self._ready(case, restarting=restarting) for case in cases]
-            coarse = Simulated(source.path, self.system, tuple(self.recordings))
+            coarse = SimulatorSetup(source.path, self.system, tuple(self.recordings))
             parts = settled_parts(self._simulator(coarse), self.nominal)
             self.simulated = coarse._replace(parts=parts)
             self._forms = self._weighed([*self.recordings, *self._lesser()])
@@ -118,11 +118,11 @@ class Simulations:
             # A small change: a block is short against all that the machine does.
             self.bounds[name] = (-self.system.comparison.block, self.system.comparison.block)
 
-    def _simulator(self, given: Simulated) -> Simulator:
+    def _simulator(self, given: SimulatorSetup) -> Simulator:
         """One in this process, with the FMU that is open."""
         return Simulator(given, self._model.fmu)
 
-    def _workers_with(self, given: Simulated) -> Pool[Simulator]:
+    def _workers_with(self, given: SimulatorSetup) -> Pool[Simulator]:
         """Simulators in processes, or the one of this process."""
         if self._alone:
             return Pool(1, lambda given: nullcontext(self._simulator(given)), given)
@@ -177,7 +177,7 @@ class Simulations:
             self._at[k] = k if counting else self._without[k]
         self._choose()
 
-    def at(self, points: Sequence[Mapping[str, float]]) -> list[Evidence]:
+    def at(self, points: Sequence[Mapping[str, float]]) -> list[WhitenedResiduals]:
         """Errors of every recording at its own point.
 
         Parameters
