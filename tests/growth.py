@@ -133,7 +133,7 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
 def time_filter(system: System, kind: type[ExtendedKalmanFilter]) -> float:
     """Processor time of a filter for a sample, the least of five runs [s]."""
     with open_model(system) as fmu:
-        estimator, samples = kind(fmu, system, kind.reasoned(fmu, system)), stop(system)
+        estimator, samples = kind(fmu, system, kind.default_gains(fmu, system)), stop(system)
         estimator.run(*samples)
         spent = []
         for _ in range(_REPEATS):

@@ -246,7 +246,7 @@ def test_command_writes_every_stop_and_the_worst(
     assert all(row.text in printed for row in ROWS)
 
     with open_model(system) as fmu:
-        ekf = ExtendedKalmanFilter(fmu, system, ExtendedKalmanFilter.reasoned(fmu, system))
+        ekf = ExtendedKalmanFilter(fmu, system, ExtendedKalmanFilter.default_gains(fmu, system))
         read = (read_case(root / case, system) for case in cases)
         stops = {
             case.name: observe_stop(case, read_truth(case, system), [ekf], system) for case in read

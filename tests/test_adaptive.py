@@ -59,7 +59,7 @@ def stop(fmu: FMU, muDC: Vector, noise: float = 1.0, seed: int = 5) -> tuple[np.
 
 
 def estimate(fmu: FMU, kind: type[ExtendedKalmanFilter], system: System, *stop: Vector) -> Estimate:
-    return kind(fmu, system, kind.reasoned(fmu, system)).run(*stop)
+    return kind(fmu, system, kind.default_gains(fmu, system)).run(*stop)
 
 
 MUDC = list(WHEELSET.columns).index("muDC")
@@ -132,7 +132,9 @@ def test_a_jump_of_a_friction_is_followed_at_once(
 @pytest.fixture(scope="module")
 def runs(fmu: FMU) -> dict[str, list[tuple[slice, Run]]]:
     made = {name: estimators_of(WHEELSET)[name] for name in FILTERS}
-    ready = {name: kind(fmu, WHEELSET, kind.reasoned(fmu, WHEELSET)) for name, kind in made.items()}
+    ready = {
+        name: kind(fmu, WHEELSET, kind.default_gains(fmu, WHEELSET)) for name, kind in made.items()
+    }
     cases = read_cases([ROOT / "cases"], WHEELSET)
     return {
         name: [(judged_window(case, WHEELSET), replay(case, one)) for case in cases]

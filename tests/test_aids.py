@@ -101,7 +101,7 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(
     """In closed form: of n readings of variance R and k of variance r, (n/R + k/r)^-1."""
     kind = estimators_of(still)[name]
     t, u, y = samples(40)
-    found = kind(level, still, kind.reasoned(level, still)).run(t, u, y)
+    found = kind(level, still, kind.default_gains(level, still)).run(t, u, y)
     weights = np.isfinite(y) / np.array([0.2, 0.05]) ** 2
     information = weights.cumsum(axis=0).sum(axis=1)
     mean = (weights * np.nan_to_num(y)).cumsum(axis=0).sum(axis=1) / information
@@ -115,7 +115,7 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(
 def test_innovations_are_those_of_what_was_measured(still: System, level: FMU) -> None:
     kind = ExtendedKalmanFilter
     t, u, y = samples(2000)
-    nis = kind(level, still, kind.reasoned(level, still)).run(t, u, y).nis[1:]
+    nis = kind(level, still, kind.default_gains(level, still)).run(t, u, y).nis[1:]
     fed = np.isfinite(y[1:]).sum(axis=1)
     # Each is chi-squared of so many outputs: the mean of n of them scatters by sqrt(2 k/n).
     for k in (1, 2):
@@ -146,7 +146,7 @@ def test_estimators_with_fixed_gains_do_without_aids(still: System, level: FMU) 
         kind = estimators_of(still)[name]
         assert list(kind.fed(still).columns) == ["coarse"]
     kind = estimators_of(still)["open_loop"]
-    found = kind(level, still, kind.reasoned(level, still)).run(t, u, y)
+    found = kind(level, still, kind.default_gains(level, still)).run(t, u, y)
     assert_array_equal(found.values[:, 0], np.full(40, y[0, 0]))
 
 
@@ -215,14 +215,14 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop: tuple[Case, M
     kind, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
     with open_model(TRAIN) as model:
-        told = kind(model, TRAIN, kind.reasoned(model, TRAIN))
+        told = kind(model, TRAIN, kind.default_gains(model, TRAIN))
         values = []
         for rail in ("wet", "dry"):
-            told.tell({"rail": rail})
+            told.set_conditions({"rail": rail})
             values.append(told.run(case.time[part], case.u[part], case.y[part]).values)
         variant = model.variant(wet)
-        plain = kind(variant, TRAIN, kind.reasoned(variant, TRAIN))
-        plain.tell({"rail": "unknown"})
+        plain = kind(variant, TRAIN, kind.default_gains(variant, TRAIN))
+        plain.set_conditions({"rail": "unknown"})
         expected = plain.run(case.time[part], case.u[part], case.y[part]).values
     corrections = [list(told.system.columns).index(correction) for correction in TRAIN.corrections]
     # The friction that is estimated is a deviation from another nominal value.
@@ -235,11 +235,11 @@ def test_who_finds_a_condition_is_not_told(stop: tuple[Case, Made]) -> None:
     case, _ = stop
     kind, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
-        bank = kind(model, TRAIN, kind.reasoned(model, TRAIN))
+        bank = kind(model, TRAIN, kind.default_gains(model, TRAIN))
         found = []
         conditions: list[dict[str, Value]] = [{"rail": "dry"}, {"rail": "wet"}]
         for condition in conditions:
-            bank.tell(condition)
+            bank.set_conditions(condition)
             found.append(bank.run(case.time[part], case.u[part], case.y[part]).values)
     assert_array_equal(found[0], found[1])
 
@@ -354,4 +354,4 @@ def test_what_is_of_a_recording_is_not_watched_over_many() -> None:
 def test_a_constant_is_refused_by_who_could_not_find_it() -> None:
     kind = estimators_of(TRAIN)["disturbance_observer"]
     with open_model(TRAIN) as model, pytest.raises(InputError, match="found 0: a constant"):
-        kind.reasoned(model, TRAIN)
+        kind.default_gains(model, TRAIN)

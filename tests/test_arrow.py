@@ -140,7 +140,7 @@ def rolling(train: System) -> Iterator[FMU]:
 
 
 def made(fmu: FMU, system: System) -> tuple[ExtendedKalmanFilter, BlockKalmanFilter]:
-    gains = ExtendedKalmanFilter.reasoned(fmu, system)
+    gains = ExtendedKalmanFilter.default_gains(fmu, system)
     return ExtendedKalmanFilter(fmu, system, gains), BlockKalmanFilter(fmu, system, gains)
 
 
@@ -249,7 +249,7 @@ def dense_step(estimator: BlockKalmanFilter, u: Vector, y: Vector) -> tuple[Vect
     """Mean and covariance after a step, by matrices of all unknowns."""
     fmu, settings, h = estimator.fmu, estimator._settings.filter, estimator.system.sample_time
     fade = faded(estimator, y)
-    n, z, P = len(fmu.states), estimator._memory.z.copy(), estimator._joint()
+    n, z, P = len(fmu.states), estimator._state.z.copy(), estimator._joint()
     inputs = fmu.variables([one.name for one in estimator.system.inputs])
     corrections = fmu.variables(estimator.system.corrections)
     fmu.set_states(z[:n])
@@ -290,7 +290,7 @@ def test_a_step_keeps_what_is_known_of_a_block_and_the_shared_unknowns(
     _, estimator = made(rolling, train)
     z, P = blind(estimator, growth.stop(train), 60)
     sigma = np.sqrt(np.diag(P))
-    assert_allclose((estimator._memory.z - z) / sigma, 0.0, atol=1e-9)
+    assert_allclose((estimator._state.z - z) / sigma, 0.0, atol=1e-9)
     apart = np.abs(estimator._joint() - P) / np.outer(sigma, sigma)
     for own in marginals(estimator):
         assert apart[own].max() < 1e-9
@@ -302,7 +302,7 @@ def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling: FMU, train: S
     _, estimator = made(rolling, train)
     t, u, y = growth.stop(train)
     blind(estimator, (t, u, y), 60)
-    z, P, settings = estimator._memory.z.copy(), estimator._joint(), estimator._settings.filter
+    z, P, settings = estimator._state.z.copy(), estimator._joint(), estimator._settings.filter
     found = estimator.advance(np.array([1e-15]), u[60:61], y[60:61])
     seen = settings.layout.seen
     noise = (settings.floor + settings.relative * np.abs(y[60])) / faded(estimator, y[60])
@@ -312,7 +312,7 @@ def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling: FMU, train: S
     after = P - K @ P[seen]
     sigma = np.sqrt(np.diag(after))
     assert_allclose(found.nis[0], innovation @ np.linalg.solve(S, innovation), rtol=1e-6)
-    assert_allclose((estimator._memory.z - z - K @ innovation) / sigma, 0.0, atol=1e-6)
+    assert_allclose((estimator._state.z - z - K @ innovation) / sigma, 0.0, atol=1e-6)
     assert_allclose((estimator._joint() - after) / np.outer(sigma, sigma), 0.0, atol=1e-6)
 
 

@@ -25,7 +25,7 @@ def test_compiled_laws_agree_with_loops_written_in_numpy(
     system = plain_filters(system)
     kind = choose(system, [name])[name]
     with open_model(system, kind.role) as fmu:
-        gains = kind.reasoned(fmu, system)
+        gains = kind.default_gains(fmu, system)
         ours = kind(fmu, system, gains).run(*samples)
         with by_fmpy(name, fmu, system, gains) as loop:
             theirs = loop(*samples)
@@ -43,7 +43,7 @@ def test_the_model_alone_goes_the_same_way_by_fmpy(
 ) -> None:
     """Coasting, braking and standstill, as above."""
     samples = (dry_case.time, dry_case.u, dry_case.y)
-    ours = OpenLoop(minimal, system, OpenLoop.reasoned(minimal, system)).run(*samples).values
+    ours = OpenLoop(minimal, system, OpenLoop.default_gains(minimal, system)).run(*samples).values
     with open_loop(minimal, system) as loop:
         theirs = loop(*samples)
     columns = list(system.columns)
@@ -60,7 +60,7 @@ def test_plain_c_gives_the_same_bits_as_the_compiled_law(
     pytest.importorskip("ziglang")
     from workbench.machines.wheelset.benchmark.c_loop import CLoop
 
-    gains = DisturbanceObserver.reasoned(minimal, system)
+    gains = DisturbanceObserver.default_gains(minimal, system)
     observer = DisturbanceObserver(minimal, system, gains)
     ours = observer.run(dry_case.time, dry_case.u, dry_case.y)
     theirs = CLoop(minimal, system, gains).run(dry_case.time, dry_case.u, dry_case.y)

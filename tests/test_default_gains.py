@@ -66,7 +66,7 @@ def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(
     assert tuned.pop("parameter_estimator") == [False, True]
     assert not any(any(both) for both in tuned.values())
     own, other = gains["disturbance_observer"]
-    assert_allclose(other.values, known["disturbance_observer"].reasoned(full, system).values)
+    assert_allclose(other.values, known["disturbance_observer"].default_gains(full, system).values)
     assert np.abs(own.values - other.values).max() > 1.0
 
 
@@ -118,7 +118,7 @@ def test_simulate_says_whose_gains_it_used(root: Path, tmp_path: Path) -> None:
 
 
 def slow_disturbance_observer(fmu: FMU, system: System) -> tuple[Estimator, Gains]:
-    gains = DisturbanceObserver.reasoned(fmu, system)
+    gains = DisturbanceObserver.default_gains(fmu, system)
     values = gains.values.copy()
     values[12:16] *= 0.02  # those that act on muDC
     slow = gains.with_values(values)
@@ -126,7 +126,7 @@ def slow_disturbance_observer(fmu: FMU, system: System) -> tuple[Estimator, Gain
 
 
 def slow_parameter_estimator(fmu: FMU, system: System) -> tuple[Estimator, Gains]:
-    gains = estimators_of(system)["parameter_estimator"].reasoned(fmu, system)
+    gains = estimators_of(system)["parameter_estimator"].default_gains(fmu, system)
     slow = gains.with_values(0.2 * gains.values)
     return ParameterEstimator(fmu, system, slow), slow
 
@@ -166,3 +166,10 @@ def test_settling_predicts_how_much_of_a_friction_step_is_left(
     # The speed, and with it the slope of the creep law, falls by 6 % in these seconds.
     assert left > 0.1
     assert left == pytest.approx(settling.left(gains), rel=0.1)
+
+
+def test_methods_of_an_estimator_under_their_former_names_are_taken() -> None:
+    former = {"name": "former", "reasoned": classmethod(lambda cls, fmu, system: "its own")}
+    with pytest.warns(DeprecationWarning, match="reasoned is now called default_gains"):
+        kind = type("Former", (DisturbanceObserver,), former)
+    assert kind.default_gains(None, None) == "its own"

@@ -28,7 +28,7 @@ def fmu(minimal_path: Path) -> Iterator[FMU]:
 
 @pytest.fixture(scope="module")
 def gains(fmu: FMU, system: System) -> Gains:
-    return DisturbanceObserver.reasoned(fmu, system)
+    return DisturbanceObserver.default_gains(fmu, system)
 
 
 def slowed(gains: Gains, share: float) -> Gains:

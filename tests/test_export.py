@@ -55,9 +55,9 @@ class Exported:
     python: Estimator
 
 
-def reasoned(name: str) -> Gains:
+def default_gains(name: str) -> Gains:
     with open_model(SYSTEM, KINDS[name].role) as fmu:
-        return KINDS[name].reasoned(fmu, SYSTEM)
+        return KINDS[name].default_gains(fmu, SYSTEM)
 
 
 def write_fmu(folder: Path, gains: Gains, fmi: int = 2) -> Path:
@@ -86,7 +86,7 @@ def exported(
 ) -> Iterator[Exported]:
     kind = KINDS[request.param]
     with open_model(SYSTEM, kind.role) as fmu:
-        gains = with_all_gains(kind.reasoned(fmu, SYSTEM))
+        gains = with_all_gains(kind.default_gains(fmu, SYSTEM))
         path = write_fmu(tmp_path_factory.mktemp(kind.name), gains)
         yield Exported(path, kind(fmu, SYSTEM, gains))
 
@@ -174,7 +174,7 @@ def test_a_tool_without_python_of_ours_gets_the_same(
 ) -> None:
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     with open_model(SYSTEM, KINDS[name].role) as fmu:
-        gains = KINDS[name].reasoned(fmu, SYSTEM)
+        gains = KINDS[name].default_gains(fmu, SYSTEM)
         path = write_fmu(tmp_path, gains, fmi)
         estimator = KINDS[name](fmu, SYSTEM, gains)
         expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
@@ -217,7 +217,7 @@ def test_a_restored_state_repeats_the_steps(exported: Exported, dry_case: Case) 
 
 def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones() -> None:
     for name in NAMES:
-        gains = reasoned(name)
+        gains = default_gains(name)
         flat = observer.flatten(SYSTEM.library, ObserverModel(SYSTEM, KINDS[name], gains, "").model)
         defaults = {v.name: v.start for v in flat.parameters}
         for parameter, value in observer.parameter_values(gains, SYSTEM).items():
@@ -229,7 +229,7 @@ def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones() -> None:
 def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder that the command writes, with gains from a file."""
     folder = tmp_path_factory.mktemp("export")
-    gains = reasoned("disturbance_observer")
+    gains = default_gains("disturbance_observer")
     values = gains.values.copy()
     values[:16] *= 0.5
     (folder / "gains.toml").write_text(format_gains(gains.with_values(values), "", {"z": 0.3}))
@@ -264,7 +264,7 @@ def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
 
 @pytest.mark.long
 def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path: Path) -> None:
-    gains = reasoned("disturbance_observer")
+    gains = default_gains("disturbance_observer")
     model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
     build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
     with zipfile.ZipFile(tmp_path / "observer.fmu") as archive:

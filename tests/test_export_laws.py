@@ -76,7 +76,7 @@ def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
 def opened(system: System, name: str) -> Iterator[Estimator]:
     kind = choose(system, [name])[name]
     with open_model(system, kind.role) as fmu:
-        yield kind(fmu, system, kind.reasoned(fmu, system))
+        yield kind(fmu, system, kind.default_gains(fmu, system))
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -398,20 +398,20 @@ def test_a_machine_whose_output_is_no_state_exports(tmp_path: Path) -> None:
 
 OWN = """
 from workbench.models.native import compiled
-from workbench.observers.estimators.kalman import ExtendedKalmanFilter, ekf_law
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter, ekf_step
 
 
 @compiled
-def law(model, settings, memory, h, u, y, row):
+def step(model, settings, state, h, u, y, estimate):
     total = 0.0
     for value in y:
         total += value
-    return ekf_law(model, settings, memory, h, u, y, row)
+    return ekf_step(model, settings, state, h, u, y, estimate)
 
 
 class Own(ExtendedKalmanFilter):
     name = "own"
-    _law = staticmethod(law)
+    _step = staticmethod(step)
 
 
 class Curved(ExtendedKalmanFilter):
@@ -419,7 +419,7 @@ class Curved(ExtendedKalmanFilter):
 
     def _begin(self, u, y):
         super()._begin(u, y)
-        self._memory.z[-1] = y[0] ** 2
+        self._state.z[-1] = y[0] ** 2
 
 
 class Shared(ExtendedKalmanFilter):
@@ -427,7 +427,7 @@ class Shared(ExtendedKalmanFilter):
 
     def __init__(self, fmu, system, gains):
         super().__init__(fmu, system, gains)
-        self._memory = self._memory._replace(change=self._memory.z)
+        self._state = self._state._replace(change=self._state.z)
 """
 
 
@@ -449,7 +449,7 @@ def test_what_does_not_become_c_is_refused_in_words(
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     kind = getattr(module, name)
-    law = EstimatorLaw(kind(minimal, SYSTEM, kind.reasoned(minimal, SYSTEM)), "")
+    law = EstimatorLaw(kind(minimal, SYSTEM, kind.default_gains(minimal, SYSTEM)), "")
     with pytest.raises(InputError, match=match):
         build_law(law, tmp_path / "own.fmu", 2, lambda _: None, platforms=[native()])
     assert not (tmp_path / "own.fmu").exists()
@@ -459,7 +459,7 @@ def test_a_model_that_is_not_of_the_library_is_refused(
     tmp_path: Path, reference_path: Path
 ) -> None:
     with FMU(reference_path) as fmu:
-        gains = ExtendedKalmanFilter.reasoned(fmu, SYSTEM)
+        gains = ExtendedKalmanFilter.default_gains(fmu, SYSTEM)
         law = EstimatorLaw(ExtendedKalmanFilter(fmu, SYSTEM, gains), "")
         with pytest.raises(InputError, match=r"expected what WheelsetRig\.MinimalObserver has"):
             build_law(law, tmp_path / "own.fmu", 2, lambda _: None, platforms=[native()])

@@ -95,7 +95,7 @@ def observer(fmu: FMU) -> DisturbanceObserver:
 
 def gains_of(fmu: FMU) -> Gains:
     """Reasoned gains; the FMU is left at its operating point."""
-    return DisturbanceObserver.reasoned(fmu, SYSTEM)
+    return DisturbanceObserver.default_gains(fmu, SYSTEM)
 
 
 def force_error(case: Case, estimator: Estimator) -> float:
@@ -184,7 +184,7 @@ def test_a_worn_wheel_at_standstill_has_no_creep_force(
     """The radius of rolling is the model's, not the parameter rW: that would leave 7 kN."""
     fmu = extended["Worn"]
     case = dry_case.with_signals({"omegaW": dry_case["omegaW"] * fmu.defaults["rW"] / WORN})
-    run = replay(case, method(fmu, SYSTEM, method.reasoned(fmu, SYSTEM)))
+    run = replay(case, method(fmu, SYSTEM, method.default_gains(fmu, SYSTEM)))
     resting = case.time > case.time[-1] - 0.5
     # 100 N is the noise of the load cell itself (80 N) with a margin for the drive's torque.
     assert np.abs(run.signal("Fx")[resting]).max() < 100.0

@@ -152,7 +152,7 @@ def case(folder: Path, tanks: System) -> Case:
 
 def made(fmu: FMU, tanks: System, name: str) -> Estimator:
     kind = estimators_of(tanks)[name]
-    return kind(fmu, tanks, kind.reasoned(fmu, tanks))
+    return kind(fmu, tanks, kind.default_gains(fmu, tanks))
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +214,7 @@ def test_filters_are_the_kalman_filter_where_the_model_is_linear(
     fmu: FMU, tanks: System, case: Case, runs: dict[str, Run], name: str
 ) -> None:
     """Reference: textbook equations in matrices, with the same implicit step."""
-    gains = estimators_of(tanks)[name].reasoned(fmu, tanks)
+    gains = estimators_of(tanks)[name].default_gains(fmu, tanks)
     walk = np.array([1e-5, 1e-5, gains["leak"]])
     A = np.array([[-PIPE, PIPE, 0.0], [PIPE, -PIPE - DRAIN, -1.0], [0.0, 0.0, 0.0]])
     A[:2] /= AREA

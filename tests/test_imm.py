@@ -107,7 +107,7 @@ def case(vessel: System) -> Case:
 def bank(fmu: FMU, system: System, lasts: float) -> InteractingMultipleModel:
     conditions = tuple(replace(condition, lasts=lasts) for condition in system.conditions)
     given = replace(system, conditions=conditions)
-    return InteractingMultipleModel(fmu, given, InteractingMultipleModel.reasoned(fmu, given))
+    return InteractingMultipleModel(fmu, given, InteractingMultipleModel.default_gains(fmu, given))
 
 
 def textbook(case: Case, transition: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -195,7 +195,7 @@ def rails() -> dict[str, Run]:
     """Wet and dry stops of the rig."""
     found = read_cases([ROOT / "cases"], WHEELSET)
     with open_model(WHEELSET) as opened:
-        gains = InteractingMultipleModel.reasoned(opened, WHEELSET)
+        gains = InteractingMultipleModel.default_gains(opened, WHEELSET)
         own = InteractingMultipleModel(opened, WHEELSET, gains)
         return {one.name: replay(one, own) for one in found}
 
@@ -205,7 +205,7 @@ def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
     plain = replace(WHEELSET, conditions=conditions, bands={})
     case = read_case(ROOT / "cases" / "09_wet_160_4.2_wsp", plain)
     with open_model(plain) as opened:
-        gains = ExtendedKalmanFilter.reasoned(opened, plain)
+        gains = ExtendedKalmanFilter.default_gains(opened, plain)
         kinds = (ExtendedKalmanFilter, InteractingMultipleModel)
         alone, one = (kind(opened, plain, gains).run(case.time, case.u, case.y) for kind in kinds)
     assert_allclose(one.values, alone.values, rtol=1e-12, atol=0)

@@ -185,7 +185,7 @@ def least(samples: tuple[Vector, Matrix, Matrix]) -> OptimizeResult:
 def horizon(
     fmu: FMU, known: System, samples: int, iterations: int = 1, rare: float = 1e-6
 ) -> MovingHorizonEstimator:
-    gains = MovingHorizonEstimator.reasoned(fmu, known)
+    gains = MovingHorizonEstimator.default_gains(fmu, known)
     design = {
         **gains.design,
         "horizon": np.array([samples]),
@@ -197,13 +197,13 @@ def horizon(
 
 
 def smoother(fmu: FMU, known: System, rare: float = 1e-300) -> Smoother:
-    gains = Smoother.reasoned(fmu, known)
+    gains = Smoother.default_gains(fmu, known)
     design = {**gains.design, "rare": np.array([rare])}
     return Smoother(fmu, known, type(gains)("smoother", gains.names, gains.values, design, ""))
 
 
 def kalman(fmu: FMU, known: System, samples: tuple[Vector, Matrix, Matrix]) -> Estimate:
-    gains = ExtendedKalmanFilter.reasoned(fmu, known)
+    gains = ExtendedKalmanFilter.default_gains(fmu, known)
     return ExtendedKalmanFilter(fmu, known, gains).run(*samples)
 
 
@@ -251,14 +251,14 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(
     best = least(samples)
     estimator = horizon(*bent, 40, iterations=8)
     estimator.run(*samples)
-    window = estimator._memory.window
+    window = estimator._state.window
     count = window.filled[0]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
     found = window.nodes[:count] / SIZES
     assert_allclose(found, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
     assert cost(window) == pytest.approx(2.0 * best.cost, rel=1e-7)
     assert_allclose(
-        estimator._memory.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
+        estimator._state.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
     )
 
 
@@ -288,7 +288,7 @@ def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder: Pat
     with open_model(known) as fmu:
         estimator = horizon(fmu, known, 50, rare=1e-300)
         estimator.run(*samples)
-        window = estimator._memory.window
+        window = estimator._state.window
         found = window.arrived[: window.filled[0]] / unit.reshape(-1, 3)
     # Rounding, grown by a condition number of about 1e5.
     assert_allclose(found, best.x.reshape(-1, 3), rtol=0, atol=1e-6)
@@ -339,7 +339,7 @@ def test_more_iterations_never_raise_the_cost(bent: tuple[FMU, System], seed: in
     for iterations in (1, 2, 4, 8):
         estimator = horizon(*bent, 40, iterations, rare=1e-300)
         estimator.run(time, u, y)
-        costs.append(cost(estimator._memory.window))
+        costs.append(cost(estimator._state.window))
     # Rounding of a sum of about a hundred squares; steps are refused beyond 1e-9 of it.
     assert (np.diff(costs) <= 1e-6 * costs[0]).all()
 
@@ -398,7 +398,7 @@ def test_the_smoother_keeps_quantities_within_their_bounds(folder: Path) -> None
     with open_model(known) as fmu:
         estimator = horizon(fmu, known, 50, rare=1e-300)
         estimator.run(*samples)
-        window = estimator._memory.window
+        window = estimator._state.window
         expected = window.arrived[: window.filled[0]]
         found = smoother(fmu, known).run(*samples)
     assert (np.abs(found.values[1:, 2] - 0.5e-4) < 1e-15).sum() > 5

@@ -75,7 +75,7 @@ def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
         FMU(renamed_path, NAMES) as theirs,
     ):
         for fmu in (ours, theirs):
-            run = replay(start_of_stop, kind(fmu, system, kind.reasoned(fmu, system)))
+            run = replay(start_of_stop, kind(fmu, system, kind.default_gains(fmu, system)))
             assert run.ending is Ending.OK
             estimates.append(run.estimate)
     assert_array_equal(*estimates)
@@ -104,7 +104,7 @@ def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_pa
 
 
 def open_loop(fmu: FMU, system: System) -> OpenLoop:
-    return OpenLoop(fmu, system, OpenLoop.reasoned(fmu, system))
+    return OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def fmu(minimal_path: Path) -> Iterator[FMU]:
 
 @pytest.fixture(scope="module")
 def gains(fmu: FMU, system: System) -> Gains:
-    return DisturbanceObserver.reasoned(fmu, system)
+    return DisturbanceObserver.default_gains(fmu, system)
 
 
 def matrices(gains: Gains) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +126,7 @@ def made(fmu: FMU, root: Path, system: System) -> Iterator[dict[str, Estimator]]
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         by_role = {"observer": fmu, "full": full}
         yield {
-            name: kind(by_role[kind.role], system, kind.reasoned(by_role[kind.role], system))
+            name: kind(by_role[kind.role], system, kind.default_gains(by_role[kind.role], system))
             for name, kind in estimators_of(system).items()
         }
 
@@ -216,7 +216,7 @@ def test_kalman_filters_know_how_much_they_know(
 ) -> None:
     """Consistency on a recording with exactly the assumed sensor noise (Bar-Shalom et al. 2001)."""
     case = stop(drying)
-    assumed = method.reasoned(fmu, WHEELSET)
+    assumed = method.default_gains(fmu, WHEELSET)
     values = assumed.values.copy()
     values[assumed.names.index("omegaW_relative")] = 3e-4
     run = replay(case, method(fmu, WHEELSET, assumed.with_values(values)))
@@ -265,7 +265,7 @@ def test_observers_run_on_the_full_model_too(fmu: FMU, stop: Stop, root: Path, n
     case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         kind = estimators_of(WHEELSET)[name]
-        estimator = kind(full, WHEELSET, kind.reasoned(full, WHEELSET))
+        estimator = kind(full, WHEELSET, kind.default_gains(full, WHEELSET))
         judged = score(case, replay(case, estimator), WHEELSET)
         assert judged.nrmse is not None
         assert judged.nrmse < 0.02
@@ -289,7 +289,7 @@ def test_any_fmu_runs_in_the_same_loop(
 
 def test_parameter_estimator_has_the_poles_it_was_given(fmu: FMU) -> None:
     """Reference: eigenvalues of model and PI controller at the design point."""
-    gains = WheelsetParameterEstimator.reasoned(fmu, WHEELSET)
+    gains = WheelsetParameterEstimator.default_gains(fmu, WHEELSET)
     L = gains.values.reshape(2, 4)
     A = fmu.state_jacobian()
     B = fmu.input_jacobian(fmu.variables(["dmuWR", "dmuDC"]))
@@ -313,7 +313,7 @@ def test_forward_and_reverse_are_mirror_images(
     # On the minimal model: the full one has its pads on one side, which is not symmetric.
     estimator = made[name]
     if name == "parameter_estimator":
-        reasoned = WheelsetParameterEstimator.reasoned(fmu, WHEELSET)
+        reasoned = WheelsetParameterEstimator.default_gains(fmu, WHEELSET)
         estimator = ParameterEstimator(fmu, WHEELSET, reasoned)
     forward, reverse = replay(case, estimator), replay(mirrored, estimator)
     turning = ("omegaW", "omegaR", "Fx", "slip", "speed")
@@ -470,7 +470,7 @@ def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(
         tunable = True
 
     with pytest.raises(InputError, match=r"silent: found no method `space`.*tunable = False"):
-        Silent.space(minimal, system, Silent.reasoned(minimal, system), 0.1, 10.0)
+        Silent.space(minimal, system, Silent.default_gains(minimal, system), 0.1, 10.0)
 
 
 # --- what laws are made of ---

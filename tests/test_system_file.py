@@ -300,11 +300,11 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
     part = slice(0, 2000)
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
     with FMU(minimal_path, {}, {"rW": 0.42}) as theirs, open_model(mine) as ours:
-        expected = kind(theirs, usual, kind.reasoned(theirs, usual)).run(*samples)
-        found = kind(ours, mine, kind.reasoned(ours, mine)).run(*samples)
+        expected = kind(theirs, usual, kind.default_gains(theirs, usual)).run(*samples)
+        found = kind(ours, mine, kind.default_gains(ours, mine)).run(*samples)
     assert_array_equal(found.values, expected.values)
     with open_model(usual) as nominal:
-        other = kind(nominal, usual, kind.reasoned(nominal, usual)).run(*samples)
+        other = kind(nominal, usual, kind.default_gains(nominal, usual)).run(*samples)
     assert np.abs(found.values - other.values).max() > 1.0
 
 
@@ -317,8 +317,8 @@ def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
     (kind,) = choose(plain, ["ekf"]).values()
     with open_model(system) as fmu:
-        expected = kind(fmu, plain, kind.reasoned(fmu, plain)).run(*samples)
-        found = kind(fmu, wider, kind.reasoned(fmu, wider)).run(*samples)
+        expected = kind(fmu, plain, kind.default_gains(fmu, plain)).run(*samples)
+        found = kind(fmu, wider, kind.default_gains(fmu, wider)).run(*samples)
     assert_array_equal(found.values, expected.values)
     assert_array_equal(found.nis, expected.nis)
     factors = [1.5 if name == "Fx" else 1.0 for name in system.columns]

@@ -29,15 +29,15 @@ SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
 # --- gains.toml ---
 
 
-def reasoned(system: System, name: str) -> Gains:
+def default_gains(system: System, name: str) -> Gains:
     kind = tunable(system, name)
     with open_model(system, kind.role) as fmu:
-        return kind.reasoned(fmu, system)
+        return kind.default_gains(fmu, system)
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf", "ukf"])
 def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -> None:
-    gains = reasoned(system, name)
+    gains = default_gains(system, name)
     provenance = {"z": 0.1, "cases": ['a "b"'], "z_k": {"a.b": 1}}
     path = tmp_path / "gains.toml"
     path.write_text(format_gains(gains, tunable(system, name).meaning, provenance))
@@ -81,7 +81,7 @@ def test_a_wrong_file_of_gains_is_refused(
 ) -> None:
     path = tmp_path / "gains.toml"
     path.write_text(text)
-    known = {name: reasoned(system, name) for name in ("ekf", "parameter_estimator")}
+    known = {name: default_gains(system, name) for name in ("ekf", "parameter_estimator")}
     with pytest.raises(InputError, match=match):
         read_gains(path, known)
 
@@ -179,7 +179,7 @@ def test_results_keep_their_contract(
     assert len(summary["folds"]) == 2
     assert len(summary["provenance"]["fmu"]["sha256"]) == 64
     path = tmp_path / "gains.toml"
-    gains = read_gains(path, {"parameter_estimator": reasoned(system, "parameter_estimator")})
+    gains = read_gains(path, {"parameter_estimator": default_gains(system, "parameter_estimator")})
     assert_array_equal(gains.values, [g["value"] for g in summary["gains"].values()])
     for name in ("convergence.png", "cases.png"):
         assert (tmp_path / name).stat().st_size > 10_000

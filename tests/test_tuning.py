@@ -56,7 +56,7 @@ def test_planted_gains_are_found(
     name = "parameter_estimator"
     kind = estimators_of(system)[name]
     with open_model(system, kind.role) as fmu:
-        reasoned = kind.reasoned(fmu, system)
+        reasoned = kind.default_gains(fmu, system)
         planted = reasoned.values * [1, 1, 0.5, 2, 1, 2, 1, 0.5]
         estimator = kind(fmu, system, reasoned.with_values(planted))
         forces = [replay(case, estimator).signal("Fx") for case in stop_beginnings]
@@ -192,7 +192,9 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
     assert [fold.cases for fold in folds] == [(r.name,) for r in job.recordings]
     assert_array_equal([fold.reasoned for fold in folds], z_k)
     assert all(np.isfinite(fold.tuned) for fold in folds)
-    observer = DisturbanceObserver(minimal, system, DisturbanceObserver.reasoned(minimal, system))
+    observer = DisturbanceObserver(
+        minimal, system, DisturbanceObserver.default_gains(minimal, system)
+    )
     for fold, case in zip(folds, stop_beginnings, strict=True):
         assert fold.error_reasoned == score(case, replay(case, observer), system).nrmse
     # Held-out force is judged by the gains that were found, not by the reasoned ones.

@@ -299,7 +299,7 @@ def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, st
     """Reasoned gains of an estimator, and what it tells of them."""
     kind = estimators_of(system)[estimator]
     with open_model(system, kind.role) as fmu:
-        gains = kind.reasoned(fmu, system)
+        gains = kind.default_gains(fmu, system)
         return gains, kind.meanings(fmu, system, gains)
 
 

@@ -118,7 +118,7 @@ def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
 def made(fmu: FMU, system: System, name: str) -> Estimator:
     """An estimator with reasoned gains."""
     kind = choose(system, [name])[name]
-    return kind(fmu, system, kind.reasoned(fmu, system))
+    return kind(fmu, system, kind.default_gains(fmu, system))
 
 
 @pytest.fixture(scope="module")

@@ -178,7 +178,7 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Pa
         names = [x.name for x in one.estimated]
         with open_model(one) as model:
             kind = ExtendedKalmanFilter
-            estimator = kind(model, one, kind.reasoned(model, one))
+            estimator = kind(model, one, kind.default_gains(model, one))
             values = estimator.run(samples[0], samples[1][:, order], samples[2]).values
         at = [list(one.columns).index(name) for name in sorted(names)]
         estimates.append(values[:, at])

@@ -46,7 +46,7 @@ def open_loop(case: Case, role: str) -> Run:
     """A model of the rig by itself."""
     kind = estimators_of(SYSTEM)["open_loop"]
     with FMU(model_path(SYSTEM, role)) as fmu:
-        return replay(case, kind(fmu, SYSTEM, kind.reasoned(fmu, SYSTEM)))
+        return replay(case, kind(fmu, SYSTEM, kind.default_gains(fmu, SYSTEM)))
 
 
 def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light: Case, unsaid: Case) -> None:

@@ -147,7 +147,7 @@ def _workbook(files: Files, random: Random) -> tuple[Files, str]:
 def _gains(system: System) -> Target:
     name = "disturbance_observer"
     with open_model(system) as model:
-        reasoned = {name: tunable(system, name).reasoned(model, system)}
+        reasoned = {name: tunable(system, name).default_gains(model, system)}
     source = (
         Path(__file__).parents[2] / "workbench" / "machines" / "wheelset" / "gains" / f"{name}.toml"
     )

@@ -58,7 +58,7 @@ def time_horizon(case: Case, system: System) -> HorizonTimes:
     steps = np.diff(case.time, prepend=case.time[0])
     with open_model(system) as fmu:
         estimator = MovingHorizonEstimator(
-            fmu, system, MovingHorizonEstimator.reasoned(fmu, system)
+            fmu, system, MovingHorizonEstimator.default_gains(fmu, system)
         )
         spent = []
         part = slice(half, half + _SAMPLES)
@@ -91,7 +91,7 @@ def format_horizon(times: HorizonTimes) -> str:
 
 def _converged(fmu: FMU, system: System, case: Case) -> Window:
     """The window over the first half of a recording, whose last problem is solved to the end."""
-    gains = MovingHorizonEstimator.reasoned(fmu, system)
+    gains = MovingHorizonEstimator.default_gains(fmu, system)
     design = {**gains.design, "iterations": np.array([float(_CONVERGED)])}
     half = case.time.size // 2
     estimator = MovingHorizonEstimator(

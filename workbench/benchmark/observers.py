@@ -106,7 +106,7 @@ def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[lis
         ready = []
         for kind in choose(system, names).values():
             fmu = stack.enter_context(open_model(system, role or kind.role))
-            ready.append(kind(fmu, system, kind.reasoned(fmu, system)))
+            ready.append(kind(fmu, system, kind.default_gains(fmu, system)))
         yield ready
 
 

@@ -124,7 +124,7 @@ def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
 def tuning_job(kind: type[Estimator], system: System, cases: Sequence[Case]) -> Job:
     """What is to be evaluated, about the reasoned gains."""
     with open_model(system, kind.role) as fmu:
-        gains, model = kind.reasoned(fmu, system), fmu.path.read_bytes()
+        gains, model = kind.default_gains(fmu, system), fmu.path.read_bytes()
     recordings = tuple(recording(case, system) for case in cases)
     return Job(kind.name, system, model, gains, recordings)
 

@@ -89,7 +89,7 @@ def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
     kind = choose(system, [asked])[asked]
     name = kind.tuned_as or kind.name
     with open_model(system, kind.role) as fmu:
-        gains = kind.reasoned(fmu, system)
+        gains = kind.default_gains(fmu, system)
     path = path or tuned_file(system, name)
     if path is None:
         return _Choice(kind, gains, format_gains(gains, kind.meaning, {}), gains.source)

@@ -244,7 +244,7 @@ class _Found:
         with open_model(system) as nominal:
             for estimator in _TRIED:
                 try:
-                    gains[estimator] = estimator.reasoned(nominal, system)
+                    gains[estimator] = estimator.default_gains(nominal, system)
                 except InputError as refused:  # a model may be fit for this, and for no observer
                     report(f"no {estimator.label}: {refused.found}")
         errors: dict[str, dict[str, list[float]]] = {}

@@ -1,5 +1,6 @@
 """What every estimator does, and what they share."""
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,6 +17,8 @@ from workbench.observers.layout import layout, rolling_ratio
 from workbench.recordings.case import Value
 from workbench.system.check import check_model
 from workbench.system.system import OBSERVER, System
+
+_RENAMED = {"reasoned": "default_gains", "tell": "set_conditions", "_law": "_step"}
 
 
 @dataclass(frozen=True)
@@ -38,29 +41,29 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Parts:
-    """A law and what it takes, for who writes it in another language.
+    """A compiled step and what it takes, for who writes it in another language.
 
     Attributes
     ----------
-    law : compiled.
+    step : compiled; advances by one sample.
     models : that it steps; `several`: it takes the tuple of them, else the only one.
-    settings, memory : named tuples, whose arrays are those of the estimator.
+    settings, state : named tuples, whose arrays are those of the estimator.
     width : entries of an estimate.
     """
 
-    law: Any
+    step: Any
     models: tuple[Instance, ...]
     several: bool
     settings: Any
-    memory: Any
+    state: Any
     width: int
 
 
 class Estimator(ABC):
     """Feeds on measured inputs u and outputs y of a system, sample by sample.
 
-    A method provides `_begin`, which fills its memory, and two compiled functions: `_law` advances
-    by one sample, `_loop` runs the law over a recording. What is tuned are its gains: `reasoned`
+    A method provides `_begin`, which fills its state, and two compiled functions: `_step` advances
+    by one sample, `_loop` runs it over a recording. What is tuned are its gains: `default_gains`
     says what they are before tuning, `space` where they are sought.
 
     Parameters
@@ -106,7 +109,7 @@ class Estimator(ABC):
     aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     finds: frozenset[str] = frozenset()
-    _law: Any
+    _step: Any
     _loop: Any
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -125,6 +128,14 @@ class Estimator(ABC):
         bands = system.bands.get(self.name, {})
         self.bands = np.array([bands.get(name, 1.0) for name in system.columns])
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Take methods of an estimator that still have their former names, for one version."""
+        super().__init_subclass__(**options)
+        for old, new in _RENAMED.items():
+            if old in vars(cls):
+                warnings.warn(f"{cls.__name__}.{old} is now called {new}", DeprecationWarning, 2)
+                setattr(cls, new, vars(cls)[old])
+
     @property
     def models(self) -> tuple[FMU, ...]:
         """What it runs on: the model, or one of each mode."""
@@ -137,9 +148,18 @@ class Estimator(ABC):
         return replace(system, outputs=(*system.outputs, *aids), intermittent=())
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """Gains before tuning; the FMU is left at an operating point."""
         return Gains(cls.name, (), np.zeros(0), {}, "")
+
+    @classmethod
+    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+        """Call `default_gains`; the former name, for one version."""
+        warnings.warn("reasoned is now called default_gains", DeprecationWarning, stacklevel=2)
+        # Of an override that asks the method it overrides.
+        owner: Any = super(cls, cls) if "reasoned" in vars(cls) else cls
+        gains: Gains = owner.default_gains(fmu, system)
+        return gains
 
     @classmethod
     def space(
@@ -197,21 +217,21 @@ class Estimator(ABC):
 
     @abstractmethod
     def _begin(self, u: Vector, y: Vector) -> None:
-        """Set the memory to the first sample."""
+        """Set the state to the first sample."""
 
     @abstractmethod
     def _arguments(self) -> tuple[Any, Any]:
-        """Settings and memory of the law."""
+        """Settings and state of the step."""
 
     @property
     def parts(self) -> Parts:
-        """The law and what it takes."""
-        settings, memory = self._arguments()
+        """The compiled step and what it takes."""
+        settings, state = self._arguments()
         several = not isinstance(self._model, Instance)
         models = self._model if several else (self._model,)
-        return Parts(self._law, models, several, settings, memory, self._width)
+        return Parts(self._step, models, several, settings, state, self._width)
 
-    def tell(self, conditions: Mapping[str, Value]) -> None:
+    def set_conditions(self, conditions: Mapping[str, Value]) -> None:
         """Take the parameters of a recording's conditions from its next start on.
 
         Those that estimators are told, and their model has; estimates of quantities start there.
@@ -220,8 +240,13 @@ class Estimator(ABC):
         told = self.system.set_by(conditions, told=True)
         self._known = {name: told[name] for name in told if name in self.fmu.parameters}
 
+    def tell(self, conditions: Mapping[str, Value]) -> None:
+        """Call `set_conditions`; the former name, for one version."""
+        warnings.warn("tell is now called set_conditions", DeprecationWarning, stacklevel=2)
+        Estimator.set_conditions(self, conditions)
+
     def start(self, u: Vector, y: Vector) -> None:
-        """Start FMU and memory from the first sample; `advance` takes it again, after no time."""
+        """Start FMU and state from the first sample; `advance` takes it again, after no time."""
         measured = zip(self.system.outputs, self._measured(y), strict=True)
         begin = {
             one.name: float(value)
@@ -286,9 +311,9 @@ class Estimator(ABC):
     def _run(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
         """Rows of estimates, as laws write them."""
         rows = np.full((steps.size, self._width), np.nan)
-        settings, memory = self._arguments()
+        settings, state = self._arguments()
         y = read_only(self._measured(y))
-        status = self._loop(self._model, settings, memory, steps, read_only(u), y, rows)
+        status = self._loop(self._model, settings, state, steps, read_only(u), y, rows)
         raise_on_failure(status, self.fmu)
         return rows
 

@@ -82,7 +82,7 @@ def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
     Those that the system's plugin brings serve the model that they were tuned on; another one
     gets gains that follow from its linearisation. The FMU is left at an operating point.
     """
-    reasoned = kind.reasoned(fmu, system)
+    reasoned = kind.default_gains(fmu, system)
     name = kind.tuned_as or kind.name
     path = tuned_file(system, name)
     if path is None:

@@ -67,7 +67,7 @@ def layout(fmu: FMU, system: System) -> Layout:
     pace = np.array(system.slopes(fading.signal)) if fading else np.zeros(len(seen))
     follower = leader = -1
     if rolling:
-        follower, leader = (_state(fmu, name) for name in (rolling.follower, rolling.leader))
+        follower, leader = (_state_index(fmu, name) for name in (rolling.follower, rolling.leader))
     return Layout(
         seen=np.array(seen, np.intp),
         nominal=nominal,
@@ -90,10 +90,10 @@ def layout(fmu: FMU, system: System) -> Layout:
 
 def _column(fmu: FMU, name: str, shown: Mapping[str, int]) -> int:
     """Column of the Jacobian for a state or an output that is none; -1 for no name."""
-    return shown.get(name, -1) if name in shown or not name else _state(fmu, name)
+    return shown.get(name, -1) if name in shown or not name else _state_index(fmu, name)
 
 
-def _state(fmu: FMU, name: str) -> int:
+def _state_index(fmu: FMU, name: str) -> int:
     if name not in fmu.states:
         raise InputError(
             where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
@@ -117,7 +117,7 @@ def rolling_ratio(fmu: FMU, system: System) -> float:
     readings = []
     for name in (rolling.leader, rolling.follower):
         moving = rest.copy()
-        moving[_state(fmu, name)] = 1.0
+        moving[_state_index(fmu, name)] = 1.0
         fmu.set_states(moving)
         readings.append(float(fmu.get(zero)[0]))
     fmu.set_states(rest)
@@ -241,16 +241,16 @@ def put(model, z):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def report(model, layout, row):  # type: ignore[no-untyped-def]
+def report(model, layout, estimate):  # type: ignore[no-untyped-def]
     """Write the estimate that the FMU is at into a row; returns a status."""
     status = read(model)
     outputs, q = layout.seen.size, layout.nominal.size
     first = model.u.size - q
     for j in range(outputs):
-        row[j] = output(model, layout, j)
+        estimate[j] = output(model, layout, j)
     for i in range(q):
-        row[outputs + i] = model.u[first + i]
-        row[outputs + q + i] = layout.nominal[i] + model.u[first + i]
+        estimate[outputs + i] = model.u[first + i]
+        estimate[outputs + q + i] = layout.nominal[i] + model.u[first + i]
     for i in range(layout.reported):
-        row[outputs + 2 * q + i] = model.y[i]
+        estimate[outputs + 2 * q + i] = model.y[i]
     return status

@@ -98,7 +98,7 @@ class LiveWindow:
     def _step(self, case: Case, estimator: Estimator, lines: Sequence[Line2D]) -> None:
         u, y = case.u, case.y
         columns = [list(estimator.system.columns).index(name) for name in self._signals]
-        estimator.tell(case.conditions)
+        estimator.set_conditions(case.conditions)
         values = np.full((case.time.size, len(self._signals)), np.nan)
         drawn = time.monotonic()
         for k, t in enumerate(case.time):

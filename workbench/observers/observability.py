@@ -261,7 +261,7 @@ def case_observability(
         If the observer fails.
     """
     with open_model(system, OBSERVER) as fmu:
-        gains = DisturbanceObserver.reasoned(fmu, system)
+        gains = DisturbanceObserver.default_gains(fmu, system)
         run = replay(case, DisturbanceObserver(fmu, system, gains))
     if run.ending is not Ending.OK:
         raise FMUError(f"{case.name}: {run.ending.value} {run.message}".strip())

@@ -47,7 +47,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
     claimed: dict[str, NDArray[np.bool_]] = {}
     ending, message = Ending.OK, ""
     try:
-        estimator.tell(case.conditions)
+        estimator.set_conditions(case.conditions)
         estimate = estimator.run(case.time, case.u, case.y)
         seconds = time.perf_counter() - begin
         values = np.asarray(estimate.values)

@@ -246,7 +246,7 @@ def prepare(
 
 def gains_for(kind: type[Estimator], fmu: FMU, system: System, tuned: bool) -> Gains:
     """Gains of an estimator, tuned or reasoned; the FMU is left at an operating point."""
-    return usual_gains(kind, fmu, system) if tuned else kind.reasoned(fmu, system)
+    return usual_gains(kind, fmu, system) if tuned else kind.default_gains(fmu, system)
 
 
 def _given(

@@ -236,7 +236,7 @@ class Evaluator:
         low_pass, pole = np.zeros((2, shares.size)), corner(objective)
         end = 0
         try:
-            estimator.tell(case.conditions)
+            estimator.set_conditions(case.conditions)
             estimator.start(case.u[0], case.y[0])
             for begin, end in pairwise(edges):
                 part = slice(begin, end)

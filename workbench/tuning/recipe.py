@@ -183,7 +183,7 @@ def pose(
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
     with open_model(system, kind.role) as model:
-        gains = kind.reasoned(model, system)
+        gains = kind.default_gains(model, system)
         space = kind.space(model, system, gains, slowest, fastest)
         meanings = kind.meanings(model, system, gains)
         provenance = {

@@ -79,7 +79,7 @@ def untuned_filters(job: Job) -> dict[str, Vector]:
     known, system = estimators_of(job.system), job.system
     with load_model(job) as fmu:
         makes = {
-            name: kind.reasoned(fmu, system)
+            name: kind.default_gains(fmu, system)
             for name, kind in known.items()
             if kind.tunable and kind.adapts
         }

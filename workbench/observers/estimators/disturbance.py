@@ -54,7 +54,7 @@ from workbench.system.system import System
 from workbench.system.units import quotient
 
 
-class Settings(NamedTuple):
+class ObserverSettings(NamedTuple):
     """What the law is given.
 
     Attributes
@@ -76,7 +76,7 @@ class Settings(NamedTuple):
     effect: Vector
 
 
-class Memory(NamedTuple):
+class ObserverState(NamedTuple):
     """What the law remembers.
 
     Attributes
@@ -97,22 +97,22 @@ class Memory(NamedTuple):
 
 
 @inlined
-def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of equation (9); other states each by themselves."""
-    layout, states, z = settings.layout, settings.states, memory.z
-    system, innovation = memory.system, memory.innovation
+    layout, states, z = settings.layout, settings.states, state.z
+    system, innovation = state.system, state.innovation
     n, s, q, outputs = model.x.size, states.size, z.size, y.size
     change = system[:, s + q]
     status = measure(model, u)
     if h > 0.0:
         status = status or evaluate(model)
         for i in range(n):
-            memory.others[i] = h * model.dx[i]
+            state.others[i] = h * model.dx[i]
         for i in range(s):
             change[i] = h * model.dx[states[i]]
         for i in range(q):
-            decay = settings.decay[i] * (z[i] - memory.target[i])
-            change[s + i] = h * decay + memory.drift[i]
+            decay = settings.decay[i] * (z[i] - state.target[i])
+            change[s + i] = h * decay + state.drift[i]
         for j in range(outputs):
             innovation[j] = y[j] - output(model, layout, j)
         status = status or linearise(model, layout.columns)
@@ -134,7 +134,7 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
                 # The integral at the end of the step is part of the implicit equation.
                 direct, integrated = share * settings.L[i, j], share * settings.L[i, outputs + j]
                 gain = h * (direct + h * integrated)
-                total += gain * innovation[j] + h * integrated * memory.integral[j]
+                total += gain * innovation[j] + h * integrated * state.integral[j]
                 add_slope(model, layout, j, gain, settings.places, equation)
             change[i] = total
         status = status or solve(system)
@@ -142,23 +142,23 @@ def law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
             return status
         for j in range(outputs):
             left = innovation[j] - explained(model, layout, j, settings.places, change)
-            memory.integral[j] += h * left
+            state.integral[j] += h * left
         before = lag(layout, model.x)
         for i in range(n):
             if settings.places[i] < 0:
-                model.x[i] += memory.others[i] / (1.0 - h * model.jacobian[i, i])
+                model.x[i] += state.others[i] / (1.0 - h * model.jacobian[i, i])
         for i in range(s):
             model.x[states[i]] += change[i]
         for i in range(q):
             z[i] = clip(z[i] + change[s + i], layout.low[i], layout.high[i])
         stick(layout, model.x, before)
-    return status or correct(model, z) or report(model, layout, row)
+    return status or correct(model, z) or report(model, layout, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = disturbance_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -191,7 +191,7 @@ class DisturbanceObserver(Estimator):
         "rate at which a deviation decays"
     )
     sticks = True
-    _law = staticmethod(law)
+    _step = staticmethod(disturbance_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -202,7 +202,7 @@ class DisturbanceObserver(Estimator):
         L = np.zeros((s + q, 2 * outputs))
         given = [*range(len(corrected)), *range(s, s + q)]
         L[given] = gains.values[: gains.values.size - q].reshape(len(given), 2 * outputs)
-        self._settings = Settings(
+        self._settings = ObserverSettings(
             layout=self._layout,
             states=np.array([fmu.states.index(name) for name in names], np.intp),
             places=np.array(
@@ -216,7 +216,7 @@ class DisturbanceObserver(Estimator):
             decay=np.ascontiguousarray(gains.values[gains.values.size - q :]),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
-        self._memory = Memory(
+        self._state = ObserverState(
             z=np.zeros(q),
             integral=np.zeros(outputs),
             target=np.zeros(q),
@@ -227,11 +227,11 @@ class DisturbanceObserver(Estimator):
         )
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._memory
+        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        memory = self._memory
-        for values in (memory.z, memory.integral, memory.target, memory.drift):
+        state = self._state
+        for values in (state.z, state.integral, state.target, state.drift):
             values[:] = 0.0
         self._model.x[:] = self.fmu.get_states()
 
@@ -244,9 +244,9 @@ class DisturbanceObserver(Estimator):
     def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
         """See Estimator."""
         states = corrected_states(fmu, system)
-        rows = {name: fmu.units.get(name, "1") for name in states}
-        rows |= {quantity.correction: quantity.unit for quantity in system.estimated}
-        rates = {f"rate of {name}": quotient(unit, "s") for name, unit in rows.items()}
+        estimates = {name: fmu.units.get(name, "1") for name in states}
+        estimates |= {quantity.correction: quantity.unit for quantity in system.estimated}
+        rates = {f"rate of {name}": quotient(unit, "s") for name, unit in estimates.items()}
         told = feedback_meanings(rates, {output.name: output.unit for output in system.outputs})
         decays = {
             f"T_{quantity.name}": (f"rate at which {quantity.correction} decays", "1/s")
@@ -264,7 +264,7 @@ class DisturbanceObserver(Estimator):
         return Gains(cls.name, names, np.append(L, T), {"effect": np.asarray(effect)}, source)
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """Gains from the linearised model: the stationary Kalman filter of the extended system.
 
         The model is extended by the quantities as states, and the filter's Riccati equation is

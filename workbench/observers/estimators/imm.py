@@ -16,8 +16,8 @@ from workbench.models.fmu import FMU
 from workbench.models.native import compiled, solve
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
-    FilterMemory,
     FilterSettings,
+    FilterState,
     begin,
     finish,
     forecast,
@@ -88,33 +88,33 @@ class BankSettings(NamedTuple):
     rates: Matrix
 
 
-class BankMemory(NamedTuple):
+class BankState(NamedTuple):
     """What the bank remembers: its filters and their probability, (k,); work space."""
 
-    members: tuple[FilterMemory, ...]
+    members: tuple[FilterState, ...]
     probability: Vector
     expected: Vector  # (k,) probability before the sample
     change: Matrix  # (k, 2 k) on the right transition within a step, on the left shares of mixing
     z: Matrix  # (k, n + q)
     P: Matrix  # (k, n + q, n + q)
-    rows: Matrix  # (k, 2 w + 1) estimates of the members
+    estimates: Matrix  # (k, 2 w + 1) estimates of the members
     evidence: Vector  # (k,) logarithm of the likelihood of a sample
 
 
 @compiled
-def _mix(settings, memory, h):  # type: ignore[no-untyped-def]
+def _mix(settings, state, h):  # type: ignore[no-untyped-def]
     """Begin each filter at the mixture of where its hypothesis may come from; a status.
 
     Source: Blom and Bar-Shalom (1988), IEEE Trans. Autom. Control 33, 780-783, equations (3) to
     (6). The transition is an implicit step, which is stochastic at any h.
     """
-    change, members = memory.change, memory.members
-    count, size = memory.z.shape
+    change, members = state.change, state.members
+    count, size = state.z.shape
     for i in range(count):
         for a in range(size):
-            memory.z[i, a] = members[i].z[a]
+            state.z[i, a] = members[i].z[a]
             for b in range(size):
-                memory.P[i, a, b] = members[i].P[a, b]
+                state.P[i, a, b] = members[i].P[a, b]
         for j in range(count):
             change[i, j] = -h * settings.rates[i, j]
             change[i, count + j] = 0.0
@@ -125,86 +125,86 @@ def _mix(settings, memory, h):  # type: ignore[no-untyped-def]
         z, P = members[j].z, members[j].P
         total = 0.0
         for i in range(count):
-            total += change[i, count + j] * memory.probability[i]
-        memory.expected[j] = total
+            total += change[i, count + j] * state.probability[i]
+        state.expected[j] = total
         if not total > 0.0:
             continue  # a hypothesis that is out of the question goes on by itself
         for i in range(count):
-            change[i, j] = change[i, count + j] * memory.probability[i] / total
+            change[i, j] = change[i, count + j] * state.probability[i] / total
         for a in range(size):
             z[a] = 0.0
             for i in range(count):
-                z[a] += change[i, j] * memory.z[i, a]
+                z[a] += change[i, j] * state.z[i, a]
         for a in range(size):
             for b in range(size):
                 P[a, b] = 0.0
                 for i in range(count):
-                    apart = (memory.z[i, a] - z[a]) * (memory.z[i, b] - z[b])
-                    P[a, b] += change[i, j] * (memory.P[i, a, b] + apart)
+                    apart = (state.z[i, a] - z[a]) * (state.z[i, b] - z[b])
+                    P[a, b] += change[i, j] * (state.P[i, a, b] + apart)
     return status
 
 
 @compiled
-def _weigh(memory):  # type: ignore[no-untyped-def]
+def _weigh(state):  # type: ignore[no-untyped-def]
     """Probability of the hypotheses after a sample, by Bayes' rule."""
-    best, total = memory.evidence[0], 0.0
-    for j in range(memory.probability.size):
-        best = max(best, memory.evidence[j])
-    for j in range(memory.probability.size):
+    best, total = state.evidence[0], 0.0
+    for j in range(state.probability.size):
+        best = max(best, state.evidence[j])
+    for j in range(state.probability.size):
         # The likeliest one has weight 1, so that not all of them vanish.
-        memory.probability[j] = memory.expected[j] * np.exp(memory.evidence[j] - best)
-        total += memory.probability[j]
-    for j in range(memory.probability.size):
-        memory.probability[j] /= total
+        state.probability[j] = state.expected[j] * np.exp(state.evidence[j] - best)
+        total += state.probability[j]
+    for j in range(state.probability.size):
+        state.probability[j] /= total
 
 
 @compiled
-def _combine(memory, row):  # type: ignore[no-untyped-def]
+def _combine(state, estimate):  # type: ignore[no-untyped-def]
     """Mean and standard deviation of the mixture, its innovation and the probabilities."""
-    rows, probability = memory.rows, memory.probability
-    count, last = rows.shape[0], rows.shape[1] - 1
+    estimates, probability = state.estimates, state.probability
+    count, last = estimates.shape[0], estimates.shape[1] - 1
     width = last // 2
     for i in range(width):
         mean, spread = 0.0, 0.0
         for j in range(count):
-            mean += probability[j] * rows[j, i]
+            mean += probability[j] * estimates[j, i]
         for j in range(count):
-            apart = rows[j, i] - mean
-            spread += probability[j] * (rows[j, width + i] ** 2 + apart * apart)
-        row[i], row[width + i] = mean, np.sqrt(spread)
-    row[row.size - 1] = 0.0
+            apart = estimates[j, i] - mean
+            spread += probability[j] * (estimates[j, width + i] ** 2 + apart * apart)
+        estimate[i], estimate[width + i] = mean, np.sqrt(spread)
+    estimate[estimate.size - 1] = 0.0
     for j in range(count):
-        row[2 * width + j] = probability[j]
-        row[row.size - 1] += probability[j] * rows[j, last]
+        estimate[2 * width + j] = probability[j]
+        estimate[estimate.size - 1] += probability[j] * estimates[j, last]
 
 
 @compiled
-def _law(models, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(models, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Mix, let each filter take the sample, weigh them."""
-    rows = memory.rows
-    status = 0 if h == 0.0 else _mix(settings, memory, h)
-    for j in range(memory.probability.size):
-        model, own, filter_ = models[j], settings.members[j], memory.members[j]
+    estimates = state.estimates
+    status = 0 if h == 0.0 else _mix(settings, state, h)
+    for j in range(state.probability.size):
+        model, own, filter_ = models[j], settings.members[j], state.members[j]
         if h == 0.0:
             reset(filter_.levels)
             status = status or begin(model, own, filter_, u, y)
-            rows[j, rows.shape[1] - 1] = np.nan
+            estimates[j, estimates.shape[1] - 1] = np.nan
         else:
             status = status or forecast(model, own, filter_, h, u, y)
             if status:
                 return status
-            memory.evidence[j] = update(model, own, filter_, h, y, rows[j])
-        status = status or finish(model, own, filter_, rows[j])
+            state.evidence[j] = update(model, own, filter_, h, y, estimates[j])
+        status = status or finish(model, own, filter_, estimates[j])
     if h > 0.0:
-        _weigh(memory)
-    _combine(memory, row)
+        _weigh(state)
+    _combine(state, estimate)
     return status
 
 
 @compiled
-def _loop(models, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(models, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(models, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(models, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -231,7 +231,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     standard = False
     tunable = False
     tuned_as = ExtendedKalmanFilter.name
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -252,14 +252,14 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
         k, size = len(found), len(self._settings.walk)
         self._model = tuple(one._model for one in filters)
         self._bank = BankSettings(tuple(one._settings for one in filters), changes(system))
-        self._memory = BankMemory(
-            members=tuple(one._memory for one in filters),
+        self._state = BankState(
+            members=tuple(one._state for one in filters),
             probability=np.zeros(k),
             expected=np.zeros(k),
             change=np.zeros((k, 2 * k)),
             z=np.zeros((k, size)),
             P=np.zeros((k, size, size)),
-            rows=np.zeros((k, 2 * len(self.system.columns) + 1)),
+            estimates=np.zeros((k, 2 * len(self.system.columns) + 1)),
             evidence=np.zeros(k),
         )
 
@@ -269,15 +269,15 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
         return tuple(one.fmu for one in self._filters)
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._bank, self._memory
+        return self._bank, self._state
 
     def start(self, u: Vector, y: Vector) -> None:
         """See Estimator; each hypothesis is as likely."""
         for one, quantities in zip(self._filters, self._starts, strict=True):
             one.start(u, y)
-            z, known = one._memory.z[len(one.fmu.states) :], np.isfinite(quantities)
+            z, known = one._state.z[len(one.fmu.states) :], np.isfinite(quantities)
             z[known] = quantities[known]
-        self._memory.probability[:] = 1.0 / len(self._filters)
+        self._state.probability[:] = 1.0 / len(self._filters)
 
 
 def _held(hypothesis: Hypothesis, fmu: FMU, estimated: Sequence[str]) -> dict[str, float]:

@@ -124,12 +124,12 @@ def note(levels, j, innovation, explained, noise):  # type: ignore[no-untyped-de
 
 
 @compiled
-def learn(settings, memory, fade, h):  # type: ignore[no-untyped-def]
-    """Change the levels by a sample; corrections are in `memory.change`.
+def learn(settings, state, fade, h):  # type: ignore[no-untyped-def]
+    """Change the levels by a sample; corrections are in `state.change`.
 
     White innovations make corrections whose sum has the variance that they take from P.
     """
-    levels, P, walk = memory.levels, memory.P, settings.walk
+    levels, P, walk = state.levels, state.P, settings.walk
     levels.age[0] += h
     part = min(fade * h / settings.learning.within, 1.0)
     for j in range(levels.sample.size):
@@ -140,7 +140,7 @@ def learn(settings, memory, fade, h):  # type: ignore[no-untyped-def]
         if not (moves > 0.0 and P[i, i] > 0.0):
             continue
         part = moves / (P[i, i] + moves)  # of the filter's memory
-        levels.moved[i] = (1.0 - part) * levels.moved[i] + memory.change[i]
+        levels.moved[i] = (1.0 - part) * levels.moved[i] + state.change[i]
         lessened = max(levels.before[i, i] - P[i, i], 0.0)
         levels.expected[i] = (1.0 - part) ** 2 * levels.expected[i] + lessened
         if levels.expected[i] > 0.0:
@@ -157,7 +157,7 @@ def surprises(settings, levels, nis):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def loosen(memory, F, q, jump):  # type: ignore[no-untyped-def]
+def loosen(state, F, q, jump):  # type: ignore[no-untyped-def]
     """Covariance before the sample, with a jump of a quantity within the last two steps.
 
     Parameters
@@ -166,7 +166,7 @@ def loosen(memory, F, q, jump):  # type: ignore[no-untyped-def]
     q : column of the quantity.
     jump : its variance.
     """
-    P, before, way = memory.P, memory.levels.before, memory.change
+    P, before, way = state.P, state.levels.before, state.change
     n, size = F.shape
     for i in range(n):
         # On average it has acted on one step and a half: on the last, and on half of the first.
@@ -184,7 +184,7 @@ _GROWTH = 4.0  # from one jump that is tried to the next, in variance
 
 
 @compiled
-def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
+def measurement_update(model, settings, state, y, estimate):  # type: ignore[no-untyped-def]
     """Covariance after a sample, and the change of the mean, one output after the other.
 
     The noise of outputs is independent, so that their order does not matter and no matrix is
@@ -193,18 +193,18 @@ def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
 
     Returns the logarithm of the determinant of the innovations' covariance.
     """
-    z, P, layout, v = memory.z, memory.P, settings.layout, memory.column
+    z, P, layout, v = state.z, state.P, settings.layout, state.column
     size, n, volume = z.size, model.x.size, 0.0
-    row[row.size - 1] = 0.0
+    estimate[estimate.size - 1] = 0.0
     for i in range(size):
-        memory.change[i] = 0.0
+        state.change[i] = 0.0
     for j in range(y.size):
         if np.isnan(y[j]):  # not measured: its level stays
-            memory.levels.scatter[j] = memory.levels.sample[j]
+            state.levels.scatter[j] = state.levels.sample[j]
             continue
         at = layout.seen[j]
         if at >= 0:
-            innovation = y[j] - z[at] - memory.change[at]
+            innovation = y[j] - z[at] - state.change[at]
             for i in range(size):
                 v[i] = P[i, at]
             total = v[at]
@@ -217,15 +217,15 @@ def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
                     v[i] += P[i, k] * model.jacobian[k, n - 1 - at]
             for i in range(size):
                 total += model.jacobian[i, n - 1 - at] * v[i]
-                innovation -= model.jacobian[i, n - 1 - at] * memory.change[i]
-        total += note(memory.levels, j, innovation, total, memory.levels.noise[j])
+                innovation -= model.jacobian[i, n - 1 - at] * state.change[i]
+        total += note(state.levels, j, innovation, total, state.levels.noise[j])
         volume += np.log(total)
         inverse = 1.0 / total
-        row[row.size - 1] += innovation * innovation * inverse
+        estimate[estimate.size - 1] += innovation * innovation * inverse
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
         for i in range(size):
             gain = v[i] * inverse
-            memory.change[i] += gain * innovation
+            state.change[i] += gain * innovation
             for k in range(i + 1):
                 P[i, k] -= gain * v[k]
                 P[k, i] = P[i, k]
@@ -233,39 +233,39 @@ def absorb(model, settings, memory, y, row):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def update(model, settings, memory, h, y, row):  # type: ignore[no-untyped-def]
+def update(model, settings, state, h, y, estimate):  # type: ignore[no-untyped-def]
     """Correct mean and covariance by a sample; returns the logarithm of its likelihood."""
-    z, levels, surprise = memory.z, memory.levels, settings.learning.surprise
+    z, levels, surprise = state.z, state.levels, settings.learning.surprise
     fade = fading(settings.layout, y)
     for i in range(z.size):
         for k in range(z.size):
-            levels.before[i, k] = memory.P[i, k]
-    volume = absorb(model, settings, memory, y, row)
-    nis = row[row.size - 1]
+            levels.before[i, k] = state.P[i, k]
+    volume = measurement_update(model, settings, state, y, estimate)
+    nis = estimate[estimate.size - 1]
     if settings.learning.within == np.inf:
         for i in range(z.size):
-            z[i] += memory.change[i]
+            z[i] += state.change[i]
         return -0.5 * (nis + volume)
     if not surprises(settings, levels, nis):
         levels.surprised[0] = 0.0
-        learn(settings, memory, fade, h)
+        learn(settings, state, fade, h)
     elif levels.surprised[0] == 0.0:
         levels.surprised[0] = 1.0
-        loosen(memory, memory.spread[:, model.x.size :], z.size - 1, 0.0)
+        loosen(state, state.spread[:, model.x.size :], z.size - 1, 0.0)
         return -0.5 * (surprise + volume)
     else:
         levels.surprised[0] = 0.0
         trust(levels)
-        volume = follow_jump(model, settings, memory, h, y, row)
+        volume = follow_jump(model, settings, state, h, y, estimate)
     for i in range(z.size):
-        z[i] += memory.change[i]
-    likelihood = -0.5 * (min(row[row.size - 1], surprise) + volume)
-    row[row.size - 1] = nis
+        z[i] += state.change[i]
+    likelihood = -0.5 * (min(estimate[estimate.size - 1], surprise) + volume)
+    estimate[estimate.size - 1] = nis
     return likelihood
 
 
 @compiled
-def follow_jump(model, settings, memory, h, y, row):  # type: ignore[no-untyped-def]
+def follow_jump(model, settings, state, h, y, estimate):  # type: ignore[no-untyped-def]
     """Correct by a sample under the least jump of one quantity that lets it happen.
 
     At most as far as it may be at the start. Of several quantities, of that under which it is
@@ -274,21 +274,21 @@ def follow_jump(model, settings, memory, h, y, row):  # type: ignore[no-untyped-
 
     Returns the logarithm of the determinant of the innovations' covariance.
     """
-    n, last, surprise = model.x.size, row.size - 1, settings.learning.surprise
-    F, best, chosen, size = memory.spread[:, n:], np.inf, memory.z.size - 1, 0.0
-    for q in range(n, memory.z.size):
+    n, last, surprise = model.x.size, estimate.size - 1, settings.learning.surprise
+    F, best, chosen, size = state.spread[:, n:], np.inf, state.z.size - 1, 0.0
+    for q in range(n, state.z.size):
         if settings.walk[q] == 0.0:
             continue  # nothing to begin with, and it does not move
         jump, farthest = h * settings.walk[q] ** 2, settings.spread[q] ** 2
-        row[last] = np.inf
-        while row[last] > surprise and jump < farthest:
+        estimate[last] = np.inf
+        while estimate[last] > surprise and jump < farthest:
             jump = min(_GROWTH * jump, farthest)
-            loosen(memory, F, q, jump)
-            volume = absorb(model, settings, memory, y, row)
-        if row[last] + volume < best:
-            best, chosen, size = row[last] + volume, q, jump
-    loosen(memory, F, chosen, size)
-    return absorb(model, settings, memory, y, row)
+            loosen(state, F, q, jump)
+            volume = measurement_update(model, settings, state, y, estimate)
+        if estimate[last] + volume < best:
+            best, chosen, size = estimate[last] + volume, q, jump
+    loosen(state, F, chosen, size)
+    return measurement_update(model, settings, state, y, estimate)
 
 
 @inlined
@@ -303,17 +303,17 @@ def room(settings, P, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
+def drive(model, settings, state, z, u, h):  # type: ignore[no-untyped-def]
     """Variances by which noise of the inputs moves the states in a step from z; returns a status.
 
-    What is measured drives the model with its sensor's noise, (h df/du sigma)^2, in `memory.least`.
+    What is measured drives the model with its sensor's noise, (h df/du sigma)^2, in `state.least`.
     Walks that are learnt hold that too, as far as outputs show it; where two bodies are pressed
     together, the force between them answers it and no speed does. So states move by what was learnt
     of them, or by what inputs make of them if that is more; the sum would count it twice.
     Source: S. Thrun, W. Burgard, D. Fox (2005), Probabilistic Robotics, table 7.2 (noise of inputs
     as noise of the step).
     """
-    n, least, low = model.x.size, memory.least, memory.change
+    n, least, low = model.x.size, state.least, state.change
     for i in range(n):
         least[i] = 0.0
     status = measure(model, u) or put(model, z)
@@ -335,14 +335,14 @@ def drive(model, settings, memory, z, u, h):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def process_noise(settings, memory, fade, h, i):  # type: ignore[no-untyped-def]
+def process_noise(settings, state, fade, h, i):  # type: ignore[no-untyped-def]
     """Variance by which state or quantity i moves in a step, after `drive`.
 
     Walks fade with feedback; the noise of a sensor does not.
     """
-    share = room(settings, memory.P, i) * memory.levels.walk[i]
+    share = room(settings, state.P, i) * state.levels.walk[i]
     moves = h * share * (fade * settings.walk[i]) ** 2
-    return max(moves, memory.least[i]) if i < memory.least.size else moves
+    return max(moves, state.least[i]) if i < state.least.size else moves
 
 
 _FAINTEST = 1e-3  # share of feedback that the noise of measurements is raised for
@@ -374,7 +374,7 @@ class FilterSettings(NamedTuple):
     driven_relative: Vector
 
 
-class FilterMemory(NamedTuple):
+class FilterState(NamedTuple):
     """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
 
     `least` holds the variances of a step of the states, (n,), see `drive`.
@@ -392,9 +392,9 @@ class FilterMemory(NamedTuple):
 
 
 @compiled
-def predict(model, settings, memory, z, h):  # type: ignore[no-untyped-def]
+def predict(model, settings, state, z, h):  # type: ignore[no-untyped-def]
     """Advance z by one linearly implicit step, in which quantities stay; returns a status."""
-    n, system = model.x.size, memory.system
+    n, system = model.x.size, state.system
     status = put(model, z) or evaluate(model)
     for i in range(n):
         system[i, n] = h * model.dx[i]
@@ -462,24 +462,24 @@ def variance(settings, fade, y, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
+def finish(model, settings, state, estimate):  # type: ignore[no-untyped-def]
     """Limit the quantities, report the estimate and its standard deviations; returns a status."""
-    z, P, layout, n = memory.z, memory.P, settings.layout, model.x.size
+    z, P, layout, n = state.z, state.P, settings.layout, model.x.size
     q, outputs = layout.nominal.size, layout.seen.size
     for i in range(q):
         z[n + i] = clip(z[n + i], layout.low[i], layout.high[i])
     status = put(model, z) or linearise(model, n + model.y.size)
-    status = status or report(model, layout, row)
+    status = status or report(model, layout, estimate)
     first = outputs + 2 * q + layout.reported  # of the standard deviations
     for j in range(outputs):
         at = layout.seen[j]
-        row[first + j] = np.sqrt(P[at, at]) if at >= 0 else deviation(model, P, -1 - at)
+        estimate[first + j] = np.sqrt(P[at, at]) if at >= 0 else deviation(model, P, -1 - at)
     for i in range(q):
         doubt = layout.doubt[i] * (layout.nominal[i] + z[n + i])
         known = np.sqrt(P[n + i, n + i] + doubt * doubt)
-        row[first + outputs + i] = row[first + outputs + q + i] = known
+        estimate[first + outputs + i] = estimate[first + outputs + q + i] = known
     for i in range(layout.reported):
-        row[first + outputs + 2 * q + i] = deviation(model, P, i)
+        estimate[first + outputs + 2 * q + i] = deviation(model, P, i)
     return status
 
 
@@ -494,54 +494,54 @@ def deviation(model, P, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
+def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
     """Covariance of the first sample; returns a status."""
     layout, fade = settings.layout, fading(settings.layout, y)
     for j in range(y.size):
         at = layout.seen[j]
         if at >= 0 and not np.isnan(y[j]):
-            memory.P[at, at] = variance(settings, fade, y, j)
+            state.P[at, at] = variance(settings, fade, y, j)
     return measure(model, u)
 
 
 @compiled
-def forecast(model, settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+def forecast(model, settings, state, h, u, y):  # type: ignore[no-untyped-def]
     """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
-    layout, P, size = settings.layout, memory.P, memory.z.size
-    status = drive(model, settings, memory, memory.z, u, h)
-    status = status or predict(model, settings, memory, memory.z, h)
+    layout, P, size = settings.layout, state.P, state.z.size
+    status = drive(model, settings, state, state.z, u, h)
+    status = status or predict(model, settings, state, state.z, h)
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
     for i in range(size):
-        P[i, i] += process_noise(settings, memory, fade, h, i)
+        P[i, i] += process_noise(settings, state, fade, h, i)
     for j in range(y.size):
-        memory.levels.noise[j] = variance(settings, fade, y, j)
-    status = status or transition(model, memory.spread, h)
-    carry(memory.spread[:, model.x.size :], P, memory.product)
+        state.levels.noise[j] = variance(settings, fade, y, j)
+    status = status or transition(model, state.spread, h)
+    carry(state.spread[:, model.x.size :], P, state.product)
     if layout.columns > model.x.size:
-        status = status or put(model, memory.z) or read(model)
+        status = status or put(model, state.z) or read(model)
         status = status or linearise(model, layout.columns)
     return status
 
 
 @compiled
-def ekf_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def ekf_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Predict by the linearised model, correct by the sample."""
     if h == 0.0:
-        reset(memory.levels)
-        status = begin(model, settings, memory, u, y)
-        return status or finish(model, settings, memory, row)
-    status = forecast(model, settings, memory, h, u, y)
+        reset(state.levels)
+        status = begin(model, settings, state, u, y)
+        return status or finish(model, settings, state, estimate)
+    status = forecast(model, settings, state, h, u, y)
     if status:
         return status
-    update(model, settings, memory, h, y, row)
-    return finish(model, settings, memory, row)
+    update(model, settings, state, h, y, estimate)
+    return finish(model, settings, state, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = ekf_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = ekf_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -568,7 +568,7 @@ class ExtendedKalmanFilter(Estimator):
     aided = True
     meaning = "standard deviations of samples, and random walks"
     sticks = True
-    _law = staticmethod(ekf_law)
+    _step = staticmethod(ekf_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -589,7 +589,7 @@ class ExtendedKalmanFilter(Estimator):
             driven=told * np.array([one.noise for one in system.inputs]),
             driven_relative=told * np.array([one.relative_noise for one in system.inputs]),
         )
-        self._memory: Any = FilterMemory(
+        self._state: Any = FilterState(
             *buffers(n, q), np.zeros(n + q), levels(n + q, len(system.outputs))
         )
 
@@ -598,18 +598,18 @@ class ExtendedKalmanFilter(Estimator):
         return np.array([self.system.spreads.get(name, 0.0) for name in self.fmu.states])
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._memory
+        return self._settings, self._state
 
     @property
     def covariance(self) -> Matrix:
         """Of the estimated quantities after the last sample, (q, q)."""
         n = len(self.fmu.states)
-        known: Matrix = self._memory.P[n:, n:].copy()
+        known: Matrix = self._state.P[n:, n:].copy()
         return known
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        self._memory.z[:] = self._start_values()
-        self._memory.P[:] = np.diag(self._settings.spread**2)
+        self._state.z[:] = self._start_values()
+        self._state.P[:] = np.diag(self._settings.spread**2)
 
     def _start_values(self) -> Vector:
         """States and deviations of the quantities at the start, (n + q,)."""
@@ -634,7 +634,7 @@ class ExtendedKalmanFilter(Estimator):
         return {name: told[name] for name in gains.names}
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """The noise of the sensors and what the system says of states and quantities."""
         outputs = cls.fed(system).outputs
         levels = {output.name: output.noise for output in outputs}

@@ -21,14 +21,14 @@ from workbench.observers.layout import Layout, measure, report
 from workbench.system.system import System
 
 
-class _Memory(NamedTuple):
+class _State(NamedTuple):
     system: Matrix  # (n, n + 1) of the step, with its right-hand side
 
 
 @inlined
-def _law(model, layout, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(model, layout, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of the model; y is not used."""
-    n, system = model.x.size, memory.system
+    n, system = model.x.size, state.system
     status = measure(model, u)
     if h > 0.0:
         status = status or evaluate(model)
@@ -42,13 +42,13 @@ def _law(model, layout, memory, h, u, y, row):  # type: ignore[no-untyped-def]
         for i in range(n):
             model.x[i] += system[i, n]
         status = set_states(model)
-    return status or report(model, layout, row)
+    return status or report(model, layout, estimate)
 
 
 @compiled
-def _loop(model, layout, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, layout, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, layout, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(model, layout, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -61,16 +61,16 @@ class OpenLoop(Estimator):
     label = "open loop"
     rank = 0
     tunable = False
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         n = len(fmu.states)
-        self._memory = _Memory(np.zeros((n, n + 1)))
+        self._state = _State(np.zeros((n, n + 1)))
 
     def _arguments(self) -> tuple[Layout, Any]:
-        return self._layout, self._memory
+        return self._layout, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()

@@ -46,7 +46,7 @@ class _Settings(NamedTuple):
     effect: Vector
 
 
-class _Memory(NamedTuple):
+class _State(NamedTuple):
     integral: Vector  # of the gains times dy: the slow part of the corrections
     gains: Matrix  # (q, 2 l) with authority
     z: Vector  # corrections
@@ -55,10 +55,10 @@ class _Memory(NamedTuple):
 
 
 @compiled
-def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of model and PI controller together."""
-    layout, integral, gains = settings.layout, memory.integral, memory.gains
-    z, system, innovation = memory.z, memory.system, memory.innovation
+    layout, integral, gains = settings.layout, state.integral, state.gains
+    z, system, innovation = state.z, state.system, state.innovation
     n, q, outputs = model.x.size, z.size, y.size
     status = measure(model, u)
     if h > 0.0:
@@ -101,13 +101,13 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
             integral[k] = clip(integral[k], layout.low[k], layout.high[k])
             z[k] = clip(integral[k] + direct, layout.low[k], layout.high[k])
         status = correct(model, z)
-    return status or report(model, layout, row)
+    return status or report(model, layout, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -132,7 +132,7 @@ class ParameterEstimator(Estimator):
     role = FULL
     rank = 30
     meaning = "L: rows corrections of quantities; columns dy, integral of dy"
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -144,7 +144,7 @@ class ParameterEstimator(Estimator):
             L=np.ascontiguousarray(gains.values.reshape(q, 2 * outputs)),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
-        self._memory = _Memory(
+        self._state = _State(
             integral=np.zeros(q),
             gains=np.zeros((q, 2 * outputs)),
             z=np.zeros(q),
@@ -153,18 +153,18 @@ class ParameterEstimator(Estimator):
         )
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._memory
+        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()
-        self._memory.integral[:] = 0.0
-        self._memory.z[:] = 0.0
+        self._state.integral[:] = 0.0
+        self._state.z[:] = 0.0
 
     @classmethod
     def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
         """See Estimator."""
-        rows = {quantity.correction: quantity.unit for quantity in system.estimated}
-        return feedback_meanings(rows, {output.name: output.unit for output in system.outputs})
+        estimates = {quantity.correction: quantity.unit for quantity in system.estimated}
+        return feedback_meanings(estimates, {output.name: output.unit for output in system.outputs})
 
     @classmethod
     def of(cls, L: Matrix, effect: Vector, source: str = "") -> Gains:
@@ -173,7 +173,7 @@ class ParameterEstimator(Estimator):
         return Gains(cls.name, names, L.ravel(), {"effect": np.asarray(effect)}, source)
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """Integral action as fast as the linearised model bears.
 
         It is decoupled at its own frequency w by the inverse of the model's response there,

@@ -11,18 +11,18 @@ from workbench.observers.contract import Estimate
 from workbench.observers.estimators.kalman import carry, finish
 from workbench.observers.estimators.moving_horizon.estimator import (
     ROUNDING,
-    HorizonMemory,
+    HorizonState,
     MovingHorizonEstimator,
     expand,
-    horizon_law,
+    horizon_step,
     move,
 )
 from workbench.observers.estimators.moving_horizon.window import (
     Window,
-    absorb,
     assign,
     assign_rows,
     end,
+    measurement_update,
     solve_damped,
     solve_free,
     window,
@@ -60,33 +60,33 @@ def _keep(settings, whole, part, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _go_forward(model, settings, horizon, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _go_forward(model, settings, horizon, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     """Run the moving horizon, which learns noise levels, outliers and jumps; returns a status.
 
     Parameters
     ----------
     memory : with the window of the whole recording, which is filled.
     """
-    whole, part = memory.window, horizon.window
+    whole, part = state.window, horizon.window
     whole.filled[0] = 0
     for k in range(steps.size):
         if steps[k] > 0.0 and part.filled[0] == part.steps.size:
             _keep(settings, whole, part, 0)
-        status = horizon_law(model, settings, horizon, steps[k], u[k], y[k], rows[k])
+        status = horizon_step(model, settings, horizon, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
         if k == 0:
-            assign(whole.mean, memory.filter.z)
-            assign_rows(whole.covariance, memory.filter.P)
+            assign(whole.mean, state.filter.z)
+            assign_rows(whole.covariance, state.filter.P)
     for k in range(part.filled[0]):
         _keep(settings, whole, part, k)
     return 0
 
 
 @compiled
-def _filter_again(model, settings, memory):  # type: ignore[no-untyped-def]
+def _filter_again(model, settings, state):  # type: ignore[no-untyped-def]
     """Lay the nodes along an extended Kalman filter with the noise of the window; a status."""
-    window, seen, z, status = memory.window, settings.layout.seen, memory.filter.z, 0
+    window, seen, z, status = state.window, settings.layout.seen, state.filter.z, 0
     P, error = window.P, window.error
     assign(z, window.mean)
     assign_rows(P, window.covariance)
@@ -96,11 +96,11 @@ def _filter_again(model, settings, memory):  # type: ignore[no-untyped-def]
             error[i] = 0.0
         for i in range(z.size):
             P[i, i] += window.noise[k, i] * window.wider[k, i]
-        status = status or expand(model, settings, memory, k)
+        status = status or expand(model, settings, state, k)
         carry(window.F[k], P, window.product)
         for j in range(seen.size):
             if not np.isnan(window.errors[k, j]):
-                absorb(
+                measurement_update(
                     *(P, error, window.gain[k, j], window.slopes[k, j], seen[j]),
                     *(window.errors[k, j], window.levels[k, j] / window.weight[k, j]),
                 )
@@ -141,22 +141,22 @@ def _solve(window, seen, damping):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _improve(model, settings, memory, damping):  # type: ignore[no-untyped-def]
+def _improve(model, settings, state, damping):  # type: ignore[no-untyped-def]
     """Move the nodes by a damped step that lowers the cost, damped as much as that takes.
 
     Returns a status, the damping (beyond the most where no step lowers it), and by which share the
     cost fell.
     """
-    window, seen = memory.window, settings.layout.seen
+    window, seen = state.window, settings.layout.seen
     solve_free(window, seen)
     while damping <= _MOST:
         _solve(window, seen, damping)
         before = cost(window)
-        status = move(model, settings, memory, 1.0)
+        status = move(model, settings, state, 1.0)
         after = cost(window)
         if status or after <= before + ROUNDING * (1.0 + before):
             return status, damping, (before - after) / (1.0 + before)
-        status = move(model, settings, memory, -1.0)
+        status = move(model, settings, state, -1.0)
         if status or damping == 0.0:
             break
         damping *= _FACTOR
@@ -164,24 +164,24 @@ def _improve(model, settings, memory, damping):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _settle(model, settings, memory):  # type: ignore[no-untyped-def]
+def _settle(model, settings, state):  # type: ignore[no-untyped-def]
     """Bring the nodes to the best trajectory; returns a status."""
     damping = _FIRST
     for _ in range(_ITERATIONS):
-        status, damping, fell = _improve(model, settings, memory, damping)
+        status, damping, fell = _improve(model, settings, state, damping)
         if status:
             return status
         if damping > _MOST or (damping <= 1.0 and fell < _SETTLED):
             break
         damping = max(damping / _FACTOR, _LEAST)
-    status, damping, fell = _improve(model, settings, memory, 0.0)
+    status, damping, fell = _improve(model, settings, state, 0.0)
     return status
 
 
 @compiled
-def _report(model, settings, memory, known, u, rows):  # type: ignore[no-untyped-def]
+def _report(model, settings, state, known, u, estimates):  # type: ignore[no-untyped-def]
     """Write the smoothed estimates over those of the way forward; returns a status."""
-    window, filter_ = memory.window, memory.filter
+    window, filter_ = state.window, state.filter
     z, seen = filter_.z, settings.layout.seen
     solve_free(window, seen)
     gather_spread(window, seen, known)
@@ -189,26 +189,26 @@ def _report(model, settings, memory, known, u, rows):  # type: ignore[no-untyped
         z[i] = window.nodes[0, i]
         z[i] += window.noise[0, i] * window.wider[0, i] * window.costates[0, i]
     assign_rows(filter_.P, known.first)
-    status = measure(model, u[0]) or finish(model, settings, filter_, rows[0])
+    status = measure(model, u[0]) or finish(model, settings, filter_, estimates[0])
     for k in range(window.filled[0]):
         assign(z, window.arrived[k])
         assign_rows(filter_.P, known.covariances[k])
         status = status or measure(model, u[k + 1])
-        status = status or finish(model, settings, filter_, rows[k + 1])
+        status = status or finish(model, settings, filter_, estimates[k + 1])
     return status
 
 
 @compiled
-def _go_back(model, settings, memory):  # type: ignore[no-untyped-def]
+def _go_back(model, settings, state):  # type: ignore[no-untyped-def]
     """Find the best trajectory from that of a filter; returns a status."""
-    return _filter_again(model, settings, memory) or _settle(model, settings, memory)
+    return _filter_again(model, settings, state) or _settle(model, settings, state)
 
 
 @compiled
-def _finish(model, settings, memory, known, u, rows):  # type: ignore[no-untyped-def]
+def _finish(model, settings, state, known, u, estimates):  # type: ignore[no-untyped-def]
     """Find the best trajectory from one that is near, and write it; returns a status."""
-    status = _settle(model, settings, memory)
-    return status or _report(model, settings, memory, known, u, rows)
+    status = _settle(model, settings, state)
+    return status or _report(model, settings, state, known, u, estimates)
 
 
 def excess(errors: Vector, lags: int) -> float:
@@ -287,23 +287,27 @@ class Smoother(MovingHorizonEstimator):
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
         """Smooth a recording; see Estimator."""
         self.start(u[0], y[0])
-        rows = np.full((time.size, self._width), np.nan)
+        estimates = np.full((time.size, self._width), np.nan)
         steps, u, y = np.diff(time, prepend=time[0]), read_only(u), read_only(self._measured(y))
-        horizon, nodes, s = self._memory, time.size - 1, self._settings.walk.size
+        horizon, nodes, s = self._state, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
         whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
-        memory = HorizonMemory(horizon.filter, horizon.held, whole)
+        state = HorizonState(horizon.filter, horizon.held, whole)
         model, settings = self._model, self._settings
-        raise_on_failure(_go_forward(model, settings, horizon, memory, steps, u, y, rows), self.fmu)
+        raise_on_failure(
+            _go_forward(model, settings, horizon, state, steps, u, y, estimates), self.fmu
+        )
         if time.size > 1:
             start, levels = whole.covariance.copy(), whole.levels.copy()
             step = float(np.median(steps))
-            self._doubt(whole, start, levels, y[1:] - rows[1:, : y.shape[1]], step)
-            raise_on_failure(_go_back(model, settings, memory), self.fmu)
+            self._doubt(whole, start, levels, y[1:] - estimates[1:, : y.shape[1]], step)
+            raise_on_failure(_go_back(model, settings, state), self.fmu)
             # A filter lags behind what drifts; what is left now is of sensors and model.
             self._doubt(whole, start, levels, whole.errors, step)
-            raise_on_failure(_finish(model, settings, memory, spread(nodes, s), u, rows), self.fmu)
-        return self._split(rows)
+            raise_on_failure(
+                _finish(model, settings, state, spread(nodes, s), u, estimates), self.fmu
+            )
+        return self._split(estimates)
 
     def _doubt(
         self, whole: Window, start: Matrix, levels: Matrix, errors: Matrix, step: float

@@ -13,7 +13,7 @@ from workbench.observers.estimators.kalman import (
     begin,
     buffers,
     drive,
-    ekf_law,
+    ekf_step,
     finish,
     learn,
     levels,
@@ -37,7 +37,7 @@ POINT_DISTANCE = 0.2
 TANGENT_SHARE = 0.8
 
 
-class PointsMemory(NamedTuple):
+class PointsState(NamedTuple):
     """As that of the extended filter, and root (upper triangle, P = root' root), points, stack."""
 
     z: Vector
@@ -86,20 +86,20 @@ def triangularise(stack, root):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _root_to_covariance(memory):  # type: ignore[no-untyped-def]
-    size = memory.z.size
+def _root_to_covariance(state):  # type: ignore[no-untyped-def]
+    size = state.z.size
     for i in range(size):
         for j in range(i + 1):
             total = 0.0
             for k in range(j + 1):
-                total += memory.root[k, i] * memory.root[k, j]
-            memory.P[i, j] = memory.P[j, i] = total
+                total += state.root[k, i] * state.root[k, j]
+            state.P[i, j] = state.P[j, i] = total
 
 
 @compiled
-def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
+def _covariance_to_root(state):  # type: ignore[no-untyped-def]
     """Cholesky's root of P; directions that rounding has left without variance get none."""
-    P, root = memory.P, memory.root
+    P, root = state.P, state.root
     size = P.shape[0]
     for i in range(size):
         for j in range(i, size):
@@ -113,9 +113,9 @@ def _covariance_to_root(memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _spread(model, settings, memory, spread, h):  # type: ignore[no-untyped-def]
+def _spread(model, settings, state, spread, h):  # type: ignore[no-untyped-def]
     """Advance all sigma points and read their outputs; leaves their mean in z; a status."""
-    z, root, points, layout = memory.z, memory.root, memory.points, settings.layout
+    z, root, points, layout = state.z, state.root, state.points, settings.layout
     size, n, status = z.size, model.x.size, 0
     for i in range(size):
         for side in range(2):
@@ -124,12 +124,12 @@ def _spread(model, settings, memory, spread, h):  # type: ignore[no-untyped-def]
                 point[j] = z[j] + (1 - 2 * side) * spread * root[i, j]
             for j in range(size - n):
                 point[n + j] = clip(point[n + j], layout.low[j], layout.high[j])
-            status = status or predict(model, settings, memory, point, h)
+            status = status or predict(model, settings, state, point, h)
             if layout.columns > n:
                 status = status or put(model, point) or read(model)
             for j in range(layout.seen.size):
                 at = layout.seen[j]
-                memory.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
+                state.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
     for j in range(size):
         total = 0.0
         for i in range(2 * size):
@@ -139,107 +139,107 @@ def _spread(model, settings, memory, spread, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _absorb(settings, memory, spread, fade, y, row):  # type: ignore[no-untyped-def]
+def _absorb(settings, state, spread, fade, y, estimate):  # type: ignore[no-untyped-def]
     """Correct mean and root by a sample, in one triangularisation.
 
     Rows are the points' deviations of outputs and unknowns, and the noise of the outputs. The
     triangle holds the root of the innovations' covariance, the gain times it, and the new root.
     Source: M. Morf, T. Kailath (1975), IEEE Trans. Autom. Control 20, 487-497.
     """
-    z, stack, triangle, levels = memory.z, memory.stack, memory.triangle, memory.levels
+    z, stack, triangle, levels = state.z, state.stack, state.triangle, state.levels
     size, outputs = z.size, y.size
     share = np.sqrt(0.5) / spread
     for j in range(outputs):
         missing, mean = np.isnan(y[j]), 0.0
         for i in range(2 * size):
-            mean += memory.seen[i, j]
+            mean += state.seen[i, j]
         mean /= 2 * size
         for i in range(2 * size):
-            stack[i, j] = 0.0 if missing else share * (memory.seen[i, j] - mean)
+            stack[i, j] = 0.0 if missing else share * (state.seen[i, j] - mean)
         for i in range(outputs):
             stack[2 * size + i, j] = 0.0
         # What is missing is one that no unknown moves, and nothing is made of it.
         noise = 1.0 if missing else levels.sample[j] * variance(settings, fade, y, j)
         stack[2 * size + j, j] = np.sqrt(noise)
-        memory.column[j] = 0.0 if missing else y[j] - mean
+        state.column[j] = 0.0 if missing else y[j] - mean
     for j in range(size):
-        memory.change[j] = levels.before[j, j] = 0.0
+        state.change[j] = levels.before[j, j] = 0.0
         for i in range(2 * size):
-            stack[i, outputs + j] = share * (memory.points[i, j] - z[j])
+            stack[i, outputs + j] = share * (state.points[i, j] - z[j])
             levels.before[j, j] += stack[i, outputs + j] ** 2
     for i in range(outputs):
         for j in range(size):
             stack[2 * size + i, outputs + j] = 0.0
     triangularise(stack, triangle)
-    row[row.size - 1] = 0.0
+    estimate[estimate.size - 1] = 0.0
     for j in range(outputs):
-        white = memory.column[j]
+        white = state.column[j]
         for i in range(j):
-            white -= triangle[i, j] * memory.column[outputs + i]
+            white -= triangle[i, j] * state.column[outputs + i]
         if np.isnan(y[j]):
             levels.scatter[j] = levels.sample[j]
         else:
             noise = variance(settings, fade, y, j)
             note(levels, j, white, triangle[j, j] ** 2 - levels.sample[j] * noise, noise)
         white /= triangle[j, j]
-        memory.column[outputs + j] = white
-        row[row.size - 1] += white * white
+        state.column[outputs + j] = white
+        estimate[estimate.size - 1] += white * white
         for i in range(size):
-            memory.change[i] += triangle[j, outputs + i] * white
+            state.change[i] += triangle[j, outputs + i] * white
     for i in range(size):
-        z[i] += memory.change[i]
+        z[i] += state.change[i]
     for i in range(size):
         for j in range(size):
-            memory.root[i, j] = triangle[outputs + i, outputs + j]
+            state.root[i, j] = triangle[outputs + i, outputs + j]
 
 
 @compiled
-def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Square-root unscented filter with 2n points of equal weight."""
-    z, root, stack = memory.z, memory.root, memory.stack
+    z, root, stack = state.z, state.root, state.stack
     size, layout = z.size, settings.layout
     if h == 0.0:
-        reset(memory.levels)
-        status = begin(model, settings, memory, u, y)
-        _covariance_to_root(memory)
-        return status or finish(model, settings, memory, row)
+        reset(state.levels)
+        status = begin(model, settings, state, u, y)
+        _covariance_to_root(state)
+        return status or finish(model, settings, state, estimate)
     fade = fading(layout, y)
     if fade < TANGENT_SHARE:
-        status = ekf_law(model, settings, memory, h, u, y, row)
-        _covariance_to_root(memory)
+        status = ekf_step(model, settings, state, h, u, y, estimate)
+        _covariance_to_root(state)
         return status
-    status = drive(model, settings, memory, z, u, h)
+    status = drive(model, settings, state, z, u, h)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
-        moves = np.sqrt(process_noise(settings, memory, fade, h, i))
-        memory.start[i] = z[i]
+        moves = np.sqrt(process_noise(settings, state, fade, h, i))
+        state.start[i] = z[i]
         for j in range(size):
             stack[i, j] = root[i, j]
             stack[size + i, j] = moves if j == i else 0.0
     triangularise(stack[: 2 * size, :size], root)
     spread = POINT_DISTANCE * np.sqrt(1.0 * size)
-    status = status or _spread(model, settings, memory, spread, h)
+    status = status or _spread(model, settings, state, spread, h)
     if status:
         return status
-    _absorb(settings, memory, spread, fade, y, row)
+    _absorb(settings, state, spread, fade, y, estimate)
     if settings.learning.within < np.inf:
-        if surprises(settings, memory.levels, row[row.size - 1]):
+        if surprises(settings, state.levels, estimate[estimate.size - 1]):
             for i in range(size):
-                z[i] = memory.start[i]
-            status = ekf_law(model, settings, memory, h, u, y, row)
-            _covariance_to_root(memory)
+                z[i] = state.start[i]
+            status = ekf_step(model, settings, state, h, u, y, estimate)
+            _covariance_to_root(state)
             return status
-        memory.levels.surprised[0] = 0.0
-    _root_to_covariance(memory)
+        state.levels.surprised[0] = 0.0
+    _root_to_covariance(state)
     if settings.learning.within < np.inf:
-        learn(settings, memory, fade, h)
-    return finish(model, settings, memory, row)
+        learn(settings, state, fade, h)
+    return finish(model, settings, state, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -263,13 +263,13 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     name = "ukf"
     label = "unscented Kalman filter"
     rank = 45
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(self.system.outputs)
-        self._memory = PointsMemory(
+        self._state = PointsState(
             *buffers(len(fmu.states), len(system.estimated)),
             np.zeros(max(size, 2 * outputs)),
             levels(size, outputs),
@@ -283,4 +283,4 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
 
     def _begin(self, u: Vector, y: Vector) -> None:
         super()._begin(u, y)
-        self._memory.root[:] = 0.0
+        self._state.root[:] = 0.0

@@ -81,7 +81,7 @@ def remembered(estimator: Estimator, sample: Vector) -> Remembered:
     _refuse_shared(estimator)
     both = zip(parts.models, estimator.models, strict=True)
     models = tuple(_model(one, fmu, number) for number, (one, fmu) in enumerate(both))
-    return copy.deepcopy(Remembered(models, parts.memory))
+    return copy.deepcopy(Remembered(models, parts.state))
 
 
 def usual_sample(estimator: Estimator) -> Vector:
@@ -151,7 +151,7 @@ def _refuse_shared(estimator: Estimator) -> None:
     """Refuse memory that is in two places, which would be two in C."""
     parts = estimator.parts
     arrays = [*_arrays(tuple(parts.settings)), *_arrays(tuple(map(tuple, parts.models)))]
-    for array in _arrays(parts.memory):
+    for array in _arrays(parts.state):
         if any(np.shares_memory(array, one) for one in arrays):
             raise InputError(
                 where=f"estimator {estimator.name}",

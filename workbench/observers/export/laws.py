@@ -117,7 +117,7 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
         }
     )
     step = program.add(
-        parts.law,
+        parts.step,
         [
             models if parts.several else models.of,
             replace(of_settings, constant=True),

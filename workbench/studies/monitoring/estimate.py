@@ -126,7 +126,7 @@ class RecordingEstimator:
         key = tuple(sorted(parameters.items()))
         if key not in self._filters:
             model = self._model.variant(parameters)
-            gains = ExtendedKalmanFilter.reasoned(model, self._constant)
+            gains = ExtendedKalmanFilter.default_gains(model, self._constant)
             self._filters[key] = ExtendedKalmanFilter(model, self._constant, gains)
         return self._filters[key]
 

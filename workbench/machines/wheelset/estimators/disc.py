@@ -8,7 +8,12 @@ from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.models.native import compiled, inlined
-from workbench.observers.estimators.disturbance import DisturbanceObserver, Memory, Settings, law
+from workbench.observers.estimators.disturbance import (
+    DisturbanceObserver,
+    ObserverSettings,
+    ObserverState,
+    disturbance_step,
+)
 from workbench.observers.gains import Gains
 from workbench.system.system import System
 
@@ -45,7 +50,7 @@ class DiscModel(NamedTuple):
 
 
 class _DiscSettings(NamedTuple):
-    observer: Settings
+    observer: ObserverSettings
     disc: DiscModel
     wheelset: int  # states
     roller: int
@@ -55,8 +60,8 @@ class _DiscSettings(NamedTuple):
     radius: float  # of the roller
 
 
-class _DiscMemory(NamedTuple):
-    observer: Memory
+class _DiscState(NamedTuple):
+    observer: ObserverState
     temperature: Vector  # (1,) [degC]
 
 
@@ -68,28 +73,28 @@ def _trend(disc, nominal, speed, temperature):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Warm the disc, move what friction decays to, then the law of the observer."""
-    disc, observer, friction = settings.disc, memory.observer, settings.friction
+    disc, observer, friction = settings.disc, state.observer, settings.friction
     if h > 0.0:
         n = model.x.size
         # The effect of muDC on der(omegaW) is the brake torque per muDC, over the inertia.
         effect = model.jacobian[n + friction, settings.wheelset]
         torque = settings.inertia * effect * (settings.nominal + observer.z[friction])
         power = disc.share * abs(torque * model.x[settings.wheelset])
-        warmer = memory.temperature[0] - disc.ambient
-        memory.temperature[0] += h * (power - disc.cooling * warmer) / disc.capacity
+        warmer = state.temperature[0] - disc.ambient
+        state.temperature[0] += h * (power - disc.cooling * warmer) / disc.capacity
         speed = settings.radius * model.x[settings.roller]
         before = observer.target[friction]
-        after = _trend(disc, settings.nominal, speed, memory.temperature[0])
+        after = _trend(disc, settings.nominal, speed, state.temperature[0])
         observer.target[friction], observer.drift[friction] = after, after - before
-    return law(model, settings.observer, observer, h, u, y, row)
+    return disturbance_step(model, settings.observer, observer, h, u, y, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -126,7 +131,7 @@ class DiscObserver(DisturbanceObserver):
     standard = False
     tunable = False
     tuned_as = DisturbanceObserver.name
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(
@@ -158,7 +163,7 @@ class DiscObserver(DisturbanceObserver):
         return {**super().settings(), "disc": self._disc.disc._asdict()}
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._disc, _DiscMemory(self._memory, self._temperature)
+        return self._disc, _DiscState(self._state, self._temperature)
 
     def _begin(self, u: Vector, y: Vector) -> None:
         super()._begin(u, y)
@@ -167,4 +172,4 @@ class DiscObserver(DisturbanceObserver):
         # Nothing has been braked yet.
         self._model.jacobian[:] = 0.0
         trend = _trend(disc, settings.nominal, settings.radius * y[1], disc.ambient)
-        self._memory.z[settings.friction] = self._memory.target[settings.friction] = trend
+        self._state.z[settings.friction] = self._state.target[settings.friction] = trend

@@ -24,14 +24,14 @@ class _Settings(NamedTuple):
     time_constant: float
 
 
-class _Memory(NamedTuple):
+class _State(NamedTuple):
     filtered: Vector  # speed, torque
 
 
 @inlined
-def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """The roller's balance through a first-order low-pass (backward Euler)."""
-    filtered = memory.filtered
+    filtered = state.filtered
     model.x[settings.roller] = y[1]
     status = measure(model, u) or set_states(model) or evaluate(model) or read(model)
     # Torque on the roller besides the creep force, tauR - loss: the model's own balance gives it.
@@ -42,14 +42,14 @@ def _law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
     filtered[0] += share * (y[1] - filtered[0])
     filtered[1] += share * (torque - filtered[1])
     acceleration = (y[1] - filtered[0]) / settings.time_constant
-    row[settings.column] = (filtered[1] - settings.inertia * acceleration) / settings.radius
+    estimate[settings.column] = (filtered[1] - settings.inertia * acceleration) / settings.radius
     return status
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -70,7 +70,7 @@ class DirectInversion(Estimator):
     label = "direct inversion"
     rank = 10
     tunable = False
-    _law = staticmethod(_law)
+    _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -89,10 +89,10 @@ class DirectInversion(Estimator):
             fmu.defaults["rR"],
             TIME_CONSTANT,
         )
-        self._memory = _Memory(np.zeros(2))
+        self._state = _State(np.zeros(2))
 
     def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._memory
+        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()

@@ -19,7 +19,7 @@ class WheelsetParameterEstimator(parameter.ParameterEstimator):
     name = parameter.ParameterEstimator.name
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """Gains from the linearised model, by its two time scales.
 
         The eigenvalues of the model are far apart: slip settles within milliseconds, the common

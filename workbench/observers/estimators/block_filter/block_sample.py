@@ -1,6 +1,6 @@
 """What a sample tells a filter whose unknowns fall into blocks, and how much it knows.
 
-`settings` and `memory` are those of the filter in `arrow`.
+`settings` and `state` are those of the filter in `arrow`.
 """
 
 import numpy as np
@@ -10,18 +10,18 @@ from workbench.observers.estimators.kalman import variance
 
 
 @compiled
-def absorb(model, settings, memory, y, fade, row):  # type: ignore[no-untyped-def]
+def measurement_update(model, settings, state, y, fade, estimate):  # type: ignore[no-untyped-def]
     """Correct mean and covariance by a sample, one output after the other.
 
     Given the shared unknowns and the common factor, an output tells of its own block alone: that is
     corrected by it, and what block and noise leave uncertain of it is the noise of what it says of
     the shared ones. Blocks stay independent given these, so that nothing is approximated.
     """
-    z, P, G, C, parts = memory.z, memory.P, memory.G, memory.C, settings.blocks
-    layout, d, v, change = settings.filter.layout, memory.row, memory.column, memory.change
-    count, width, s = parts.first.size - 2, P.shape[0], memory.known.shape[0]
-    last, measured = parts.first[count], memory.measured
-    row[row.size - 1] = 0.0
+    z, P, G, C, parts = state.z, state.P, state.G, state.C, settings.blocks
+    layout, d, v, change = settings.filter.layout, state.row, state.column, state.change
+    count, width, s = parts.first.size - 2, P.shape[0], state.known.shape[0]
+    last, measured = parts.first[count], state.measured
+    estimate[estimate.size - 1] = 0.0
     for k in range(change.size):
         change[k] = 0.0
     for j in range(y.size):
@@ -63,17 +63,17 @@ def absorb(model, settings, memory, y, fade, row):  # type: ignore[no-untyped-de
                 C[begin + k, c] -= gain * v[c]
         for a in range(width):
             innovation -= d[a] * change[last + a]
-            memory.told[a] = 0.0
+            state.told[a] = 0.0
             for b in range(width):
-                memory.told[a] += P[a, b] * d[b]
-            total += d[a] * memory.told[a]
+                state.told[a] += P[a, b] * d[b]
+            total += d[a] * state.told[a]
         inverse = 1.0 / total
-        row[row.size - 1] += innovation * innovation * inverse
+        estimate[estimate.size - 1] += innovation * innovation * inverse
         for a in range(width):
-            gain = memory.told[a] * inverse
+            gain = state.told[a] * inverse
             change[last + a] += gain * innovation
             for b in range(width):
-                P[a, b] -= gain * memory.told[b]
+                P[a, b] -= gain * state.told[b]
     for k in range(last):
         for a in range(width):
             change[k] += G[k, a] * change[last + a]
@@ -94,45 +94,45 @@ def of_shared(P, d):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def scatter(memory, begin, k):  # type: ignore[no-untyped-def]
+def scatter(state, begin, k):  # type: ignore[no-untyped-def]
     """Variance of unknown k, in the order of blocks, of the block that begins at `begin`."""
-    G, P, last = memory.G, memory.P, memory.G.shape[0]
+    G, P, last = state.G, state.P, state.G.shape[0]
     if k >= last:
         return P[k - last, k - last]
-    return memory.C[k, k - begin] + of_shared(P, G[k])
+    return state.C[k, k - begin] + of_shared(P, G[k])
 
 
 @compiled
-def reported_deviation(settings, memory, r):  # type: ignore[no-untyped-def]
+def reported_deviation(settings, state, r):  # type: ignore[no-untyped-def]
     """Standard deviation of reported output r, which may depend on all blocks, to first order."""
-    parts, slope, d = settings.blocks, memory.reported, memory.row
+    parts, slope, d = settings.blocks, state.reported, state.row
     count, total = parts.first.size - 2, 0.0
     for a in range(d.size):
-        d[a] = slope[parts.first[count] + a, r] if a < memory.known.shape[0] else 0.0
+        d[a] = slope[parts.first[count] + a, r] if a < state.known.shape[0] else 0.0
     for i in range(count):
         begin = parts.first[i]
         for k in range(begin, parts.first[i + 1]):
             for a in range(d.size):
-                d[a] += slope[k, r] * memory.G[k, a]
+                d[a] += slope[k, r] * state.G[k, a]
             for c in range(parts.first[i + 1] - begin):
-                total += slope[k, r] * memory.C[k, c] * slope[begin + c, r]
-    return np.sqrt(max(total + of_shared(memory.P, d), 0.0))
+                total += slope[k, r] * state.C[k, c] * slope[begin + c, r]
+    return np.sqrt(max(total + of_shared(state.P, d), 0.0))
 
 
 @compiled
-def fed_deviation(settings, memory, j):  # type: ignore[no-untyped-def]
+def fed_deviation(settings, state, j):  # type: ignore[no-untyped-def]
     """Standard deviation of fed output j, to first order."""
-    parts, slope, d = settings.blocks, memory.measured, memory.row
+    parts, slope, d = settings.blocks, state.measured, state.row
     count, i = parts.first.size - 2, parts.home[j]
     begin = parts.first[i]
     if settings.filter.layout.seen[j] >= 0:
-        return np.sqrt(scatter(memory, begin, parts.place[j]))
+        return np.sqrt(scatter(state, begin, parts.place[j]))
     size, total = parts.first[i + 1] - begin if i < count else 0, 0.0
     for a in range(d.size):
-        d[a] = slope[j, size + a] if a < memory.known.shape[0] else 0.0
+        d[a] = slope[j, size + a] if a < state.known.shape[0] else 0.0
     for k in range(size):
         for a in range(d.size):
-            d[a] += slope[j, k] * memory.G[begin + k, a]
+            d[a] += slope[j, k] * state.G[begin + k, a]
         for c in range(size):
-            total += slope[j, k] * memory.C[begin + k, c] * slope[j, c]
-    return np.sqrt(max(total + of_shared(memory.P, d), 0.0))
+            total += slope[j, k] * state.C[begin + k, c] * slope[j, c]
+    return np.sqrt(max(total + of_shared(state.P, d), 0.0))

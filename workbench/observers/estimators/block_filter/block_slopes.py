@@ -1,46 +1,46 @@
 """Derivatives of a model whose unknowns fall into blocks, of none that is zero by structure.
 
-`parts` are `blocks.Blocks`, `settings` and `memory` those of the filter in `arrow`.
+`parts` are `blocks.Blocks`, `settings` and `state` those of the filter in `arrow`.
 """
 
 from workbench.models.native import compiled, direction, inlined, linearise
 
 
 @compiled
-def slopes(model, parts, memory):  # type: ignore[no-untyped-def]
+def slopes(model, parts, state):  # type: ignore[no-untyped-def]
     """Derivatives of each block's rates and of the shared ones, by what acts on them; a status."""
     if model.fmi == 0:
-        return slopes_by_differences(model, parts, memory)
+        return slopes_by_differences(model, parts, state)
     count = parts.first.size - 2
     for i in range(count):
         asked = parts.states[i] + parts.states[count]
         for k in range(parts.first[i], parts.first[i + 1]):
             known = model.knowns[parts.order[k] :]
-            out = memory.slopes[k]
+            out = state.slopes[k]
             if direction(model, parts.rates[i], asked, known, 1, model.seed, out):
                 return 1
     for a in range(parts.first[count + 1] - parts.first[count]):
         known = model.knowns[parts.order[parts.first[count] + a] :]
-        out = memory.common[a]
+        out = state.common[a]
         if direction(model, model.unknowns, model.x.size, known, 1, model.seed, out):
             return 1
     return 0
 
 
 @compiled
-def slopes_by_differences(model, parts, memory):  # type: ignore[no-untyped-def]
+def slopes_by_differences(model, parts, state):  # type: ignore[no-untyped-def]
     """The same of an FMU without directional derivatives, of which all are taken; a status."""
     status, count, order = linearise(model, model.x.size), parts.first.size - 2, parts.order
     last = parts.first[count]
     for i in range(count):
         for k in range(parts.first[i], parts.first[i + 1]):
             for r in range(parts.states[i]):
-                memory.slopes[k, r] = model.jacobian[order[k], order[parts.first[i] + r]]
+                state.slopes[k, r] = model.jacobian[order[k], order[parts.first[i] + r]]
             for a in range(parts.states[count]):
-                memory.slopes[k, parts.states[i] + a] = model.jacobian[order[k], order[last + a]]
+                state.slopes[k, parts.states[i] + a] = model.jacobian[order[k], order[last + a]]
     for a in range(parts.first[count + 1] - last):
         for r in range(model.x.size):
-            memory.common[a, r] = model.jacobian[order[last + a], r]
+            state.common[a, r] = model.jacobian[order[last + a], r]
     return status
 
 
@@ -55,7 +55,7 @@ def slope(model, column, known, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def slopes_of_fed(model, settings, memory):  # type: ignore[no-untyped-def]
+def slopes_of_fed(model, settings, state):  # type: ignore[no-untyped-def]
     """Derivatives of fed outputs that are no states, by block and shared unknowns; a status."""
     parts, seen, n = settings.blocks, settings.filter.layout.seen, model.x.size
     count, status = parts.first.size - 2, 0
@@ -68,9 +68,9 @@ def slopes_of_fed(model, settings, memory):  # type: ignore[no-untyped-def]
         if i < count:
             size = parts.first[i + 1] - parts.first[i]
         for k in range(size):
-            known, out = parts.order[parts.first[i] + k], memory.measured[j, k:]
+            known, out = parts.order[parts.first[i] + k], state.measured[j, k:]
             status = status or slope(model, column, known, out)
-        for a in range(memory.known.shape[0]):
-            known, out = parts.order[parts.first[count] + a], memory.measured[j, size + a :]
+        for a in range(state.known.shape[0]):
+            known, out = parts.order[parts.first[count] + a], state.measured[j, size + a :]
             status = status or slope(model, column, known, out)
     return status

@@ -1,6 +1,6 @@
 """Step of a filter whose unknowns fall into blocks, after which its covariance is one of blocks.
 
-`settings` and `memory` are those of the filter in `arrow`, which says what is approximated.
+`settings` and `state` are those of the filter in `arrow`, which says what is approximated.
 """
 
 import numpy as np
@@ -13,13 +13,13 @@ _ROUNDING = 1e-12  # share of a variance below which what is left of it is round
 
 
 @compiled
-def eliminate(settings, memory, i, h):  # type: ignore[no-untyped-def]
+def eliminate(settings, state, i, h):  # type: ignore[no-untyped-def]
     """Solve block i of the implicit step for its states, given the shared ones; returns a status.
 
     Writes (I - h A_ii)^-1 of the block's unknowns, in rows of its states: those of quantities are
     of a unit matrix; and `passed`, what the shared unknowns take from it, M_si M_ii^-1.
     """
-    parts, slopes, inverse, solved = settings.blocks, memory.slopes, memory.inverse, memory.solved
+    parts, slopes, inverse, solved = settings.blocks, state.slopes, state.inverse, state.solved
     count, begin, n = parts.first.size - 2, parts.first[i], parts.states[i]
     size, shared = parts.first[i + 1] - begin, parts.states[count]
     for r in range(n):
@@ -39,21 +39,21 @@ def eliminate(settings, memory, i, h):  # type: ignore[no-untyped-def]
             total = -h * slopes[begin + c, n + a] if c >= n else 0.0
             for r in range(n):
                 total -= h * slopes[begin + r, n + a] * inverse[begin + r, c]
-            memory.passed[begin + c, a] = total
+            state.passed[begin + c, a] = total
     return status
 
 
 @compiled
-def gather(model, settings, memory, h, fade):  # type: ignore[no-untyped-def]
+def gather(model, settings, state, h, fade):  # type: ignore[no-untyped-def]
     """Step of the shared unknowns, of what all blocks pass to them; returns a status.
 
     With M = I - h A and z' = M^-1 z, blocks b_i and shared s: S s' = r, r = s - sum of L_i b_i,
     L_i = M_si M_ii^-1. Writes S^-1 and the change of the mean to `system`, the covariance R of r to
     `known`, and C_i L_i' of each block to `tied`.
     """
-    parts, walk, P, G, C = settings.blocks, settings.filter.walk, memory.P, memory.G, memory.C
-    passed, tied, system, common = memory.passed, memory.tied, memory.system, memory.common
-    kept, moved, known, order = memory.kept, memory.moved, memory.known, parts.order
+    parts, walk, P, G, C = settings.blocks, settings.filter.walk, state.P, state.G, state.C
+    passed, tied, system, common = state.passed, state.tied, state.system, state.common
+    kept, moved, known, order = state.kept, state.moved, state.known, parts.order
     count, status, (s, width) = parts.first.size - 2, 0, kept.shape
     last, shared = parts.first[count], parts.states[count]
     for a in range(s):
@@ -70,7 +70,7 @@ def gather(model, settings, memory, h, fade):  # type: ignore[no-untyped-def]
     for i in range(count):
         begin, n = parts.first[i], parts.states[i]
         size = parts.first[i + 1] - begin
-        status = status or eliminate(settings, memory, i, h)
+        status = status or eliminate(settings, state, i, h)
         for c in range(size):
             C[begin + c, c] += h * (fade * walk[order[begin + c]]) ** 2
             for a in range(shared):
@@ -94,7 +94,7 @@ def gather(model, settings, memory, h, fade):  # type: ignore[no-untyped-def]
                 system[a, s] -= factor * model.dx[row]
     for a in range(s):
         for b in range(s):
-            memory.step[a, b] = system[a, b]
+            state.step[a, b] = system[a, b]
             system[a, s + 1 + b] = 1.0 if a == b else 0.0
         for b in range(width):
             moved[a, b] = 0.0
@@ -141,9 +141,9 @@ def invert(known, before):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def share(memory):  # type: ignore[no-untyped-def]
+def share(state):  # type: ignore[no-untyped-def]
     """Covariance of the shared unknowns after a step, S^-1 R S^-T; `known` becomes R^-1."""
-    kept, system, known, after = memory.kept, memory.system, memory.known, memory.after
+    kept, system, known, after = state.kept, state.system, state.known, state.after
     s = known.shape[0]
     for a in range(s):
         for b in range(s):
@@ -156,7 +156,7 @@ def share(memory):  # type: ignore[no-untyped-def]
             for c in range(s):
                 total += kept[a, c] * system[b, s + 1 + c]
             after[a, b] = after[b, a] = total
-    invert(known, memory.row)
+    invert(known, state.row)
 
 
 @compiled
@@ -202,16 +202,16 @@ def forward(rows, X, begin, n, size, left):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def whiten(memory, begin, size):  # type: ignore[no-untyped-def]
+def whiten(state, begin, size):  # type: ignore[no-untyped-def]
     """Add what a block tells of the covariance between blocks to its sums, in units of its root.
 
     `block`, the covariance of its unknowns given the shared ones, becomes its root T (Cholesky), of
     which columns without a rest of variance are zero. In these units the covariance of any two
     blocks is less than a unit matrix.
     """
-    root, G, weighed, tied = memory.block, memory.G, memory.weighed, memory.tied
-    along, against, between = memory.along, memory.against, memory.between
-    s, width = memory.kept.shape
+    root, G, weighed, tied = state.block, state.G, state.weighed, state.tied
+    along, against, between = state.along, state.against, state.between
+    s, width = state.kept.shape
     for k in range(size):
         least = _ROUNDING * root[k, k]
         for c in range(k + 1):
@@ -219,13 +219,13 @@ def whiten(memory, begin, size):  # type: ignore[no-untyped-def]
             for d in range(c):
                 total -= root[k, d] * root[c, d]
             if c < k:
-                root[k, c] = total * memory.column[c]
+                root[k, c] = total * state.column[c]
             elif total > least:
                 root[k, k] = np.sqrt(total)
-                memory.column[k] = 1.0 / root[k, k]
+                state.column[k] = 1.0 / root[k, k]
             else:
-                root[k, k] = memory.column[k] = 0.0
-        inverse = memory.column[k]
+                root[k, k] = state.column[k] = 0.0
+        inverse = state.column[k]
         for d in range(k):
             factor = root[k, d]
             for a in range(width):
@@ -240,34 +240,34 @@ def whiten(memory, begin, size):  # type: ignore[no-untyped-def]
             along[1, k, a] += weighed[k, a]
         for a in range(s):
             tied[begin + k, a] *= inverse
-            memory.row[a] = 0.0
+            state.row[a] = 0.0
         for b in range(s):
             for a in range(s):
-                memory.row[a] += tied[begin + k, b] * memory.known[b, a]
+                state.row[a] += tied[begin + k, b] * state.known[b, a]
         for a in range(s):
             against[0, k, a] += tied[begin + k, a]
-            against[1, k, a] += memory.row[a]
+            against[1, k, a] += state.row[a]
         for c in range(k + 1):
             total = 0.0
             for a in range(width):
                 total += weighed[k, a] * G[begin + c, a]
             for a in range(s):
-                total -= memory.row[a] * tied[begin + c, a]
+                total -= state.row[a] * tied[begin + c, a]
             between[k, c] -= total
 
 
 @compiled
-def distribute(model, settings, memory, i, h):  # type: ignore[no-untyped-def]
+def distribute(model, settings, state, i, h):  # type: ignore[no-untyped-def]
     """Mean of block i after a step, and its covariance given the shared unknowns.
 
     b_i' = X (b_i - M_is s') with X = M_ii^-1, and s' = S^-1 r: b_i given r, moved by X. What makes
     the covariance between blocks is summed up for `liken`.
     """
-    parts, G, C, X = settings.blocks, memory.G, memory.C, memory.inverse
-    tied, block, left, weighed = memory.tied, memory.block, memory.left, memory.weighed
-    common, system, order, known = memory.common, memory.system, parts.order, memory.known
+    parts, G, C, X = settings.blocks, state.G, state.C, state.inverse
+    tied, block, left, weighed = state.tied, state.block, state.left, state.weighed
+    common, system, order, known = state.common, state.system, parts.order, state.known
     count, begin, n = parts.first.size - 2, parts.first[i], parts.states[i]
-    size, shared, (s, width) = parts.first[i + 1] - begin, parts.states[count], memory.kept.shape
+    size, shared, (s, width) = parts.first[i + 1] - begin, parts.states[count], state.kept.shape
     for k in range(size):
         for c in range(size):
             block[k, c] = C[begin + k, c]
@@ -278,7 +278,7 @@ def distribute(model, settings, memory, i, h):  # type: ignore[no-untyped-def]
         for a in range(s):
             total = -tied[begin + k, a] if a < shared else 0.0
             for b in range(width):
-                total += memory.moved[a, b] * G[begin + k, b]
+                total += state.moved[a, b] * G[begin + k, b]
             tied[begin + k, a] = total
     forward(G, X, begin, n, size, left)
     forward(tied, X, begin, n, size, left)
@@ -289,7 +289,7 @@ def distribute(model, settings, memory, i, h):  # type: ignore[no-untyped-def]
         for b in range(width):
             factor = G[begin + k, b]
             for a in range(width):
-                weighed[k, a] += factor * memory.P[b, a]
+                weighed[k, a] += factor * state.P[b, a]
         for a in range(s):
             left[k, a] = 0.0
             for b in range(s):
@@ -305,39 +305,39 @@ def distribute(model, settings, memory, i, h):  # type: ignore[no-untyped-def]
         for c in range(size):
             C[begin + k, c] += block[k, c]
             block[k, c] = C[begin + k, c]
-    whiten(memory, begin, size)
+    whiten(state, begin, size)
     for k in range(size):
         for b in range(s):
             G[begin + k, b] = 0.0
         for a in range(s):
             for b in range(s):
-                G[begin + k, b] += left[k, a] * memory.step[a, b]
+                G[begin + k, b] += left[k, a] * state.step[a, b]
         for c in range(size):
             G[begin + k, s + c] = block[k, c] if c <= k else 0.0
     for r in range(n):
-        memory.change[begin + r] = 0.0
+        state.change[begin + r] = 0.0
         for k in range(n):
             at = order[begin + k]
             factor, moves = h * X[begin + r, k], model.dx[at]
             for b in range(s):
                 G[begin + r, b] += factor * common[b, at]
                 moves += common[b, at] * system[b, s]
-            memory.change[begin + r] += factor * moves
+            state.change[begin + r] += factor * moves
     for k in range(n, size):
-        memory.change[begin + k] = 0.0
+        state.change[begin + k] = 0.0
 
 
 @compiled
-def liken(settings, memory):  # type: ignore[no-untyped-def]
+def liken(settings, state):  # type: ignore[no-untyped-def]
     """Take the covariance between two blocks, given the shared unknowns, for that of all pairs.
 
     In units of their roots, on average over the pairs, which makes a covariance of any blocks: the
     mean lies between a unit matrix and -1/(N - 1) of it, as the sum of N blocks has no variance
     less than zero. It is that of a common factor; what is known of each block stays as it is.
     """
-    P, G, C, between, first = memory.P, memory.G, memory.C, memory.between, settings.blocks.first
-    along, against, left = memory.along, memory.against, memory.left
-    count, s = first.size - 2, memory.known.shape[0]
+    P, G, C, between, first = state.P, state.G, state.C, state.between, settings.blocks.first
+    along, against, left = state.along, state.against, state.left
+    count, s = first.size - 2, state.known.shape[0]
     width, size = P.shape[0], P.shape[0] - s
     pairs = count * (count - 1.0)
     for k in range(size):
@@ -348,7 +348,7 @@ def liken(settings, memory):  # type: ignore[no-untyped-def]
                 between[k, c] -= against[1, k, a] * against[0, c, a]
     for a in range(s):
         for b in range(s):
-            P[a, b] = memory.after[a, b]
+            P[a, b] = state.after[a, b]
         for k in range(size):
             P[a, s + k] = P[s + k, a] = 0.0
     for k in range(size):
@@ -371,29 +371,29 @@ def liken(settings, memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def predict(model, settings, memory, h, fade):  # type: ignore[no-untyped-def]
+def predict(model, settings, state, h, fade):  # type: ignore[no-untyped-def]
     """Advance mean and covariance by one linearly implicit step; returns a status."""
-    z, parts, layout = memory.z, settings.blocks, settings.filter.layout
-    status = put(model, z) or evaluate(model) or slopes(model, parts, memory)
-    status = status or gather(model, settings, memory, h, fade)
+    z, parts, layout = state.z, settings.blocks, settings.filter.layout
+    status = put(model, z) or evaluate(model) or slopes(model, parts, state)
+    status = status or gather(model, settings, state, h, fade)
     if status:
         return status
-    share(memory)
-    count, size = parts.first.size - 2, memory.between.shape[0]
+    share(state)
+    count, size = parts.first.size - 2, state.between.shape[0]
     for k in range(size):
         for c in range(size):
-            memory.between[k, c] = 0.0
-        for a in range(memory.P.shape[0]):
-            memory.along[0, k, a] = memory.along[1, k, a] = 0.0
-        for a in range(memory.known.shape[0]):
-            memory.against[0, k, a] = memory.against[1, k, a] = 0.0
+            state.between[k, c] = 0.0
+        for a in range(state.P.shape[0]):
+            state.along[0, k, a] = state.along[1, k, a] = 0.0
+        for a in range(state.known.shape[0]):
+            state.against[0, k, a] = state.against[1, k, a] = 0.0
     for i in range(count):
-        distribute(model, settings, memory, i, h)
-    liken(settings, memory)
-    for a in range(memory.known.shape[0]):
-        memory.change[parts.first[count] + a] = memory.system[a, memory.known.shape[0]]
+        distribute(model, settings, state, i, h)
+    liken(settings, state)
+    for a in range(state.known.shape[0]):
+        state.change[parts.first[count] + a] = state.system[a, state.known.shape[0]]
     before = lag(layout, z)
     for k in range(z.size):
-        z[parts.order[k]] += memory.change[k]
+        z[parts.order[k]] += state.change[k]
     stick(layout, z, before)
     return 0

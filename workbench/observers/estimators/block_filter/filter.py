@@ -30,8 +30,8 @@ from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.models.native import compiled, read
 from workbench.observers.estimators.block_filter.block_sample import (
-    absorb,
     fed_deviation,
+    measurement_update,
     reported_deviation,
     scatter,
 )
@@ -51,7 +51,7 @@ class ArrowSettings(NamedTuple):
     blocks: Blocks
 
 
-class ArrowMemory(NamedTuple):
+class ArrowState(NamedTuple):
     """What the law remembers, and its work space.
 
     With b unknowns in blocks of at most m, of which k are states, s shared ones, n states in all;
@@ -113,33 +113,33 @@ class ArrowMemory(NamedTuple):
 
 
 @compiled
-def finish(model, settings, memory, row):  # type: ignore[no-untyped-def]
+def finish(model, settings, state, estimate):  # type: ignore[no-untyped-def]
     """Limit the quantities, report the estimate and its standard deviations; returns a status."""
-    z, parts, layout, n = memory.z, settings.blocks, settings.filter.layout, model.x.size
+    z, parts, layout, n = state.z, settings.blocks, settings.filter.layout, model.x.size
     q, outputs = layout.nominal.size, layout.seen.size
     for i in range(q):
         z[n + i] = clip(z[n + i], layout.low[i], layout.high[i])
-    status = put(model, z) or slopes_of_fed(model, settings, memory)
+    status = put(model, z) or slopes_of_fed(model, settings, state)
     for k in range(z.size):
         for r in range(layout.reported):
-            status = status or slope(model, n + r, parts.order[k], memory.reported[k, r:])
-    status = status or report(model, layout, row)
+            status = status or slope(model, n + r, parts.order[k], state.reported[k, r:])
+    status = status or report(model, layout, estimate)
     first = outputs + 2 * q + layout.reported  # of the standard deviations
     for j in range(outputs):
-        row[first + j] = fed_deviation(settings, memory, j)
+        estimate[first + j] = fed_deviation(settings, state, j)
     for i in range(parts.first.size - 1):
         for k in range(parts.first[i] + parts.states[i], parts.first[i + 1]):
             at = parts.order[k] - n
             doubt = layout.doubt[at] * (layout.nominal[at] + z[n + at])
-            known_to = np.sqrt(scatter(memory, parts.first[i], k) + doubt * doubt)
-            row[first + outputs + at] = row[first + outputs + q + at] = known_to
+            known_to = np.sqrt(scatter(state, parts.first[i], k) + doubt * doubt)
+            estimate[first + outputs + at] = estimate[first + outputs + q + at] = known_to
     for r in range(layout.reported):
-        row[first + outputs + 2 * q + r] = reported_deviation(settings, memory, r)
+        estimate[first + outputs + 2 * q + r] = reported_deviation(settings, state, r)
     return status
 
 
 @compiled
-def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
+def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
     """Covariance of the first sample; returns a status."""
     parts, fade = settings.blocks, fading(settings.filter.layout, y)
     count = parts.first.size - 2
@@ -149,34 +149,34 @@ def begin(model, settings, memory, u, y):  # type: ignore[no-untyped-def]
             known = variance(settings.filter, fade, y, j)
             own = place - parts.first[i]
             if i == count:
-                memory.P[own, own] = known
+                state.P[own, own] = known
             else:
-                memory.C[place, own] = known
+                state.C[place, own] = known
     return measure(model, u)
 
 
 @compiled
-def arrow_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def arrow_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Predict by the linearised model, correct by the sample."""
     if h == 0.0:
-        status = begin(model, settings, memory, u, y)
-        return status or finish(model, settings, memory, row)
+        status = begin(model, settings, state, u, y)
+        return status or finish(model, settings, state, estimate)
     layout = settings.filter.layout
     fade = fading(layout, y)
-    status = measure(model, u) or predict(model, settings, memory, h, fade)
+    status = measure(model, u) or predict(model, settings, state, h, fade)
     if layout.columns > model.x.size:
-        status = status or put(model, memory.z) or read(model)
-        status = status or slopes_of_fed(model, settings, memory)
+        status = status or put(model, state.z) or read(model)
+        status = status or slopes_of_fed(model, settings, state)
     if status:
         return status
-    absorb(model, settings, memory, y, fade, row)
-    return finish(model, settings, memory, row)
+    measurement_update(model, settings, state, y, fade, estimate)
+    return finish(model, settings, state, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = arrow_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = arrow_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -221,48 +221,48 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
                 expected="levels that are held, as they are learnt of all unknowns at once",
                 remedy="leave 'learns' out of the system file, or use the estimator ekf",
             )
-        self._law, self._loop = arrow_law, _loop
+        self._step, self._loop = arrow_step, _loop
         self._settings = ArrowSettings(self._settings, self._blocks)
-        self._memory = _memory(self._blocks, self._layout, len(self.fmu.states))
+        self._state = _state(self._blocks, self._layout, len(self.fmu.states))
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        if not isinstance(self._memory, ArrowMemory):
+        if not isinstance(self._state, ArrowState):
             super()._begin(u, y)
             return
-        memory, known = self._memory, self._settings.filter.spread[self._blocks.order] ** 2
-        memory.z[:] = self._start_values()
-        memory.G[:] = memory.C[:] = 0.0
+        state, known = self._state, self._settings.filter.spread[self._blocks.order] ** 2
+        state.z[:] = self._start_values()
+        state.G[:] = state.C[:] = 0.0
         for begin, end in pairwise(self._blocks.first[:-1]):
-            memory.C[begin:end, : end - begin] = np.diag(known[begin:end])
-        memory.P[:] = 0.0
+            state.C[begin:end, : end - begin] = np.diag(known[begin:end])
+        state.P[:] = 0.0
         shared = known[self._blocks.first[-2] :]
-        memory.P[: shared.size, : shared.size] = np.diag(shared)
+        state.P[: shared.size, : shared.size] = np.diag(shared)
 
     @property
     def covariance(self) -> Matrix:
         """See ExtendedKalmanFilter; of two blocks, by what they share."""
-        if not isinstance(self._memory, ArrowMemory):
+        if not isinstance(self._state, ArrowState):
             return super().covariance
         n = len(self.fmu.states)
         return self._joint()[n:, n:]
 
     def _joint(self) -> Matrix:
         """Covariance of states and quantities, (n + q, n + q)."""
-        memory, order = self._memory, self._blocks.order
-        gain = np.concatenate([memory.G, np.eye(len(memory.known), len(memory.P))])
+        state, order = self._state, self._blocks.order
+        gain = np.concatenate([state.G, np.eye(len(state.known), len(state.P))])
         known = np.zeros((order.size, order.size))
-        known[np.ix_(order, order)] = gain @ memory.P @ gain.T
+        known[np.ix_(order, order)] = gain @ state.P @ gain.T
         for begin, end in pairwise(self._blocks.first[:-1]):
             own = order[begin:end]
-            known[np.ix_(own, own)] += memory.C[begin:end, : end - begin]
+            known[np.ix_(own, own)] += state.C[begin:end, : end - begin]
         return known
 
 
-def _memory(parts: Blocks, layout: Layout, n: int) -> ArrowMemory:
+def _state(parts: Blocks, layout: Layout, n: int) -> ArrowState:
     """Memory and work space of the law, in which everything is zero."""
     b, size, (m, k) = int(parts.first[-2]), parts.order.size, widths(parts)
     s, outputs = size - b, layout.seen.size
-    return ArrowMemory(
+    return ArrowState(
         z=np.zeros(size),
         P=np.zeros((s + m, s + m)),
         G=np.zeros((b, s + m)),

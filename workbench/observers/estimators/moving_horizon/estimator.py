@@ -11,7 +11,7 @@ from workbench.models.fmu import FMU
 from workbench.models.native import compiled, inlined, linearise, raise_on_failure, read, read_only
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
-    FilterMemory,
+    FilterState,
     Learning,
     begin,
     drive,
@@ -75,18 +75,18 @@ class HorizonSettings(NamedTuple):
     fading: float
 
 
-class HorizonMemory(NamedTuple):
+class HorizonState(NamedTuple):
     """What the law remembers: that of a filter, held (l,) last samples, and the window."""
 
-    filter: FilterMemory
+    filter: FilterState
     held: Vector
     window: Window
 
 
 @inlined
-def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
+def _append(settings, state, h, u, y):  # type: ignore[no-untyped-def]
     """Add a node where the estimate stands, and the sample that its step leads to."""
-    window, held, levels = memory.window, memory.held, memory.filter.levels
+    window, held, levels = state.window, state.held, state.filter.levels
     if window.filled[0] == window.steps.size:
         shift(window)
     k = window.filled[0]
@@ -102,31 +102,31 @@ def _append(settings, memory, h, u, y):  # type: ignore[no-untyped-def]
         levels.noise[j] = variance(settings, fade, held, j)
         window.levels[k, j] = levels.sample[j] * levels.noise[j]
         window.weight[k, j] = 1.0
-    for i in range(memory.filter.z.size):
-        window.nodes[k, i] = memory.filter.z[i]
+    for i in range(state.filter.z.size):
+        window.nodes[k, i] = state.filter.z[i]
         window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
         window.active[k, i] = 0
         before = window.wider[k - 1, i] if k > 0 else window.older[i]
-        share = levels.walk[i] * room(settings, memory.filter.P, i)
+        share = levels.walk[i] * room(settings, state.filter.P, i)
         window.wider[k, i] = max(share, settings.fading * before)
-    for i in range(memory.filter.least.size):
-        least = memory.filter.least[i] / window.wider[k, i]
+    for i in range(state.filter.least.size):
+        least = state.filter.least[i] / window.wider[k, i]
         window.noise[k, i] = max(window.noise[k, i], least)
 
 
 @inlined
-def expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
+def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
     """Take and linearise the step from a node, and the outputs there; returns a status."""
-    window, layout, n = memory.window, settings.layout, model.x.size
+    window, layout, n = state.window, settings.layout, model.x.size
     arrived, h = window.arrived[k], window.steps[k]
     for i in range(arrived.size):
         arrived[i] = window.nodes[k, i]
     status = measure(model, window.inputs[k])
-    status = status or predict(model, settings, memory.filter, arrived, h)
-    status = status or transition(model, memory.filter.spread, h)
+    status = status or predict(model, settings, state.filter, arrived, h)
+    status = status or transition(model, state.filter.spread, h)
     for i in range(n):
         for j in range(arrived.size):
-            window.F[k, i, j] = memory.filter.spread[i, n + j]
+            window.F[k, i, j] = state.filter.spread[i, n + j]
     if layout.columns > n:
         status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
     for j in range(layout.seen.size):
@@ -141,9 +141,9 @@ def expand(model, settings, memory, k):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _learn(settings, memory):  # type: ignore[no-untyped-def]
+def _learn(settings, state):  # type: ignore[no-untyped-def]
     """Let noise levels follow the last sample, as those of a filter without a window."""
-    window, levels = memory.window, memory.filter.levels
+    window, levels = state.window, state.filter.levels
     last = window.filled[0] - 1
     for j in range(levels.sample.size):
         levels.scatter[j] = levels.sample[j]  # as thought, of a sample that is missing
@@ -151,108 +151,108 @@ def _learn(settings, memory):  # type: ignore[no-untyped-def]
             explained = window.total[last, j] - window.levels[last, j]
             note(levels, j, window.surprise[last, j], explained, levels.noise[j])
     assign_rows(levels.before, window.before)
-    assign_rows(memory.filter.P, window.P)
-    assign(memory.filter.change, window.moved)
-    learn(settings, memory.filter, fading(settings.layout, memory.held), window.steps[last])
+    assign_rows(state.filter.P, window.P)
+    assign(state.filter.change, window.moved)
+    learn(settings, state.filter, fading(settings.layout, state.held), window.steps[last])
 
 
 @compiled
-def _fill_in(model, settings, memory, k, y):  # type: ignore[no-untyped-def]
+def _fill_in(model, settings, state, k, y):  # type: ignore[no-untyped-def]
     """Put samples that were missing to node k; returns a status."""
     for j in range(y.size):
         if not np.isnan(y[j]):
-            memory.window.samples[k, j] = y[j]
-    return expand(model, settings, memory, k)
+            state.window.samples[k, j] = y[j]
+    return expand(model, settings, state, k)
 
 
 @compiled
-def _solve(settings, memory, new, row):  # type: ignore[no-untyped-def]
+def _solve(settings, state, new, estimate):  # type: ignore[no-untyped-def]
     """Best change of the nodes, to first order; the estimate is what the last step leads to.
 
     Parameters
     ----------
     new : whether it is the first time that the last sample is met.
     """
-    window, seen = memory.window, settings.layout.seen
+    window, seen = state.window, settings.layout.seen
     last = window.filled[0] - 1
     solve_free(window, seen)
     nis = 0.0
     for j in range(seen.size):
         if window.total[last, j] > 0.0:
             nis += window.surprise[last, j] ** 2 / window.total[last, j]
-    row[row.size - 1] = nis
-    learns, age = settings.learning.within < np.inf, memory.filter.levels.age[0]
+    estimate[estimate.size - 1] = nis
+    learns, age = settings.learning.within < np.inf, state.filter.levels.age[0]
     if nis > settings.largest_nis and not (learns and age < settings.learning.within):
         window.alert[0] = 1
-        trust(memory.filter.levels)
+        trust(state.filter.levels)
     if new and learns and window.alert[0] == 0:
-        _learn(settings, memory)
+        _learn(settings, state)
     for _ in range(_ROUNDS):
         if not reweigh(window, settings.limit, settings.fading):
             break
         solve_free(window, seen)
-    assign_rows(memory.filter.P, window.P)
+    assign_rows(state.filter.P, window.P)
     bound(window, seen)
-    for i in range(memory.filter.z.size):
-        memory.filter.z[i] = end(window, last, i)
+    for i in range(state.filter.z.size):
+        state.filter.z[i] = end(window, last, i)
 
 
 @compiled
-def move(model, settings, memory, share):  # type: ignore[no-untyped-def]
+def move(model, settings, state, share):  # type: ignore[no-untyped-def]
     """Move the nodes by a share of their change and take the steps from there; a status."""
-    window, status = memory.window, 0
+    window, status = state.window, 0
     for k in range(window.filled[0]):
-        for i in range(memory.filter.z.size):
+        for i in range(state.filter.z.size):
             window.nodes[k, i] += share * window.change[k, i]
-        status = status or expand(model, settings, memory, k)
+        status = status or expand(model, settings, state, k)
     return status
 
 
 @compiled
-def _relinearise(model, settings, memory):  # type: ignore[no-untyped-def]
+def _relinearise(model, settings, state):  # type: ignore[no-untyped-def]
     """Move the nodes by the change that was found, as far as it lowers the cost; a status.
 
     Nodes stay where they were linearised if no part of it does.
     """
-    before, share = cost(memory.window), 1.0
-    status = move(model, settings, memory, share)
+    before, share = cost(state.window), 1.0
+    status = move(model, settings, state, share)
     while not status and share > 0.0:
-        if cost(memory.window) <= before + ROUNDING * (1.0 + before):
+        if cost(state.window) <= before + ROUNDING * (1.0 + before):
             break
         less = 0.5 * share if share > _SHORTEST else 0.0
-        status = move(model, settings, memory, less - share)
+        status = move(model, settings, state, less - share)
         share = less
     return status
 
 
 @compiled
-def horizon_law(model, settings, memory, h, u, y, row):  # type: ignore[no-untyped-def]
+def horizon_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Estimate the last samples anew, with one that is added; returns a status."""
-    window = memory.window
+    window = state.window
     if h == 0.0:
-        status = begin(model, settings, memory.filter, u, y)
-        reset(memory.filter.levels)
+        status = begin(model, settings, state.filter, u, y)
+        reset(state.filter.levels)
         window.filled[0] = 0
         window.alert[0] = 0
-        for i in range(memory.filter.z.size):
+        for i in range(state.filter.z.size):
             window.older[i] = 1.0
-        assign(memory.held, y)
-        assign(window.mean, memory.filter.z)
-        assign_rows(window.covariance, memory.filter.P)
-        return status or finish(model, settings, memory.filter, row)
-    status = drive(model, settings, memory.filter, memory.filter.z, u, h)
-    _append(settings, memory, h, u, y)
-    status = status or expand(model, settings, memory, window.filled[0] - 1)
+        assign(state.held, y)
+        assign(window.mean, state.filter.z)
+        assign_rows(window.covariance, state.filter.P)
+        return status or finish(model, settings, state.filter, estimate)
+    status = drive(model, settings, state.filter, state.filter.z, u, h)
+    _append(settings, state, h, u, y)
+    status = status or expand(model, settings, state, window.filled[0] - 1)
     for iteration in range(settings.iterations):
-        _solve(settings, memory, iteration == 0, row)
-        status = status or _relinearise(model, settings, memory)
-    return status or finish(model, settings, memory.filter, row)
+        _solve(settings, state, iteration == 0, estimate)
+        status = status or _relinearise(model, settings, state)
+    return status or finish(model, settings, state.filter, estimate)
 
 
 @compiled
-def _loop(model, settings, memory, steps, u, y, rows):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = horizon_law(model, settings, memory, steps[k], u[k], y[k], rows[k])
+        status = horizon_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -284,7 +284,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
     label = "moving horizon estimator"
     rank = 46
     standard = False
-    _law = staticmethod(horizon_law)
+    _step = staticmethod(horizon_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
@@ -304,8 +304,8 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         )
         low = np.concatenate([np.full(n, -np.inf), self._layout.low])
         high = np.concatenate([np.full(n, np.inf), self._layout.high])
-        self._memory = HorizonMemory(
-            self._memory,
+        self._state = HorizonState(
+            self._state,
             held=np.zeros(outputs),
             window=window(round(samples), n, len(system.inputs), outputs, low, high),
         )
@@ -313,7 +313,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
     @property
     def window(self) -> Window:
         """The problem of the last sample and its solution."""
-        window: Window = self._memory.window
+        window: Window = self._state.window
         return window
 
     def fill_in(self, age: int, y: Vector) -> None:
@@ -338,18 +338,18 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
                 remedy="give a longer horizon in [design] of the gains",
             )
         raise_on_failure(
-            _fill_in(self._model, self._settings, self._memory, k, read_only(y)), self.fmu
+            _fill_in(self._model, self._settings, self._state, k, read_only(y)), self.fmu
         )
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        memory, self._memory = self._memory, self._memory.filter
+        state, self._state = self._state, self._state.filter
         super()._begin(u, y)
-        self._memory = memory
+        self._state = state
 
     @classmethod
-    def reasoned(cls, fmu: FMU, system: System) -> Gains:
+    def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """The noise of the sensors, and a horizon."""
-        levels = super().reasoned(fmu, system)
+        levels = super().default_gains(fmu, system)
         design = {"horizon": HORIZON, "iterations": ITERATIONS, "rare": RARE}
         constants = {name: np.array([float(value)]) for name, value in design.items()}
         return Gains(levels.estimator, levels.names, levels.values, constants, levels.source)

@@ -47,7 +47,8 @@ class Window(NamedTuple):
     active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
     scale : (N, s) variances without bounds.
     offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
-    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see `absorb`.
+    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see
+        `measurement_update`.
     change : (N, s) best node less node.
     next_mean, next_covariance : as mean and covariance, of the second node.
     before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
@@ -183,7 +184,7 @@ def shift(window):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def absorb(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
+def measurement_update(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
     """Correct error and P by a sample of unknown `at`, or of an output with slopes c, `at` < 0.
 
     Returns what the way back needs beside v = P c: c'P c + variance, and residual - c'error.
@@ -241,7 +242,7 @@ def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
             window.total[k, j] = 0.0
             if not np.isnan(window.errors[k, j]):
                 variance = window.levels[k, j] / window.weight[k, j]
-                window.total[k, j], window.surprise[k, j] = absorb(
+                window.total[k, j], window.surprise[k, j] = measurement_update(
                     *(P, error, window.gain[k, j], window.slopes[k, j]),
                     *(seen[j], window.errors[k, j], variance),
                 )
@@ -259,12 +260,12 @@ def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
             elif abs(window.active[k, i]) == 1 and P[i, i] > DETERMINED * window.scale[k, i]:
                 limit = window.high[i] if window.active[k, i] > 0 else window.low[i]
                 row, missing = outputs + i, limit - window.arrived[k, i]
-                window.total[k, row], window.surprise[k, row] = absorb(
+                window.total[k, row], window.surprise[k, row] = measurement_update(
                     P, error, window.gain[k, row], window.work, i, missing, 0.0
                 )
             elif damping > 0.0 and window.scale[k, i] > 0.0:
                 row = outputs + i
-                window.total[k, row], window.surprise[k, row] = absorb(
+                window.total[k, row], window.surprise[k, row] = measurement_update(
                     *(P, error, window.gain[k, row], window.work, i, 0.0),
                     window.scale[k, i] / damping,
                 )
@@ -272,7 +273,7 @@ def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
 
 @compiled
 def _react(costate, v, c, at, total, surprise):  # type: ignore[no-untyped-def]
-    """Force of a sample, which changes the costate; see `absorb`."""
+    """Force of a sample, which changes the costate; see `measurement_update`."""
     if total == 0.0:
         return 0.0
     force = surprise
