@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.benchmark.fmpy_loop import open_loop
 from workbench.benchmark.observers import plain_filters, resample
+from workbench.benchmark.other_loops import open_loop
 from workbench.machines.wheelset.benchmark import LOOPS, by_fmpy
 from workbench.models.fmu import FMU
 from workbench.observers import choose

@@ -57,9 +57,10 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         printing = getattr(options, "pdf", False)
         if printing:
             browser()  # one that is missing is told before the work
+        module = import_module(options.module)
         if getattr(options, "workers", 1) > 1:
-            preload(options.work)  # workers import while this process does
-        done = import_module(options.work).run(options, output)
+            preload(*getattr(module, "WORKERS_NEED", ()))  # workers import while this process does
+        done = module.run(options, output)
         if printing and done.page is not None:
             output.result(f"printed: {print_page(done.page)}")
         return output.close(command, done)

@@ -1,5 +1,7 @@
 """`workbench bench`: how long calls into the FMUs, observers and tuning take."""
 
+from __future__ import annotations
+
 import argparse
 import platform
 from collections.abc import Sequence
@@ -7,107 +9,125 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from workbench.benchmark.bench_observers import bench_observers
-from workbench.benchmark.bench_tuning import bench_tuning
-from workbench.benchmark.calls import points
+from workbench.cli.arguments import Commands, add_isolated, add_out, add_system, add_told
 from workbench.cli.extras import require_compiler
-from workbench.cli.inputs import given_cases
 from workbench.cli.output import CommandResult, Output
-from workbench.pages.answer import Answer, Measure
-from workbench.pages.provenance import run_of, sources
-from workbench.recordings.case import Case
 from workbench.runtime.files import locked_folder, write_json
-from workbench.system.registry import load_system, open_model
-from workbench.system.system import System
 
 if TYPE_CHECKING:
-    from workbench.models.compiler.benchmark import CallTimes
+    from workbench.recordings.case import Case
+    from workbench.system.system import System
 
 
-_SEED = 1
 _CASE = 2  # of the recordings, on which single observers are timed
 # What is not named here is a time in s, of one call, step, or run.
 _UNITS = {"steps_per_second": "1/s"}
 
 
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    bench = commands.add_parser(
+        "bench",
+        help=text,
+        description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
+        "sources in one program, and Co-Simulation steps; then the observers beside the same "
+        "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
+        "workers, memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
+        epilog="example:\n  python -m workbench bench --out /tmp/bench",
+    )
+    add_out(bench, "results/bench")
+    add_system(bench)
+    bench.add_argument(
+        "--cases",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="CASE",
+        help="recordings that observers and tuning are timed on (default: those of the system)",
+    )
+    add_told(bench)
+    add_isolated(bench)
+    return bench
+
+
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Time all of it."""
     require_compiler()
+    from workbench.benchmark.calls import SEED, calls_answer, format_calls, time_models
+    from workbench.cli.inputs import given_cases
+    from workbench.pages.provenance import run_of, sources
+    from workbench.system.registry import load_system
+
     system = load_system(options.system)
     cases = given_cases(options, system)
     with locked_folder(options.out):
-        return _run(output, system, cases, options.out / "bench.json")
-
-
-def _run(output: Output, system: System, cases: Sequence[Case], path: Path) -> CommandResult:
-    case = cases[min(_CASE, len(cases) - 1)]
-    calls = _time_models(system)
-    output.result(_format_calls(calls, system.sample_time))
-    observers = bench_observers(system, cases, case, output)
-    tuning = bench_tuning(system, cases, case, output)
-    content: dict[str, Any] = {
-        "answer": _answer(calls).to_dict(),
-        "provenance": {"run": run_of("bench", system, sources(cases))},
-        "machine": {"processor": platform.machine(), "system": platform.platform()},
-        "seed": _SEED,
-        "calls": {
-            name: {
-                "unit": "s",
-                **asdict(times),
-                "ratios": dict(times.ratios()),
-                "steps_per_second": 1.0 / times.step,
-            }
-            for name, times in calls.items()
-        },
-        "observers": observers,
-        "tuning": tuning,
-    }
-    write_json(path, content)
-    output.result(f"written: {path}")
+        case = cases[min(_CASE, len(cases) - 1)]
+        calls = time_models(system)
+        output.result(format_calls(calls, system.sample_time))
+        content: dict[str, Any] = {
+            "answer": calls_answer(calls).to_dict(),
+            "provenance": {"run": run_of("bench", system, sources(cases))},
+            "machine": {"processor": platform.machine(), "system": platform.platform()},
+            "seed": SEED,
+            "calls": {
+                name: {
+                    "unit": "s",
+                    **asdict(times),
+                    "ratios": dict(times.ratios()),
+                    "steps_per_second": 1.0 / times.step,
+                }
+                for name, times in calls.items()
+            },
+            "observers": _observers(system, cases, case, output),
+            "tuning": _tuning(system, cases, case, output),
+        }
+        write_json(options.out / "bench.json", content)
+    output.result(f"written: {options.out / 'bench.json'}")
     return CommandResult(content, _UNITS)
 
 
-def _time_models(system: System) -> "dict[str, CallTimes]":
-    """Time calls into the models of all roles."""
-    from workbench.models.compiler.benchmark import time_sources
+def _observers(system: System, cases: Sequence[Case], case: Case, output: Output) -> dict[str, Any]:
+    """Time the observers on one case, processes on all, and print the table; in seconds."""
+    from workbench.benchmark.horizon import format_horizon, time_horizon
+    from workbench.benchmark.observers import (
+        format_observers,
+        time_compilation,
+        time_observers,
+        time_processes,
+    )
 
-    calls = {}
-    for role, model in system.models.items():
-        with open_model(system, role) as fmu:
-            at = points(fmu, system, np.random.default_rng(_SEED))
-            calls[model.name] = time_sources(fmu.description, at, system.sample_time)
-    return calls
+    observers = time_observers(case, system)
+    processes = time_processes(cases, system)
+    compilation = time_compilation(system, case)
+    horizon = time_horizon(case, system)
+    output.result(
+        f"\n{format_observers(observers, processes, compilation)}\n{format_horizon(horizon)}"
+    )
+    return {
+        "case": case.name,
+        "steps": [asdict(row) for row in observers],
+        "processes": asdict(processes),
+        "compilation": compilation,
+        "horizon": {**asdict(horizon), "ratios": horizon.ratios()},
+    }
 
 
-def _answer(calls: "dict[str, CallTimes]") -> Answer:
-    """Times of calls, which are those of this machine."""
-    headline, told = {}, []
-    for name, times in calls.items():
-        headline[f"{name}: derivatives through FMI"] = Measure(times.derivatives_fmi, "s", "lower")
-        headline[f"{name}: Jacobian through FMI"] = Measure(times.jacobian_fmi, "s", "lower")
-        headline[f"{name}: Co-Simulation steps"] = Measure(1.0 / times.step, "1/s", "higher")
-        told.append(f"{times.derivatives_fmi / times.derivatives:.1f} times for {name}")
-    return Answer(f"Derivatives through FMI take, over a plain call: {', '.join(told)}.", headline)
+def _tuning(system: System, cases: Sequence[Case], case: Case, output: Output) -> dict[str, Any]:
+    """Time evaluations on one case, workers on all, and print the table; in seconds."""
+    from workbench.benchmark.tuning import (
+        format_tuning,
+        observe_memory,
+        time_evaluations,
+        time_workers,
+    )
 
-
-def _format_calls(calls: "dict[str, CallTimes]", step: float) -> str:
-    lines = [
-        "derivatives: one C call (plain); setting states and inputs, getting derivatives (FMI)",
-        "jacobian: full matrix d[der(x), w]/d[x, u] from one C call for its nonzeros (plain);",
-        "    setting states and inputs, one directional derivative for each column (FMI)",
-        f"{'model':<16} {'evaluation':<12} {'plain':>9} {'FMI':>9}  {'ratio':>5}",
-    ]
-    for name, times in calls.items():
-        ratios = times.ratios()
-        for kind, plain, through in (
-            ("derivatives", times.derivatives, times.derivatives_fmi),
-            ("jacobian", times.jacobian, times.jacobian_fmi),
-        ):
-            spent = f"{1e9 * plain:>6.0f} ns {1e9 * through:>6.0f} ns"
-            lines.append(f"{name:<16} {kind:<12} {spent}  {ratios[kind]:5.2f}")
-    for name, times in calls.items():
-        rate = f"Co-Simulation steps of {1e3 * step:g} ms per second"
-        lines.append(f"{name:<16} {1.0 / times.step:>9.0f} {rate}")
-    return "\n".join(lines)
+    evaluations = time_evaluations(case, system)
+    workers = time_workers(cases, system)
+    memory = observe_memory([case.source.parent for case in cases], system)
+    output.result(f"\n{format_tuning(evaluations, workers, memory)}")
+    return {
+        "case": case.name,
+        "evaluations": [{**asdict(row), "ratios": dict(row.ratios())} for row in evaluations],
+        "workers": {**asdict(workers), "ratios": dict(workers.ratios())},
+        "memory": asdict(memory),
+    }

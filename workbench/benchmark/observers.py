@@ -16,7 +16,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.benchmark.memory import peak_memory
-from workbench.benchmark.other_ways import Loop, by_c, by_fmpy
+from workbench.benchmark.other_loops import Loop, by_c, by_fmpy
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.recordings.case import Case

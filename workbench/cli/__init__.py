@@ -1,4 +1,10 @@
-"""The commands of the command line, one module each, imported only when its command runs."""
+"""The commands of the command line: the line of help of each, by the name of its module.
+
+A command is one module: `add(commands, text)` adds its parser, and `run(options, output)` works and
+returns a `CommandResult`. Parsing imports the module, so that what takes long to import stands
+inside the functions that need it. Its `WORKERS_NEED` names the modules that worker processes import
+while the command is read.
+"""
 
 COMMANDS = {
     "simulate": "run all estimators on recordings",
@@ -18,5 +24,4 @@ COMMANDS = {
     "new": "write a system of one's own to begin with",
     "doctor": "say what is installed, what is missing, and what to do",
     "completion": "print what a shell needs to complete commands",
-    "bench": "time calls into the FMUs, the observers, and the tuning",
 }

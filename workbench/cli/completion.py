@@ -3,9 +3,25 @@
 import argparse
 import sys
 
+from workbench.cli.arguments import Commands
 from workbench.cli.extras import require
 from workbench.cli.output import CommandResult, Output
 from workbench.cli.parser import command_line
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "completion",
+        help=text,
+        description="Print a script by which a shell completes commands and options. Needs the "
+        "extra [completion]; the script does not.",
+        epilog="examples:\n"
+        "  workbench completion bash > ~/.local/share/bash-completion/completions/workbench\n"
+        "  workbench completion zsh > ~/.zfunc/_workbench     # a folder of $fpath",
+    )
+    parser.add_argument("shell", choices=("bash", "zsh", "fish", "tcsh"), help="of the user")
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:

@@ -1,28 +1,86 @@
 """`workbench diagnose`: what a simulation gets wrong, the cause, and a better model."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from workbench.cli.arguments import (
+    Commands,
+    add_effects,
+    add_model,
+    add_platforms,
+    add_recordings,
+    add_run,
+    add_system,
+)
 from workbench.cli.extras import require_compiler
-from workbench.cli.inputs import given_cases
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.diagnosis import Outcome, Problem, catalogue, choose, diagnose
-from workbench.diagnosis.laws import needs_law, propose
-from workbench.diagnosis.laws.report import PROPOSED, write_proposal
-from workbench.diagnosis.report import write_diagnosis
 from workbench.errors import InputError, closest
-from workbench.models.modelica import read_library
-from workbench.pages.provenance import run_of, sources
-from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
-from workbench.system.reader import with_model
-from workbench.system.registry import load_system, open_model
-from workbench.system.system import OBSERVER
+
+if TYPE_CHECKING:
+    from workbench.diagnosis import Outcome, Problem
+    from workbench.recordings.case import Case
+
+WORKERS_NEED = ("workbench.diagnosis", "workbench.diagnosis.laws")
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "diagnose",
+        help=text,
+        description="Compare recordings with the observer model: show where the simulation is "
+        "wrong, name the physical cause, say what cannot be told apart, extend the Modelica "
+        "model, and measure the gain on recordings that were held out. Writes a page to read "
+        "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs "
+        "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were "
+        "found. Exit status 0 for any verdict.",
+        epilog="examples:\n"
+        "  python -m workbench diagnose my_recordings --out results/mine\n"
+        "  python -m workbench diagnose --system my_machine --effects Seepage\n"
+        "  python -m workbench diagnose my_recordings --held-out 'cold_*'\n"
+        "  python -m workbench diagnose new_recordings --fmu results/mine/model/Extended.fmu\n"
+        "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
+        "  python -m workbench diagnose my_recordings --propose\n"
+        "  python -m workbench diagnose --list",
+    )
+    add_recordings(parser, out="results/diagnose")
+    add_system(parser)
+    parser.add_argument(
+        "--held-out",
+        nargs="+",
+        default=[],
+        metavar="CASE",
+        help="recordings by name (* is any letters), on which only errors of both models are "
+        "measured",
+    )
+    add_model(parser)
+    add_effects(parser, "consider")
+    parser.add_argument(
+        "--list", action="store_true", help="list the effects of the library, and end"
+    )
+    add_platforms(parser, "the extended FMU", "native")
+    parser.add_argument(
+        "--certainty",
+        action="store_true",
+        help="also ask how sure the sizes are, by further fits: what noise alone allows, which "
+        "errors go together, and whether fits that begin elsewhere end the same",
+    )
+    parser.add_argument(
+        "--propose",
+        action="store_true",
+        help="if something is missing that no effect explains, infer a law for it: where it acts, "
+        "on what it depends, its form (into OUT/proposed)",
+    )
+    add_run(parser)
+    return parser
 
 
 def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
@@ -44,6 +102,13 @@ def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case],
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
+    from workbench.cli.inputs import given_cases
+    from workbench.diagnosis import Problem, catalogue, choose
+    from workbench.models.modelica import read_library
+    from workbench.system.reader import with_model
+    from workbench.system.registry import load_system
+    from workbench.system.system import OBSERVER
+
     system = load_system(options.system)
     if options.library is not None:
         system = replace(system, library=options.library)
@@ -70,6 +135,9 @@ def _propose(
     provenance: Mapping[str, Any],
 ) -> None:
     """Propose a law, if no effect explains what is missing."""
+    from workbench.diagnosis.laws import needs_law, propose
+    from workbench.diagnosis.laws.report import PROPOSED, write_proposal
+
     if not needs_law(outcome):
         output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
@@ -81,6 +149,11 @@ def _propose(
 
 
 def _run(options: argparse.Namespace, output: Output, problem: Problem) -> CommandResult:
+    from workbench.diagnosis import diagnose
+    from workbench.diagnosis.report import write_diagnosis
+    from workbench.pages.provenance import run_of, sources
+    from workbench.system.registry import open_model
+
     system, cases, held_out = problem.system, problem.cases, problem.held_out
     output.stage(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
     outcome = diagnose(

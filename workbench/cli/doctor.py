@@ -13,12 +13,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
-from workbench.cli.arguments import nearby
+from workbench.cli.arguments import Commands, nearby
 from workbench.cli.extras import PURPOSES, missing_packages
 from workbench.cli.output import CommandResult, Output
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU
-from workbench.models.fmu_cache import cache_folder
 from workbench.runtime.files import require_writable
 from workbench.runtime.resources import CHECKOUT, fmus, installing
 from workbench.system.installed import built_models
@@ -32,6 +30,19 @@ _MODEL = """package Small
   end Decay;
 end Small;
 """
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    return commands.add_parser(
+        "doctor",
+        help=text,
+        description="Say what is installed, what is missing and what each extra is for; compare "
+        "the FMUs that come along with their manifest; compile a small model, and run the result; "
+        "look at the folder of what is kept between runs; say what to do. Exit status: 0 sound, "
+        "1 something does not work as it is.",
+        epilog="examples:\n  python -m workbench doctor\n  python -m workbench doctor --json",
+    )
 
 
 @dataclass(frozen=True)
@@ -124,6 +135,7 @@ def _sources() -> Inspection:
 def _compiled() -> Inspection:
     """Whether a model can be compiled here, and runs."""
     from workbench.models.compiler import build, native  # an extra
+    from workbench.models.fmu import FMU
 
     with tempfile.TemporaryDirectory() as scratch:
         package, path = Path(scratch) / "package.mo", Path(scratch) / "Decay.fmu"
@@ -140,6 +152,8 @@ def _compiled() -> Inspection:
 
 def _kept() -> Inspection:
     """Whether what is compiled can be kept between runs; without that, commands begin slowly."""
+    from workbench.models.fmu_cache import cache_folder
+
     folder = cache_folder()
     try:
         require_writable(folder / "doctor")

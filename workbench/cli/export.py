@@ -1,5 +1,7 @@
 """`workbench export`: an observer with its gains as an FMU, and in an SSP package."""
 
+from __future__ import annotations
+
 import argparse
 import hashlib
 import tempfile
@@ -11,24 +13,75 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from workbench.cli.arguments import (
+    Commands,
+    add_isolated,
+    add_out,
+    add_platforms,
+    add_reference,
+    add_system,
+)
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output
-from workbench.observers import Estimator, Gains, choose, estimators_of
-from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
 from workbench.runtime.files import locked_folder, write_json, write_whole
-from workbench.system.registry import load_system, model_path, open_model
-from workbench.system.system import REFERENCE, System
 
 if TYPE_CHECKING:
-    from workbench.models.compiler import BuiltFMU  # an extra, needed by this command alone
+    from workbench.models.compiler import BuiltFMU
+    from workbench.observers import Estimator, Gains
+    from workbench.system.system import System
+
 
 # Writes the FMU to a file, of a version of FMI, and says which platform comes next.
 _Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
 
 
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    export = commands.add_parser(
+        "export",
+        help=text,
+        description="Write an estimator with its gains as a Co-Simulation FMU for all platforms, "
+        "which runs in any FMI tool without Python, and, where the system has a reference model, "
+        "an SSP 1.0 package in which it observes that. One communication step takes one sample. "
+        "Needs the extra [compiler].",
+        epilog="examples:\n"
+        "  python -m workbench export\n"
+        "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
+        "  python -m workbench export --estimator mhe --fmi 3 --out /tmp/export\n"
+        "  python -m workbench export --estimator imm --gains results/tune/ekf/gains.toml",
+    )
+    export.add_argument(
+        "--gains",
+        type=Path,
+        metavar="FILE",
+        help="gains.toml of 'workbench tune', which names the estimator unless --estimator does "
+        "(default: those that come tuned with the system, else those that follow from the model)",
+    )
+    export.add_argument(
+        "--estimator",
+        metavar="NAME",
+        help="estimator (default: the first in [export.classes] of the system, else ekf)",
+    )
+    add_system(export)
+    export.add_argument(
+        "--fmi",
+        type=int,
+        choices=(2, 3),
+        default=2,
+        help="version of the FMU; SSP 1.0 packages hold FMI 2.0 (default: %(default)s)",
+    )
+    add_platforms(export, "the FMU", "all")
+    add_reference(export, "(FMI 2.0) that the package connects the observer to")
+    add_out(export, "results/export")
+    add_isolated(export)
+    return export
+
+
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Write the observer as an FMU, and the package."""
+    from workbench.system.registry import load_system, model_path
+    from workbench.system.system import REFERENCE
+
     require_compiler()
     from workbench.models.compiler import PLATFORMS, native
     from workbench.observers.export import write_package
@@ -43,7 +96,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         model, make = _maker(stack, system, chosen, platforms)
         name = model.rpartition(".")[2]
 
-        def build(fmi: int) -> "BuiltFMU":
+        def build(fmi: int) -> BuiltFMU:
             path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"
             return make(path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}"))
 
@@ -82,6 +135,11 @@ class _Choice:
 
 def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
     """The estimator that is asked for, that of the gains, or the first that has a class."""
+    from workbench.observers import choose, estimators_of
+    from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+    from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
+    from workbench.system.registry import open_model
+
     known = estimators_of(system)
     if asked is None:
         usual = next(iter(system.export.classes), ExtendedKalmanFilter.name)
@@ -99,9 +157,10 @@ def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
 
 def _maker(
     stack: ExitStack, system: System, chosen: _Choice, platforms: Sequence[str]
-) -> tuple[str, "_Make"]:
+) -> tuple[str, _Make]:
     """Dotted name of an estimator's FMU, and what builds it: of its Modelica class, or its law."""
     from workbench.observers.export import EstimatorLaw, ObserverModel, build_law, build_observer
+    from workbench.system.registry import open_model
 
     kind, gains = chosen.kind, chosen.gains
     if kind.name in system.export.classes:
@@ -112,7 +171,7 @@ def _maker(
     return law.model, partial(build_law, law, platforms=platforms)
 
 
-def _summary(system: System, chosen: _Choice, built: "BuiltFMU") -> dict[str, Any]:
+def _summary(system: System, chosen: _Choice, built: BuiltFMU) -> dict[str, Any]:
     from workbench.models.compiler import source_hash
 
     gains = chosen.gains
@@ -130,7 +189,7 @@ def _summary(system: System, chosen: _Choice, built: "BuiltFMU") -> dict[str, An
     }
 
 
-def _identity(built: "BuiltFMU") -> dict[str, Any]:
+def _identity(built: BuiltFMU) -> dict[str, Any]:
     return {
         "file": built.path.name,
         "model": built.model,

@@ -1,40 +1,73 @@
 """`workbench import`: files of recorders as case folders."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import nearby
-from workbench.cli.confirming import confirmed
-from workbench.cli.import_figure import draw_cuts
-from workbench.cli.inputs import recording_options
-from workbench.cli.output import CommandResult, Output
+from workbench.cli.arguments import Commands, add_out, add_system, add_told, nearby
+from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
-from workbench.recordings.case import UNKNOWN
-from workbench.recordings.channels import RecordingOptions, stored_columns
-from workbench.recordings.formats import read_recorded_file
-from workbench.recordings.importing import (
-    IMPORTED,
-    Import,
-    case_name,
-    describe,
-    import_recording,
-    imported,
-    store,
-    write,
-    write_record,
-)
 from workbench.runtime.files import locked_folder
-from workbench.system.registry import load_system
-from workbench.system.system import System
+
+if TYPE_CHECKING:
+    from workbench.recordings.channels import RecordingOptions
+    from workbench.recordings.importing import Import
+    from workbench.system.system import System
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "import",
+        help=text,
+        description="Turn files of recorders into case folders: CSV of any locale, Excel, MDF, "
+        "TDMS, MAT, Parquet. Channels are proposed by name, unit and plausible values; you confirm "
+        "them once, and columns.toml keeps that for further files. import.json says what was read, "
+        "converted, left out and cut. Originals are only read.",
+        epilog="examples:\n"
+        "  python -m workbench import monday/*.mf4 --out cases\n"
+        "  python -m workbench import stop7.csv --out cases --condition load='2 kN'\n"
+        "  python -m workbench import stop7.csv --out cases --column 'time=Zeit [ms]' --yes",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="of a recorder")
+    add_out(parser, "imported")
+    add_system(parser)
+    add_told(parser)
+    parser.add_argument(
+        "--yes",
+        action="store_true",
+        help="take what is proposed by name without asking, but not what only a unit speaks for",
+    )
+    parts = parser.add_mutually_exclusive_group()
+    parts.add_argument(
+        "--together",
+        action="store_true",
+        help="the files, with all sheets and groups, are of one recording, by several recorders",
+    )
+    parts.add_argument(
+        "--apart",
+        action="store_true",
+        help="sheets or groups with the same channels are recordings of their own, even if their "
+        "times overlap",
+    )
+    parser.add_argument(
+        "--whole", action="store_true", help="do not cut a long recording into several"
+    )
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Import files, each by itself; what is refused leaves the others."""
+    from workbench.cli.inputs import recording_options
+    from workbench.recordings.importing import IMPORTED, imported
+    from workbench.system.registry import load_system
+
     system = load_system(options.system)
     known = recording_options(options, system)
     if options.together or options.apart:
@@ -69,6 +102,18 @@ def _files(
     output: Output,
 ) -> tuple[list[dict[str, Any]], list[InputError]]:
     """Import the recordings of some files; returns what is imported by now, and what is not."""
+    from workbench.cli.confirming import confirmed
+    from workbench.cli.import_figure import draw_cuts
+    from workbench.recordings.channels import stored_columns
+    from workbench.recordings.formats import read_recorded_file
+    from workbench.recordings.importing import (
+        describe,
+        import_recording,
+        store,
+        write,
+        write_record,
+    )
+
     files = [read_recorded_file(path) for path in paths]
     stored = stored_columns(options.out, system)
     found, conditions = confirmed(files, system, stored, known, output, options.yes)
@@ -101,6 +146,8 @@ def _files(
 
 def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> str:
     """Name of a case that no other recording has taken, on no file system."""
+    from workbench.recordings.importing import case_name
+
     taken = {case.casefold() for other in others for case in other["cases"]}
     taken |= {case[3:] for case in taken}  # without the number of a part
     name = case_name(path, part)
@@ -111,6 +158,8 @@ def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> st
 
 def _tell(one: Import, output: Output, warned: set[str]) -> None:
     """Say what was written, what nobody knows, and what is unlikely and was not said by now."""
+    from workbench.recordings.case import UNKNOWN
+
     doubts = list(one.measured.doubts)
     for piece in one.pieces:
         unknown = [key for key, source in piece.sources.items() if source == UNKNOWN]
@@ -121,5 +170,5 @@ def _tell(one: Import, output: Output, warned: set[str]) -> None:
         doubts += piece.doubts
     for doubt in doubts:
         if doubt not in warned:
-            print(f"warning: {doubt}", file=sys.stderr, flush=True)
+            warn(doubt)
             warned.add(doubt)

@@ -1,12 +1,12 @@
 """What the commands share: systems and recordings that are asked for."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from workbench.cli.arguments import nearby
+from workbench.cli.output import warn
 from workbench.errors import InputError, closest
 from workbench.recordings.case import UNKNOWN, Case, check_names, read_cases
 from workbench.recordings.channels import RecordingOptions, parse_named
@@ -87,7 +87,7 @@ def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
     cases = read_cases(folders, system, recording_options(options, system))
     for case in cases:
         for doubt in case.doubts:
-            print(f"warning: {doubt}", file=sys.stderr, flush=True)
+            warn(doubt)
     return cases
 
 

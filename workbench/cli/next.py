@@ -1,27 +1,66 @@
 """`workbench next`: the experiment that tells apart what a diagnosis could not."""
 
+from __future__ import annotations
+
 import argparse
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from workbench.cli.arguments import Commands, add_out, add_run
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.diagnosis.inference.rivals import Rivals, read_rivals
 from workbench.errors import InputError
-from workbench.pages.provenance import run_of
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, read_text
-from workbench.studies.design import next_stop
-from workbench.studies.design.report import write_next_stop
-from workbench.system.registry import load_system
+
+if TYPE_CHECKING:
+    from workbench.diagnosis.inference.rivals import Rivals
+
 
 _SUMMARY = "summary.json"
+
+WORKERS_NEED = ("workbench.studies.design",)
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "next",
+        help=text,
+        description="Say which recording to make next: of all experiments that the system file "
+        "allows, those that part best the causes which a diagnosis could not tell apart; or, of a "
+        "single cause, that make its size most sure. Three are proposed, with the separation that "
+        "is left when every model is fitted again, the chance that the right cause is then named, "
+        "and the cost. Writes next.json, experiments.csv (all that were tried) and a figure of "
+        "the responses. Needs the extra [compiler].",
+        epilog="examples:\n"
+        "  python -m workbench diagnose my_recordings --out results/mine\n"
+        "  python -m workbench next results/mine\n"
+        "  python -m workbench next results/mine --system my_machine --out results/mine_next",
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="folder of a diagnosis, with summary.json"
+    )
+    parser.add_argument(
+        "--system",
+        default="",
+        metavar="NAME|FILE",
+        help="an installed system, or a system file (default: that of the diagnosis, by its name)",
+    )
+    add_out(parser, "results/next")
+    add_run(parser)
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Rank the experiments that a system allows."""
+    from workbench.pages.provenance import run_of
+    from workbench.studies.design import next_stop
+    from workbench.studies.design.report import write_next_stop
+    from workbench.system.registry import load_system
+
     file = options.result / _SUMMARY
     summary = _read(file)
     rivals = _rivals(summary, file)
@@ -61,6 +100,8 @@ def _read(file: Path) -> dict[str, Any]:
 
 def _rivals(summary: dict[str, Any], file: Path) -> Rivals:
     """What it left undecided."""
+    from workbench.diagnosis.inference.rivals import read_rivals
+
     if summary["verdict"] != "found":
         raise InputError(
             where=str(file),

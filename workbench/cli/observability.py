@@ -1,33 +1,60 @@
 """`workbench observability`: what measured outputs can tell about states and quantities."""
 
+from __future__ import annotations
+
 import argparse
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from workbench.arrays import Vector
-from workbench.cli.inputs import chosen_system
-from workbench.cli.output import CommandResult, Output, read_result
-from workbench.observers.observability import CaseObservability, case_observability, linear_test
-from workbench.observers.observability_report import (
-    draw_observability,
-    format_observability,
-    write_observability,
-    write_observability_page,
-    write_windows,
+from workbench.cli.arguments import (
+    Commands,
+    add_models,
+    add_recordings,
+    add_run,
+    add_system,
+    example_case,
 )
-from workbench.pages.provenance import models, run_of, software, sources
-from workbench.recordings.case import Case
+from workbench.cli.output import CommandResult, Output, read_result
 from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
-from workbench.system.registry import open_model
-from workbench.system.system import FULL, OBSERVER, System
+
+if TYPE_CHECKING:
+    from workbench.arrays import Vector
+    from workbench.observers.observability import CaseObservability
+    from workbench.recordings.case import Case
+    from workbench.system.system import System
+
+WORKERS_NEED = ("workbench.observers.observability_report",)
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    own = example_case()
+    observability = commands.add_parser(
+        "observability",
+        help=text,
+        description="Show what the measured outputs can tell: a linear test of the observer "
+        "models, and for each recording how well half a second of samples can know the estimated "
+        "quantities (Cramer-Rao bound). Writes windows (CSV), observability.json and figures.",
+        epilog="examples:\n"
+        "  python -m workbench observability\n"
+        f"  python -m workbench observability {own} --out /tmp/one\n"
+        "  python -m workbench observability my_cases --system my/system.toml",
+    )
+    add_recordings(observability, out="results/observability")
+    add_system(observability)
+    add_models(observability)
+    add_run(observability)
+    return observability
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Show what the outputs of the recordings tell."""
+    from workbench.cli.inputs import chosen_system
+
     system, cases = chosen_system(options)
     with locked_folder(options.out):
         return _run(options, output, system, cases)
@@ -36,6 +63,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 def _run(
     options: argparse.Namespace, output: Output, system: System, cases: Sequence[Case]
 ) -> CommandResult:
+    from workbench.observers.observability import linear_test
+    from workbench.observers.observability_report import (
+        format_observability,
+        write_observability,
+        write_observability_page,
+    )
+    from workbench.pages.provenance import models, run_of, software, sources
+    from workbench.system.registry import open_model
+    from workbench.system.system import FULL, OBSERVER
+
     linear = {}
     for role in (role for role in (OBSERVER, FULL) if role in system.models):
         with open_model(system, role) as fmu:
@@ -86,6 +123,9 @@ def _units(system: System) -> dict[str, str]:
 
 def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:
     """Test all models on one case; writes its CSV and figure."""
+    from workbench.observers.observability import case_observability
+    from workbench.observers.observability_report import draw_observability, write_windows
+
     system, scales, out = setup
     one = case_observability(system, scales, case)
     write_windows(one, out / f"{case.name}.csv")

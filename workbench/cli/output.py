@@ -84,6 +84,11 @@ class Output:
         return status
 
 
+def warn(message: object) -> None:
+    """Say what is unlikely, or went wrong and is survived."""
+    print(f"warning: {message}", file=sys.stderr, flush=True)
+
+
 def _document(command: str, status: int, told: Mapping[str, Any]) -> str:
     content = _plain({"command": command, "status": status, **told})
     return json.dumps(content, indent=2, allow_nan=False)

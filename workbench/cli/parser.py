@@ -1,13 +1,13 @@
-"""What each command may be told, one module each; none of them imports what a command works with.
-
-A command's module of the same name, one package up, runs it: `run(options, output)`.
-"""
+"""The parser of the command line, made of those of its commands."""
 
 import argparse
 from importlib import import_module
 
 from workbench.cli import COMMANDS
 from workbench.system.installed import installed_plugins
+
+# The one command of a room above this one.
+_BENCH = ("workbench.benchmark.bench", "time calls into the FMUs, the observers, and the tuning")
 
 
 def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
@@ -26,15 +26,15 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=release)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     known = {name: (f"workbench.cli.{name}", text) for name, text in COMMANDS.items()}
-    for plugin in installed_plugins():
-        known |= plugin.commands
+    known["bench"] = _BENCH
+    if not all(name in known for name in asked or [""]):  # else plugins have nothing to add
+        for plugin in installed_plugins():
+            known |= plugin.commands
     for name, (module, text) in known.items():
         if asked and name not in asked:
             commands.add_parser(name, help=text)
-            continue
-        package, _, own = module.rpartition(".")
-        options = f"{package}.options.{own}" if package.startswith("workbench.") else module
-        import_module(options).add(commands, text).set_defaults(work=module)
+        else:
+            import_module(module).add(commands, text).set_defaults(module=module)
     for one in parsers(parser):
         one.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
         _add_output(one)

@@ -1,58 +1,163 @@
 """`workbench power`: how much the diagnosis can be trusted."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from workbench.cli.arguments import (
+    Commands,
+    above_zero,
+    add_effects,
+    add_isolated,
+    add_out,
+    add_pdf,
+    add_reference,
+    add_seed,
+    add_system,
+    add_workers,
+    count,
+)
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.diagnosis.inference.thresholds import of_system
 from workbench.errors import InputError, closest
-from workbench.pages.provenance import run_of
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
-from workbench.studies.power import (
-    Plantable,
-    PowerStudy,
-    Repertoire,
-    SetVerdict,
-    VirtualRig,
-    diagnose_sets,
-    open_virtual_rig,
-    plan,
-    read_recorded_sets,
-    summarise,
-)
-from workbench.studies.power.diagnosing import library_effects
-from workbench.studies.power.following import follow_proposals, summarise_following
-from workbench.studies.power.left_out import propose_left_out, summarise_left_out
-from workbench.studies.power.planned import predict_campaign
-from workbench.studies.power.planting import Group, plan_sheet_errors, some
-from workbench.studies.power.report import (
-    format_followed,
-    format_left_out,
-    format_plan,
-    format_power,
-    format_sheet,
-    format_thresholds,
-    write_followed,
-    write_left_out,
-    write_plan,
-    write_power,
-    write_sheet,
-    write_thresholds,
-)
-from workbench.studies.power.sensitivity import values, vary_sets
-from workbench.studies.power.sheet import summarise_sheet
-from workbench.system.registry import load_system, model_path
-from workbench.system.system import REFERENCE
+
+if TYPE_CHECKING:
+    from workbench.studies.power import Plantable, PowerStudy, SetVerdict, VirtualRig
+    from workbench.studies.power.planting import Group
+
+WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "power",
+        help=text,
+        description="Plant effects in the virtual rig, diagnose the recordings without telling, "
+        "and count: false alarms on clean sets, right names against the size of the effect, pairs, "
+        "causes that are not in the catalogue, coverage of the intervals. Writes power.json, "
+        "figures (PNG, SVG) and the verdict on each set (sets.jsonl). Takes hours; Ctrl-C keeps "
+        "what there is and reports it, --resume goes on. Needs the extra [compiler].",
+        epilog="examples:\n"
+        "  python -m workbench power\n"
+        "  python -m workbench power --clean 5 --sizes 4 --repeats 1 --pairs 5 --out /tmp/quick\n"
+        "  python -m workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
+        "  python -m workbench power --clean 200 --resume\n"
+        "  python -m workbench power --thresholds --sets 8\n"
+        "  python -m workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
+        "  python -m workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
+        "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
+        "  python -m workbench power --sheet-error --repeats 2\n"
+        "  python -m workbench power --system train --recorded labelled healthy",
+    )
+    _add_sets(parser)
+    add_workers(parser)
+    _add_checks(parser)
+    parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
+    add_system(parser)
+    add_reference(parser, "that makes the recordings")
+    add_out(parser, "results/power")
+    add_pdf(parser)
+    add_isolated(parser)
+    return parser
+
+
+def _add_sets(parser: argparse.ArgumentParser) -> None:
+    """Add which sets of recordings are made."""
+    add_effects(parser, "plant, also those that the catalogue lacks, by the rig's names")
+    for option, default, text in (
+        ("--clean", 50, "sets without an effect"),
+        ("--repeats", 3, "sets of each effect at each size"),
+        ("--pairs", 30, "sets with two of the effects, at the largest size"),
+        ("--sets", 8, "sets of --thresholds, of all kinds alike"),
+    ):
+        parser.add_argument(
+            option,
+            type=count,
+            default=default,
+            metavar="N",
+            help=f"{text} (default: %(default)s)",
+        )
+    parser.add_argument(
+        "--sizes",
+        type=above_zero,
+        nargs="+",
+        default=[0.5, 1.0, 2.0, 4.0],
+        metavar="X",
+        help="multiples of the least size that is worth a finding (default: 0.5 1 2 4)",
+    )
+    add_seed(parser, "all sets")
+    parser.add_argument(
+        "--recorded",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="FOLDER",
+        help="sets that were recorded, each with a truth.json of what is wrong in them, in place "
+        "of sets that the virtual rig makes",
+    )
+    parser.add_argument(
+        "--case",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="recording of a set, may be repeated (default: those that are usual for the system)",
+    )
+
+
+def _add_checks(parser: argparse.ArgumentParser) -> None:
+    """Add what is asked instead of how often the diagnosis is right."""
+    checks = parser.add_mutually_exclusive_group()
+    for option, text in (
+        (
+            "--thresholds",
+            "halve and double each threshold of the diagnosis on the same recordings, "
+            "and tell what changes (into OUT/thresholds)",
+        ),
+        (
+            "--leave-out-effect",
+            "leave the planted effect out of the catalogue, and tell which law is proposed in its "
+            "place, on --repeats sets of each at the largest size (into OUT/left_out)",
+        ),
+        (
+            "--plan",
+            "before a recording is made: the chance that the recordings named by --case show each "
+            "effect at --sizes, from one set without any (into OUT/plan)",
+        ),
+        (
+            "--follow",
+            "where a set leaves the planted effect with others, make the recording that is "
+            "proposed next and some that are drawn, and tell which part them (into OUT/followed)",
+        ),
+        (
+            "--sheet-error",
+            "make recordings of a rig that differs from its data sheet in --repeats "
+            "sets of each error, and tell what is said (into OUT/sheet_error)",
+        ),
+    ):
+        checks.add_argument(
+            option,
+            action="store_const",
+            const=option[2:].replace("-", "_"),
+            dest="check",
+            help=text,
+        )
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make, diagnose and count."""
+    from workbench.studies.power import PowerStudy, open_virtual_rig, read_recorded_sets
+    from workbench.studies.power.diagnosing import library_effects
+    from workbench.system.registry import load_system, model_path
+    from workbench.system.system import REFERENCE
+
     require_compiler()
     system = load_system(options.system)
     if options.library:
@@ -97,6 +202,8 @@ def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
 def _provenance(
     options: argparse.Namespace, study: PowerStudy, interrupted: bool
 ) -> dict[str, Any]:
+    from workbench.pages.provenance import run_of
+
     return {
         "run": run_of("power", study.system, {}),
         "workbench": version("wheelset-workbench"),
@@ -107,6 +214,8 @@ def _provenance(
 
 
 def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
+    from workbench.studies.power import Repertoire, plan
+
     repertoire = Repertoire(_chosen(options.effects, study.rig), tuple(study.effects))
     sizes = sorted(set(options.sizes))
     counts = (options.clean, sizes, options.repeats, options.pairs)
@@ -123,6 +232,9 @@ def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
 def _usual(
     options: argparse.Namespace, output: Output, study: PowerStudy, groups: Sequence[Group]
 ) -> CommandResult:
+    from workbench.studies.power import Repertoire, summarise
+    from workbench.studies.power.report import format_power, write_power
+
     results, interrupted = _diagnosed(options, output, groups, study, options.out)
     summary = summarise(results, Repertoire(study.rig.plantables, tuple(study.effects)))
     write_power(summary, study.effects, _provenance(options, study, interrupted), options.out)
@@ -133,6 +245,10 @@ def _usual(
 
 
 def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+    from workbench.studies.power.planting import plan_sheet_errors
+    from workbench.studies.power.report import format_sheet, write_sheet
+    from workbench.studies.power.sheet import summarise_sheet
+
     out = options.out / "sheet_error"
     groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)
     results, interrupted = _diagnosed(options, output, groups, study, out)
@@ -142,6 +258,9 @@ def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy)
 
 
 def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+    from workbench.studies.power.left_out import propose_left_out, summarise_left_out
+    from workbench.studies.power.report import format_left_out, write_left_out
+
     out = options.out / "left_out"
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
     engine = Engine(options.workers, output.stage)
@@ -152,6 +271,11 @@ def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) ->
 
 
 def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+    from workbench.diagnosis.inference.thresholds import of_system
+    from workbench.studies.power.planting import some
+    from workbench.studies.power.report import format_thresholds, write_thresholds
+    from workbench.studies.power.sensitivity import values, vary_sets
+
     sets = some(_planned(options, study), options.sets, options.seed)
     results, interrupted = vary_sets(sets, study, Engine(options.workers, output.stage))
     usual = values(of_system(study.system.comparison, len(study.effects)))
@@ -161,6 +285,9 @@ def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) 
 
 
 def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+    from workbench.studies.power.planned import predict_campaign
+    from workbench.studies.power.report import format_plan, write_plan
+
     out = options.out / "plan"
     sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
     output.stage("one set without any effect is made and diagnosed")
@@ -170,6 +297,9 @@ def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStud
 
 
 def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+    from workbench.studies.power.following import follow_proposals, summarise_following
+    from workbench.studies.power.report import format_followed, write_followed
+
     out = options.out / "followed"
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
     engine = Engine(options.workers, output.stage)
@@ -198,5 +328,7 @@ def _diagnosed(
     study: PowerStudy,
     out: Path,
 ) -> tuple[list[SetVerdict], bool]:
+    from workbench.studies.power import diagnose_sets
+
     engine = Engine(options.workers, output.stage, out)
     return diagnose_sets(groups, study, engine, seed=options.seed, resume=options.resume)

@@ -1,30 +1,58 @@
 """`workbench results`: what a folder holds, and two runs side by side."""
 
-import argparse
-import sys
-from pathlib import Path
-from typing import Any
+from __future__ import annotations
 
-from workbench.cli.output import CommandResult, Output
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from workbench.cli.arguments import Commands
+from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
-from workbench.pages.runs import (
-    RunRecord,
-    compare_runs,
-    differences,
-    format_changes,
-    format_runs,
-    read_runs,
-)
+
+if TYPE_CHECKING:
+    from workbench.pages.runs import RunRecord
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "results",
+        help=text,
+        description="Say what a folder of results holds: command, date, version, system, the "
+        "answer and its numbers, files. With a second folder, compare: what got better, what "
+        "worse, what stayed, and what else is not the same (version, recordings, settings). Of two "
+        "folders with several runs, those of the same place are compared.",
+        epilog="examples:\n"
+        "  python -m workbench results results\n"
+        "  python -m workbench results results/before results/after\n"
+        "  python -m workbench results results/before results/after --json",
+    )
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="of results, or before a change"
+    )
+    parser.add_argument(
+        "other", type=Path, nargs="?", metavar="OTHER", help="to compare with, after the change"
+    )
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """List the runs of a folder, or compare them with those of another."""
-    found = read_runs(options.folder, _warn)
+    from workbench.pages.runs import (
+        compare_runs,
+        differences,
+        format_changes,
+        format_runs,
+        read_runs,
+    )
+
+    found = read_runs(options.folder, warn)
     if options.other is None:
         output.result(format_runs(found))
         return CommandResult({"runs": [one.to_dict() for one in found]})
     told: list[dict[str, Any]] = []
-    for before, after in _pairs(found, read_runs(options.other, _warn), options.other):
+    for before, after in _pairs(found, read_runs(options.other, warn), options.other):
         changes = compare_runs(before, after)
         output.result(f"{chr(10) * bool(told)}{format_changes(before, after, changes)}")
         told.append(
@@ -36,10 +64,6 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             }
         )
     return CommandResult({"comparisons": told})
-
-
-def _warn(error: InputError) -> None:
-    print(f"warning: {error}", file=sys.stderr, flush=True)
 
 
 def _pairs(

@@ -1,30 +1,92 @@
 """`workbench simulate`: all estimators on recordings."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from workbench.cli.inputs import chosen_system
+from workbench.cli.arguments import (
+    Commands,
+    add_isolated,
+    add_models,
+    add_pdf,
+    add_recordings,
+    add_system,
+    add_workers,
+    example_case,
+)
 from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
-from workbench.observers import choose
-from workbench.observers.live import LiveWindow
-from workbench.observers.report import format_table, summarise_runs, write_estimates, write_page
-from workbench.observers.run import Ending
-from workbench.observers.simulation import CaseResult, Simulation, case_figure, prepare, simulate
-from workbench.pages.figures import draw_case
-from workbench.pages.provenance import models, run_of, software, sources
-from workbench.recordings.case import Case
 from workbench.runtime.files import locked_folder, write_json
-from workbench.system.system import OBSERVER, System
+
+if TYPE_CHECKING:
+    from workbench.observers.live import LiveWindow
+    from workbench.observers.simulation import CaseResult, Simulation
+    from workbench.recordings.case import Case
+    from workbench.system.system import System
+
+WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    own = example_case()
+    parser = commands.add_parser(
+        "simulate",
+        help=text,
+        description="Run all estimators on recordings; write a page to read (index.html), and "
+        "beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
+        epilog="examples:\n"
+        "  python -m workbench simulate\n"
+        f"  python -m workbench simulate {own} --out /tmp/one\n"
+        "  python -m workbench simulate my_cases --system my/system.toml\n"
+        "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
+        f"  python -m workbench simulate {own} --live\n"
+        "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
+    )
+    add_recordings(parser, out="results/simulate")
+    add_system(parser)
+    add_models(parser)
+    parser.add_argument(
+        "--gains",
+        type=Path,
+        metavar="FILE",
+        help="gains.toml of 'workbench tune', for the estimator that it names (default: gains "
+        "tuned for the system's models, else gains reasoned from the linearised models)",
+    )
+    parser.add_argument(
+        "--untuned",
+        action="store_true",
+        help="gains reasoned from the linearised models, to compare tuned ones with",
+    )
+    parser.add_argument(
+        "--estimator",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="run this one, may be repeated (default: the standard ones of the system)",
+    )
+    add_workers(parser)
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="show each run in a window as it goes, one after the other",
+    )
+    add_pdf(parser)
+    add_isolated(parser)
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Run all estimators on the recordings."""
+    from workbench.cli.inputs import chosen_system
+    from workbench.observers.live import LiveWindow
+
     system, cases = chosen_system(options)
     window = LiveWindow(system) if options.live else None
     with locked_folder(options.out):
@@ -38,6 +100,11 @@ def _run(
     cases: Sequence[Case],
     window: LiveWindow | None,
 ) -> CommandResult:
+    from workbench.observers import choose
+    from workbench.observers.report import format_table, summarise_runs, write_page
+    from workbench.observers.simulation import case_figure, prepare, simulate
+    from workbench.pages.provenance import run_of, sources
+
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
@@ -101,6 +168,8 @@ def _units(system: System) -> dict[str, str]:
 
 def _idle(results: Sequence[CaseResult]) -> list[str]:
     """Estimators that failed in every case."""
+    from workbench.observers.run import Ending
+
     return [
         name
         for name in results[0].runs
@@ -112,6 +181,8 @@ def _shown(
     simulation: Simulation, cases: Sequence[Case], window: LiveWindow, out: Path
 ) -> Iterator[CaseResult]:
     """All cases one after the other, each shown before."""
+    from workbench.observers.simulation import simulate
+
     for case in cases:
         with simulation.estimators() as running:
             window.show(case, list(running.values()))
@@ -120,6 +191,9 @@ def _shown(
 
 def _models(simulation: Simulation) -> dict[str, Any]:
     """Software and models that run; the observer's is always named."""
+    from workbench.pages.provenance import models, software
+    from workbench.system.system import OBSERVER
+
     roles = dict.fromkeys([OBSERVER, *(kind.role for kind in simulation.kinds.values())])
     named = models(simulation.system, [role for role in roles if role in simulation.system.models])
     return {
@@ -140,6 +214,10 @@ def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
 
 def _write(out: Path, result: CaseResult) -> None:
     """Write CSV and figures of a case."""
+    from workbench.observers.report import write_estimates
+    from workbench.observers.simulation import case_figure
+    from workbench.pages.figures import draw_case
+
     write_estimates(result, out / f"{result.case.name}.csv")
     paths = [out / f"{result.case.name}.{kind}" for kind in ("png", "svg")]
     draw_case(case_figure(result), paths)

@@ -2,14 +2,23 @@
 
 import argparse
 
-from workbench.cli.arguments import nearby
+from workbench.cli.arguments import Commands, nearby
 from workbench.cli.output import CommandResult, Output
 from workbench.system.installed import system_files
-from workbench.system.tables import read_table
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "systems", help=text, description="List the systems that are installed: name, title, file."
+    )
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """List the systems."""
+    from workbench.system.tables import read_table
+
     found = {}
     files = system_files()
     width = max(map(len, files))

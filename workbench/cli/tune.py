@@ -1,57 +1,162 @@
 """`workbench tune`: gains that minimise the worst case over recordings."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import signal
-import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from workbench.cli.cluster import open_cluster
-from workbench.cli.inputs import given_cases, model_names
-from workbench.cli.output import CommandResult, Output
-from workbench.errors import InputError, WorkerError
-from workbench.pages.answer import with_answer
-from workbench.pages.provenance import run_of, sources
-from workbench.recordings.case import Case
-from workbench.runtime.files import locked_folder, write_whole
-from workbench.runtime.pool import Pool
-from workbench.system.reader import with_model
-from workbench.system.registry import load_system
-from workbench.tuning import (
-    Evaluator,
-    Generation,
-    Job,
-    NoWorkersError,
-    Plan,
-    Problem,
-    Progress,
-    TuningResult,
-    draw_cases,
-    draw_convergence,
-    evaluators,
-    pose,
-    summarise_tuning,
-    tunable,
-    tune,
-    tuned_gains,
+from workbench.cli.arguments import (
+    Commands,
+    add_isolated,
+    add_map,
+    add_pdf,
+    add_seed,
+    add_system,
+    add_told,
+    add_workers,
+    positive,
 )
-from workbench.tuning.report import format_tuned, headline, tuning_answer, write_tuning_page
+from workbench.cli.output import CommandResult, Output, warn
+from workbench.errors import InputError, WorkerError
+from workbench.runtime.files import locked_folder
+from workbench.runtime.pool import Pool
 
 if TYPE_CHECKING:
+    from workbench.recordings.case import Case
     from workbench.runtime.cluster import DaskPool
+    from workbench.tuning import Evaluator, Job, Problem
+
+WORKERS_NEED = ("workbench.tuning",)
 
 
-_LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    parser = commands.add_parser(
+        "tune",
+        help=text,
+        description="Find gains that minimise z, the worst of the objectives z_k of all cases "
+        "(Schwarz et al. 2018, equations 11 and 12), by differential evolution. Writes gains.toml, "
+        "summary.json, figures and a page. Ctrl-C keeps the best so far; --resume goes on from "
+        "there, to the same result.",
+        epilog="examples:\n"
+        "  python -m workbench tune disturbance_observer\n"
+        "  python -m workbench tune parameter_estimator --budget 20 --out /tmp/quick\n"
+        "  python -m workbench tune disturbance_observer --folds 5\n"
+        "  python -m workbench tune disturbance_observer --judge-by smoother\n"
+        "  python -m workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
+    )
+    parser.add_argument(
+        "estimator", metavar="ESTIMATOR", help="one with gains, such as disturbance_observer or ekf"
+    )
+    add_system(parser)
+    parser.add_argument(
+        "--cases",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="CASE",
+        help="case folders, or folders of case folders (default: those of the system)",
+    )
+    add_told(parser)
+    parser.add_argument(
+        "--fmu",
+        type=Path,
+        metavar="FILE",
+        help="observer model (default: that of the estimator)",
+    )
+    add_map(parser)
+    _add_search(parser)
+    _add_work(parser)
+    add_pdf(parser)
+    add_isolated(parser)
+    return parser
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    """Add what decides about the gains."""
+    parser.add_argument(
+        "--budget",
+        type=positive,
+        default=100,
+        metavar="GENERATIONS",
+        help="most generations to search (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--population",
+        type=positive,
+        default=15,
+        metavar="N",
+        help="candidates per gain (default: %(default)s)",
+    )
+    add_seed(parser, "the search")
+    parser.add_argument(
+        "--scale-error",
+        "--radius-error",
+        type=float,
+        metavar="PERCENT",
+        help="judge each case again with an output's scale off by this much, alternately to both "
+        "sides, so that gains do not rely on what nobody knows as well; 0: only as recorded "
+        "(default: as the system says)",
+    )
+    parser.add_argument(
+        "--folds",
+        type=int,
+        default=0,
+        metavar="K",
+        help="also tune K times without a K-th of the cases, and judge on these",
+    )
+    parser.add_argument(
+        "--judge-by",
+        metavar="ESTIMATOR",
+        help="judge by one that knows whole recordings, such as smoother, what no sensor measures "
+        "(default: by what is measured)",
+    )
+    parser.add_argument(
+        "--full-evaluation",
+        action="store_true",
+        help="do not drop candidates that have lost; the result is the same",
+    )
+
+
+def _add_work(parser: argparse.ArgumentParser) -> None:
+    """Add who does the work, and what is shown and kept of it."""
+    add_workers(parser)
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="scheduler of a Dask cluster to work on instead; needs the extra [cluster]",
+    )
+    parser.add_argument(
+        "--timeout",
+        type=positive,
+        default=60,
+        metavar="SECONDS",
+        help="a candidate that takes longer ends its worker (default: %(default)s)",
+    )
+    parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
+    parser.add_argument(
+        "--live", action="store_true", help="draw convergence.png anew every 5 s while searching"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where to write (default: results/tune/ESTIMATOR)",
+    )
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Search the gains."""
+    from workbench.cli.inputs import given_cases, model_names
+    from workbench.system.reader import with_model
+    from workbench.system.registry import load_system
+    from workbench.tuning import pose, tunable
+
     system = load_system(options.system)
     kind = tunable(system, options.estimator)
     cases = given_cases(options, system)
@@ -72,13 +177,26 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 def _run(
     options: argparse.Namespace, output: Output, problem: Problem, cases: int, out: Path
 ) -> CommandResult:
+    from workbench.cli.tune_progress import PrintedProgress, written
+    from workbench.pages.answer import with_answer
+    from workbench.pages.provenance import run_of, sources
+    from workbench.tuning import (
+        NoWorkersError,
+        Plan,
+        draw_cases,
+        draw_convergence,
+        summarise_tuning,
+        tune,
+    )
+    from workbench.tuning.report import format_tuned, headline, tuning_answer, write_tuning_page
+
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size
     output.stage(
         f"{options.estimator}: {size} gains, {cases} cases, at most {plan.generations} "
         f"generations of {plan.population * size} candidates"
     )
-    progress = _Printed(output, plan, options.folds, out, live=options.live)
+    progress = PrintedProgress(output, plan, options.folds, out, live=options.live)
     try:
         with _one_interruption(), closing(_pool(options, problem.job)) as pool:
             tuned = tune(
@@ -95,7 +213,7 @@ def _run(
     content = summarise_tuning(tuned, options.folds)
     content["provenance"] |= {"run": run_of("tune", problem.job.system, sources(problem.cases))}
     summary = with_answer(tuning_answer(headline(content), content), content)
-    if not (progress.kept and _written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
+    if not (progress.kept and written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
         return CommandResult(status=1)
     draw_convergence(tuned.search.history, out / "convergence.png")
     draw_cases(summary["cases"], out / "cases.png")
@@ -144,68 +262,10 @@ def _one_interruption() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _pool(options: argparse.Namespace, job: Job) -> "Pool[Evaluator] | DaskPool[Evaluator]":
+def _pool(options: argparse.Namespace, job: Job) -> Pool[Evaluator] | DaskPool[Evaluator]:
+    from workbench.cli.cluster import open_cluster
+    from workbench.tuning import Evaluator, evaluators
+
     if options.cluster is None:
         return evaluators(job, options.workers, options.timeout)
-    return open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, _warn)
-
-
-def _warn(message: str) -> None:
-    print(f"warning: {message}", file=sys.stderr, flush=True)
-
-
-class _Printed(Progress):
-    """Prints one line per generation, draws now and then if asked to, and keeps the gains.
-
-    Attributes
-    ----------
-    kept : whether the gains could be written.
-    """
-
-    def __init__(self, output: Output, plan: Plan, folds: int, out: Path, *, live: bool) -> None:
-        self._output, self._plan, self._folds = output, plan, folds
-        self._out, self._live = out, live
-        self._drawn = -np.inf
-        self.kept = False
-
-    def begins(self, fold: int) -> None:
-        """See Progress."""
-        self._begin = time.perf_counter()
-        self._done: list[Generation] = []
-        if fold:
-            self._output.progress(f"fold {fold} of {self._folds}")
-
-    def evolved(self, history: Sequence[Generation]) -> None:
-        """See Progress."""
-        last, now = history[-1], time.perf_counter()
-        self._done.append(last)
-        most = self._plan.generations
-        left = (now - self._begin) / len(self._done) * (most + 1 - len(history))
-        saved = 1.0 - sum(g.samples for g in self._done) / sum(g.of for g in self._done)
-        self._output.progress(
-            f"[{len(history) - 1:>3}/{most}] z {last.z:.5f}, worst {last.worst} by "
-            f"{last.margin:.1%} over {last.second}; {last.candidates / last.seconds:.0f} "
-            f"evaluations/s, {saved:.0%} of work saved, {sum(last.unstable.values())} unstable, at "
-            f"most {left:.0f} s left"
-        )
-        if self._live and now - self._drawn > _LIVE_PERIOD:
-            draw_convergence(history, self._out / "convergence.png")
-            self._drawn = now
-
-    def found(self, tuned: TuningResult) -> None:
-        """Write the gains, first of all, so that nothing after them can lose them."""
-        self.kept = _written(self._out / "gains.toml", tuned_gains(tuned))
-
-    def warn(self, message: str) -> None:
-        """See Progress."""
-        _warn(message)
-
-
-def _written(path: Path, text: str) -> bool:
-    """Write a result; if that fails show it instead, so that it is not lost."""
-    try:
-        write_whole(path, text)
-    except InputError as error:
-        print(f"{text}\nerror: {error} The content is above.", file=sys.stderr)
-        return False
-    return True
+    return open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, warn)

@@ -1,34 +1,72 @@
 """`workbench accuracy`: estimators against the truth of the virtual rig."""
 
+from __future__ import annotations
+
 import argparse
 import time
 from contextlib import ExitStack
 from dataclasses import replace
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-from workbench.cli.inputs import given_cases
+from workbench.cli.arguments import Commands, add_pdf, add_recordings, add_system, example_case
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
-from workbench.machines.wheelset.accuracy import StopAccuracy, observe_stop, stop_accuracy
-from workbench.machines.wheelset.accuracy_page import write_accuracy_page
-from workbench.machines.wheelset.accuracy_report import (
-    format_accuracy,
-    write_accuracies,
-    write_accuracy,
-)
-from workbench.machines.wheelset.truth import read_truth
-from workbench.observers import choose, estimators_of
-from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
-from workbench.observers.gains_file import usual_gains
-from workbench.pages.provenance import run_of, sources
-from workbench.recordings.case import Case
 from workbench.runtime.files import locked_folder
-from workbench.system.registry import load_system, open_model
-from workbench.system.system import System
+
+if TYPE_CHECKING:
+    from workbench.machines.wheelset.accuracy import StopAccuracy
+    from workbench.recordings.case import Case
+    from workbench.system.system import System
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    own = example_case()
+    accuracy = commands.add_parser(
+        "accuracy",
+        help=text,
+        description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
+        "beside each recording and no estimator reads: force in the contact, a slide, friction of "
+        "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "
+        "writes every stop (accuracy.csv) and the same with the worst (accuracy.json), with what "
+        "95 % bands must be multiplied by to hold 95 % of the truth ('bands').",
+        epilog="examples:\n"
+        "  python -m workbench accuracy\n"
+        "  python -m workbench rig --seed 1 --out /tmp/rig\n"
+        "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
+        "  python -m workbench accuracy /tmp/rig1 /tmp/rig2  # of two seeds, told apart by folder\n"
+        f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
+    )
+    add_recordings(accuracy, out="results/accuracy")
+    accuracy.add_argument(
+        "--estimator",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="judge this one, may be repeated (default: all)",
+    )
+    add_system(accuracy)
+    add_pdf(accuracy)
+    return accuracy
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Judge the estimators."""
+    from workbench.machines.wheelset.accuracy import observe_stop, stop_accuracy
+    from workbench.machines.wheelset.accuracy_page import write_accuracy_page
+    from workbench.machines.wheelset.accuracy_report import (
+        format_accuracy,
+        write_accuracies,
+        write_accuracy,
+    )
+    from workbench.machines.wheelset.truth import read_truth
+    from workbench.observers import choose, estimators_of
+    from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
+    from workbench.observers.gains_file import usual_gains
+    from workbench.pages.provenance import run_of, sources
+    from workbench.system.registry import load_system, open_model
+
     system = load_system(options.system)
     # Of a wheelset, which has no like parts, the block filter is the extended one.
     every = [name for name in estimators_of(system) if name != BlockKalmanFilter.name]
@@ -77,6 +115,8 @@ def _stops(options: argparse.Namespace, system: System) -> list[Case]:
     InputError
         If there are none, one cannot be read, or a folder is given twice.
     """
+    from workbench.cli.inputs import given_cases
+
     if len(options.cases) < 2:
         return given_cases(options, system)
     found: dict[str, Case] = {}

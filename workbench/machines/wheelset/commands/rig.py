@@ -1,5 +1,7 @@
 """`workbench rig`: recordings from the virtual rig."""
 
+from __future__ import annotations
+
 import argparse
 import dataclasses
 import time
@@ -8,35 +10,106 @@ from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from workbench.cli.output import CommandResult, Output
-from workbench.cli.planted import make_planted
-from workbench.errors import InputError
-from workbench.machines.wheelset import PLUGIN
-from workbench.machines.wheelset.rig import (
-    CONSTANT_PADS,
-    ORDINARY_PADS,
-    SCENARIOS,
-    STANDARD,
-    Effects,
-    Scenario,
-    check_files,
-    plant,
-    proposed_stop,
-    select,
-    simulate,
-    write_recording,
+from workbench.cli.arguments import (
+    Commands,
+    add_out,
+    add_reference,
+    add_seed,
+    add_system,
+    add_workers,
+    positive,
 )
-from workbench.models.fmu import CoSimulation
+from workbench.cli.output import CommandResult, Output
+from workbench.errors import InputError
 from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
 from workbench.system.plugins import find_plugin
-from workbench.system.registry import load_system, model_path
-from workbench.system.system import REFERENCE, System
+
+if TYPE_CHECKING:
+    from workbench.machines.wheelset.rig import Effects, Scenario
+    from workbench.system.system import System
+
+WORKERS_NEED = ("workbench.machines.wheelset.rig",)
+
+
+def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+    """Add the command to the parser; `text` is its line in the list of all."""
+    rig = commands.add_parser(
+        "rig",
+        help=text,
+        description="Make recordings by co-simulation of the multibody model with drive, brake, "
+        "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
+        "truth.json, which no estimator reads. The same seed gives the same bytes. Of another "
+        "--system, its own virtual rig makes a set, with truth.json beside it.",
+        epilog="examples:\n"
+        "  python -m workbench rig --out /tmp/rig\n"
+        "  python -m workbench rig --list\n"
+        "  python -m workbench rig --case 15_locked_wheel --out /tmp/rig\n"
+        "  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig\n"
+        "  python -m workbench rig --next results/next --out /tmp/rig\n"
+        "  python -m workbench rig --system train --effect 'pads[3]=0.15' --out /tmp/stops",
+    )
+    add_out(rig, "results/rig")
+    rig.add_argument("--list", action="store_true", help="list scenarios and effects, and end")
+    rig.add_argument(
+        "--case",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="scenario, may be repeated (default: the fourteen standard ones)",
+    )
+    rig.add_argument(
+        "--next",
+        type=Path,
+        metavar="RESULT",
+        help="make the best experiment of a result of 'workbench next' in place of scenarios",
+    )
+    add_seed(rig, "tolerances and noise")
+    rig.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="plant an effect, or change one of the pads; may be repeated",
+    )
+    rig.add_argument(
+        "--pads",
+        choices=("ordinary", "constant"),
+        default="ordinary",
+        help="friction of dry pads: with speed, temperature and force, or constant as in the "
+        "nominal model (default: %(default)s)",
+    )
+    _add_making(rig)
+    return rig
+
+
+def _add_making(rig: argparse.ArgumentParser) -> None:
+    """Add what says how recordings are made and written."""
+    rig.add_argument(
+        "--rate",
+        type=positive,
+        default=200,
+        metavar="HZ",
+        help="of the recording, a divisor of 1000 (default: %(default)s)",
+    )
+    rig.add_argument(
+        "--truth-every",
+        type=positive,
+        default=1,
+        metavar="N",
+        help="write the truth of every Nth sample only (default: %(default)s)",
+    )
+    add_reference(rig, "that makes the recordings")
+    add_system(rig)
+    add_workers(rig)
 
 
 def _listed() -> str:
     """Scenarios and effects, for people."""
+    from workbench.machines.wheelset.rig import ORDINARY_PADS, SCENARIOS, STANDARD, Effects
+
     effects = "\n".join(
         f"  {field.name:<18} [{field.metadata['unit']}]".ljust(28) + field.metadata["text"]
         for field in dataclasses.fields(Effects)
@@ -57,6 +130,18 @@ effects, zero if not given:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make the recordings, or list what can be made."""
+    from workbench.machines.wheelset import PLUGIN
+    from workbench.machines.wheelset.rig import (
+        CONSTANT_PADS,
+        ORDINARY_PADS,
+        SCENARIOS,
+        Effects,
+        plant,
+        proposed_stop,
+        select,
+    )
+    from workbench.system.registry import load_system
+
     system = load_system(options.system)
     if find_plugin(system.plugin) is not PLUGIN:
         return _of_another(options, output, system)
@@ -79,6 +164,8 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 def _of_another(options: argparse.Namespace, output: Output, system: System) -> CommandResult:
     """What another machine's plugin makes, which has nothing of this rig's own."""
+    from workbench.cli.planted import make_planted
+
     own = {"next": None, "pads": "ordinary", "rate": 200, "truth_every": 1}
     for name, usual in own.items():
         if getattr(options, name) != usual:
@@ -98,6 +185,11 @@ def _recorded(
     scenarios: Sequence[Scenario],
     effects: Effects,
 ) -> CommandResult:
+    from workbench.machines.wheelset.rig import check_files
+    from workbench.models.fmu import CoSimulation
+    from workbench.system.registry import model_path
+    from workbench.system.system import REFERENCE
+
     check_files([options.out / scenario.name for scenario in scenarios], options.rate)
     fmu = options.reference or model_path(system, REFERENCE)
     with CoSimulation(fmu):
@@ -137,6 +229,8 @@ class _Order:
 
 def _make(order: _Order, scenario: Scenario) -> str:
     """Make and write one case; returns a line for people."""
+    from workbench.machines.wheelset.rig import simulate, write_recording
+
     stop = simulate(scenario, order.seed, order.effects, order.fmu)
     write_recording(stop, order.effects, order.rate, order.out / scenario.name, order.every)
     seconds = stop.standstill - stop.drawn.coasting

@@ -1,1 +1,0 @@
-"""What the commands for the wheelset alone may be told, one module each."""
