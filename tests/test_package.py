@@ -37,6 +37,13 @@ def test_nothing_heavy_is_imported_before_it_is_needed(
     assert imported.isdisjoint(HEAVY)
 
 
+def test_matplotlib_is_loaded_only_where_something_is_drawn(root: Path) -> None:
+    done = run("-X", "importtime", "-c", "import workbench.api", cwd=root)
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "workbench.api" in imported
+    assert "matplotlib" not in imported
+
+
 def test_the_help_lists_each_command_and_each_has_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

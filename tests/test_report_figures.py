@@ -67,7 +67,7 @@ def contrast(one: str, other: str) -> float:
 @pytest.mark.parametrize(("theme", "curves"), [(0, LIGHT), (1, DARK)])
 def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[str, str]) -> None:
     """WCAG 2.2 AA: 4.5 for text, 3 for graphics."""
-    css = (root / "workbench" / "report" / "page.css").read_text()
+    css = (root / "workbench" / "pages" / "page.css").read_text()
     named = dict(re.findall(r"--(\w+): (#\w{6});", css.split(":root {")[1 + theme]))
     for text in ("text", "quiet", "accent", "warning"):
         assert contrast(named[text], named["ground"]) >= 4.5

@@ -105,7 +105,7 @@ def news(page: Any) -> str:
 
 
 def headline(page: Any) -> str:
-    return text(page.get_element_by_id("result"))
+    return text(page.get_element_by_id("answer"))
 
 
 def written(summary: dict[str, Any], folder: Path) -> Any:

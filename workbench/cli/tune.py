@@ -183,12 +183,17 @@ def _run(
     from workbench.tuning import (
         NoWorkersError,
         Plan,
-        draw_cases,
-        draw_convergence,
         summarise_tuning,
         tune,
     )
-    from workbench.tuning.report import format_tuned, headline, tuning_answer, write_tuning_page
+    from workbench.tuning.report import (
+        draw_cases,
+        draw_convergence,
+        format_tuned,
+        headline,
+        tuning_answer,
+        write_tuning_page,
+    )
 
     plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
     size = problem.space.start.size

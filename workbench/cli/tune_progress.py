@@ -15,9 +15,9 @@ from workbench.tuning import (
     Plan,
     Progress,
     TuningResult,
-    draw_convergence,
     tuned_gains,
 )
+from workbench.tuning.report import draw_convergence
 
 _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 

@@ -5,13 +5,10 @@ from dataclasses import asdict, dataclass, replace
 from html import escape
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.counting import FAULTY, MISSING
@@ -25,11 +22,15 @@ from workbench.diagnosis.inference.timing import LateSignals
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
 from workbench.errors import InputError, closest
 from workbench.observers.simulation import CaseResult, case_figure
-from workbench.pages.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
 from workbench.pages.views import capital, named, per_shown, shown_unit
 from workbench.recordings.case import Case
 from workbench.system.system import Channel, Signal, System
 from workbench.system.units import BAND, si_factor, with_interval
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MEASURE = (
     "root mean square of prediction errors, in means over {span}, on recordings that were held "
@@ -561,8 +562,7 @@ def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[P
     """Draw what errors go with, before and after, to each path (PNG or SVG by suffix)."""
     channels = list(dict.fromkeys(dependence["channel"] for dependence in dependences))
     influences = list(dict.fromkeys(dependence["influence"] for dependence in dependences))
-    with mpl.rc_context(STYLE | {"axes.grid": False}):
-        sheet = Figure(figsize=(7.5, 4.0), layout="constrained")
+    with styled(7.5, 4.0, axes_grid=False) as sheet:
         plots = sheet.subplots(1, 2, sharey=True)
         for axes, key in zip(plots, ("before", "after"), strict=True):
             share = np.zeros((len(influences), len(channels)))
@@ -584,8 +584,7 @@ def draw_confusability(
     names: Sequence[str], cosines: Matrix, found: Sequence[str], paths: Iterable[Path]
 ) -> None:
     """Draw the similarity of the signatures of effects; those found are marked."""
-    with mpl.rc_context(STYLE | {"axes.grid": False, "font.size": 7}):
-        sheet = Figure(figsize=(9.0, 9.0), layout="constrained")
+    with styled(9.0, 9.0, axes_grid=False, font_size=7) as sheet:
         axes = sheet.subplots()
         draw_heat(axes, 100.0 * cosines, 100.0, least=50.0)
         marked = [f"▸ {name}" if name in found else name for name in names]
@@ -601,8 +600,7 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
     rows = [*recordings, "all recordings"]
     before = [*(recording["before"] for recording in recordings.values()), gain["before"]]
     after = [*(recording["after"] for recording in recordings.values()), gain["after"]]
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(7.5, 1.5 + 0.3 * len(rows)), layout="constrained")
+    with styled(7.5, 1.5 + 0.3 * len(rows)) as sheet:
         axes = sheet.subplots()
         heights = range(len(rows))
         axes.hlines(heights, after, before, color=LIGHT["raw"])
@@ -717,7 +715,7 @@ def _finding(
     )
 
 
-def draw_heat(axes: Axes, percents: Matrix, most: float, least: float = 0.5) -> None:
+def draw_heat(axes: "Axes", percents: Matrix, most: float, least: float = 0.5) -> None:
     """A matrix of whole percents, written into their cells from `least` on."""
     axes.imshow(percents, cmap="Blues", vmin=0.0, vmax=1.6 * most, aspect="auto")
     for (row, column), value in np.ndenumerate(percents):

@@ -4,10 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from workbench.observers.observability import (
     STRIDE,
@@ -18,10 +16,9 @@ from workbench.observers.observability import (
     prior,
 )
 from workbench.pages.answer import Answer, Measure, with_answer
-from workbench.pages.figures import STYLE, CaseFigure, Curve, Panel, save_figure
+from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure, styled
 from workbench.pages.measures import percentage, unit_suffix, whole_percent
-from workbench.pages.parts import Cell, Heading, Part, Rows, number, write_parts
-from workbench.pages.recordings import placed
+from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
 from workbench.runtime.files import write_json, write_whole
 from workbench.system.system import System
@@ -38,8 +35,7 @@ def draw_observability(observability: CaseObservability, path: Path) -> None:
     Bounds are drawn at the end of their window and shaded where the first model's are useful.
     """
     system, case = observability.system, observability.case
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    with styled(9.0, 7.0) as figure:
         top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
         figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
         for first in system.inputs[:1]:
@@ -285,28 +281,21 @@ def write_observability_page(
     """
     system = done[0].system
     figures = [_figure(one) for one in sorted(done, key=_share)]
-    drawn = placed(figures, summary, out)
+    first, *others = zoomable(figures, summary, out)
     names = ", ".join(capital(quantity.label) for quantity in system.estimated) or "States"
     parts = [
-        Part("shown", "Where the samples tell least", (_EXPLAINED,), recordings=tuple(drawn[:1])),
-        Part("cases", "Recordings", tables=(_cases(system, summary),), printed=True),
-        Part("linear", "Linear test of the models", (_LINEAR,), tables=tuple(_states(summary))),
-        Part("definitions", "Definitions", terms=_terms(summary)),
+        Part("shown", "Where the samples tell least", [_EXPLAINED, first]),
+        Part("cases", "Recordings", [_cases(system, summary)], printed=True),
+        Part("linear", "Linear test of the models", [_LINEAR, *_states(summary)]),
+        Part("definitions", "Definitions", [Definitions(_terms(summary))]),
     ]
-    if drawn[1:]:
-        parts.insert(2, Part("others", "The other recordings", recordings=tuple(drawn[1:])))
+    if others:
+        parts.insert(2, Part("others", "The other recordings", others))
     missing = planned - len(done)
     warnings = [f"Incomplete: {len(done)} of {planned} recordings, interrupted."] * bool(missing)
-    path = out / "index.html"
-    write_parts(
-        f"What the measurements can tell: {names}",
-        summary,
-        parts,
-        path,
-        file="observability.json",
-        warnings=warnings,
-    )
-    return path
+    title = f"What the measurements can tell: {names}"
+    page = Page(title, parts, "observability.json", warnings=warnings)
+    return page.write(summary, out / "index.html")
 
 
 _EXPLAINED = (
@@ -372,22 +361,22 @@ def _figure(observability: CaseObservability) -> CaseFigure:
     )
 
 
-def _cases(system: System, summary: Mapping[str, Any]) -> Rows:
-    columns = [Heading("recording", number=False), Heading("conditions", number=False)]
+def _cases(system: System, summary: Mapping[str, Any]) -> Table:
+    columns: list[object] = ["recording", "conditions"]
     for quantity in system.estimated:
         unit = "" if quantity.unit == "1" else f" [{quantity.unit}]"
         columns += [
-            Heading(f"{quantity.name}, median{unit}"),
-            Heading(
+            Numbers(f"{quantity.name}, median{unit}"),
+            Numbers(
                 f"{quantity.name} can be told [%]",
                 meaning=f"time with a bound below {quantity.useful:g}",
             ),
-            Heading(f"bound of {quantity.name}, median{unit}"),
+            Numbers(f"bound of {quantity.name}, median{unit}"),
         ]
     rows = []
     for name, case in summary["cases"].items():
         first = next(iter(case["models"].values()))
-        cells = [Cell(case["title"])]
+        cells = [case["title"]]
         for quantity in system.estimated:
             share = None if first["useful"] is None else first["useful"][quantity.correction]
             bound = (
@@ -396,41 +385,39 @@ def _cases(system: System, summary: Mapping[str, Any]) -> Rows:
                 else first["median_bound"][quantity.correction]
             )
             cells += [
-                number(case[f"median_{quantity.name}"], "{:.3g}".format),
-                number(None if share is None else 100.0 * share, "{:.0f}".format, share),
-                number(bound, "{:.2g}".format),
+                number(case[f"median_{quantity.name}"], ".3g"),
+                number(None if share is None else 100.0 * share, ".0f", share),
+                number(bound, ".2g"),
             ]
-        rows.append((name, tuple(cells)))
+        rows.append((name, *cells))
     caption = (
         f"How well windows of {summary['window_s']:g} s know each quantity, over the judged time "
         "of each recording, by the first model."
     )
-    return Rows("case-table", caption, tuple(columns), tuple(rows))
+    return Table("case-table", caption, columns, rows)
 
 
-def _states(summary: Mapping[str, Any]) -> list[Rows]:
+def _states(summary: Mapping[str, Any]) -> list[Table]:
     tables = []
     for model, test in summary["linear"].items():
-        rows = tuple(
+        rows = [
             (
                 name,
-                (
-                    number(100.0 * state["remaining"], "{:.2f}".format, state["remaining"]),
-                    number(state["scale"], "{:.3g}".format),
-                    Cell(_verdict(name, test)),
-                ),
+                number(100.0 * state["remaining"], ".2f", state["remaining"]),
+                number(state["scale"], ".3g"),
+                _verdict(name, test),
             )
             for name, state in test["states"].items()
-        )
+        ]
         columns = (
-            Heading("state", number=False),
-            Heading("left after a second [%]"),
-            Heading("scale [unit of the state]"),
-            Heading("verdict", number=False),
+            "state",
+            Numbers("left after a second [%]"),
+            Numbers("scale [unit of the state]"),
+            "verdict",
         )
         seen = "observable" if test["observable"] else "not observable"
         caption = f"{model}: rank {test['rank']} of {len(test['states'])}, {seen}."
-        tables.append(Rows(f"linear-{model}", caption, columns, rows))
+        tables.append(Table(f"linear-{model}", caption, columns, rows))
     return tables
 
 

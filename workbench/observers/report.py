@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
 from scipy.stats import t
 
 from workbench.observers import label
@@ -14,9 +16,21 @@ from workbench.observers.simulation import CaseResult
 from workbench.pages.answer import Answer, Measure, recordings, with_answer
 from workbench.pages.figures import CaseFigure
 from workbench.pages.measures import percentage
-from workbench.pages.recordings import placed
-from workbench.pages.templates import rendered
-from workbench.pages.views import below, called, inverse, percent, rounded, window
+from workbench.pages.parts import (
+    Block,
+    Cell,
+    Definitions,
+    Numbers,
+    Page,
+    Part,
+    Table,
+    Text,
+    number,
+    term,
+    zoomable,
+)
+from workbench.pages.templates import anchor
+from workbench.pages.views import below, called, capital, inverse, percent, rounded, window
 from workbench.runtime.files import write_whole
 from workbench.system.system import System
 
@@ -209,29 +223,232 @@ def write_page(
         error = summary["cases"][name]["estimators"][best.name][f"{judged}_nrmse"]
         return -np.inf if error is None else float(error)
 
-    by_name = {figure.name: figure for figure in figures}
-    order = sorted(by_name, key=badness, reverse=True)
-    drawn = placed([by_name[name] for name in order], summary, path.parent)
-    text = rendered(
-        "page.html",
-        summary,
-        lambda name: label(name, system),
-        standings=ranking,
-        best=best,
-        order=order,
-        drawings=dict(zip(order, drawn, strict=True)),
-        planned=planned,
-        judged=judged,
-        unit=system.unit(judged),
-        called=called(system, judged),
-        when=system.objective.when or window(system),
-        window=window(system),
-        below=below(system),
-        fed=judged in (output.name for output in system.outputs),
-        rounded=rounded,
-        weights=[
-            (weight, inverse(system.unit(name)), name)
-            for name, weight in system.objective.weights.items()
-        ],
+    ordered = sorted(figures, key=lambda figure: badness(figure.name), reverse=True)
+    order = [figure.name for figure in ordered]
+    first, *others = zoomable(ordered, summary, path.parent, own_files=True)
+    quantity = called(system, judged)
+    shown = (
+        f"From top to bottom: what was measured and fed to the estimators, the {quantity} measured "
+        "and estimated, its error, and the quantities behind it. Estimators are judged in the "
+        "shaded time. Bands, where an estimator knows its uncertainty, hold 95 %. Where a "
+        "recording has no sensor that judges, the grey band is the reference. Curves that leave a "
+        "panel are cut, most often of the open loop."
     )
-    write_whole(path, text)
+    title = "The worst recording" if best.worst is not None else "A recording"
+    table = _cases(system, summary, ranking, order)
+    cases: list[Block] = [table, *_doubts(system, summary, order)]
+    parts = [
+        Part("shown", title, [shown, first]),
+        Part("estimators", "Estimators", [_estimators(system, ranking)], printed=True),
+        Part("cases", "Cases, worst first", cases, printed=True),
+        Part("definitions", "How errors are defined", [Definitions(_terms(system))]),
+    ]
+    if others:
+        parts.insert(3, Part("figures", "The other recordings, worst first", others))
+    missing = planned - len(order)
+    incomplete = Markup(
+        f"<strong>Incomplete:</strong> {len(order)} of {planned} cases, because the run was "
+        "interrupted."
+    )
+    page = Page(
+        title=f"{capital(quantity)} estimated on {recordings(len(order))}",
+        parts=parts,
+        warnings=[incomplete] * (missing > 0),
+        run=_run(system, summary),
+    )
+    page.write(summary, path)
+
+
+_Z = Numbers("objective z", "mean weighed error over the whole recording; of several, the largest")
+
+
+def _share(share: float | None) -> Cell:
+    """A share as a number of percent, sorted as a share."""
+    return Cell("n/a") if share is None else Cell(f"{100 * share:.2f}", share)
+
+
+def _link(case: str) -> Markup:
+    return Markup('<a href="#{}">{}</a>').format(quote(anchor(case)), case)
+
+
+def _estimators(system: System, ranking: Sequence[Standing]) -> Table:
+    quantity = called(system, system.objective.signal)
+    rows = []
+    for standing in ranking:
+        middle, low, high = standing.usual
+        usual = _share(middle)
+        if low is not None and high is not None:
+            usual = Cell(f"{usual.text} ({100 * low:.2f} to {100 * high:.2f})", middle)
+        row = (
+            label(standing.name, system),
+            _share(standing.worst),
+            _link(standing.case) if standing.case else "n/a",
+            usual,
+            number(standing.z, ".3f"),
+            number(standing.judged, ""),
+            number(standing.seconds, ".2f"),
+        )
+        rows.append(row)
+    return Table(
+        "estimator-table",
+        "Each estimator over all cases, the one with the least worst case first. Errors are of the "
+        f"{quantity}, rms over mean {system.objective.when or window(system)}.",
+        (
+            "estimator",
+            Numbers("worst error [%]", sorted="ascending"),
+            "worst case",
+            Numbers(
+                "usual error [%]",
+                "geometric mean of the cases, with its 95 % interval by how they differ",
+            ),
+            _Z,
+            Numbers("cases judged"),
+            Numbers("computing time [s]"),
+        ),
+        rows,
+    )
+
+
+def _cases(
+    system: System, summary: Mapping[str, Any], ranking: Sequence[Standing], order: Sequence[str]
+) -> Table:
+    judged, best = system.objective.signal, ranking[0]
+    unit, quantity = system.unit(judged), called(system, judged)
+    rows = []
+    for name in order:
+        case = summary["cases"][name]
+        scores = case["estimators"]
+        rms = scores[best.name][f"{judged}_rms_{unit}"]
+        row = (
+            _link(name),
+            Markup('<span class="conditions">{}</span>').format(case["title"]),
+            *(_share(scores[standing.name][f"{judged}_nrmse"]) for standing in ranking),
+            Cell("n/a") if rms is None else Cell(rounded(rms), rms),
+            number(scores[best.name]["z"], ".3f"),
+        )
+        rows.append(row)
+    errors = [Numbers(f"{label(standing.name, system)} [%]") for standing in ranking]
+    errors[0] = Numbers(errors[0].title, sorted="descending")
+    root = Markup("{} error [{}]").format(
+        term("rms", "root of the mean square, in the judged time"), unit
+    )
+    return Table(
+        "case-table",
+        f"Error of the {quantity} by case and estimator [% of its mean]; rms error and objective z "
+        f"are those of the {label(best.name, system)}.",
+        ("case", "conditions", *errors, Numbers(root), _Z),
+        rows,
+    )
+
+
+def _doubts(system: System, summary: Mapping[str, Any], order: Sequence[str]) -> list[Text]:
+    """What is unlikely in recordings, and why estimators failed."""
+    texts = []
+    for name in order:
+        case = summary["cases"][name]
+        texts += [f"{name}: {doubt}" for doubt in case["doubts"]]
+        texts += [
+            f"{name}, {label(estimator, system)}: {score['reason']}."
+            for estimator, score in case["estimators"].items()
+            if score["reason"]
+        ]
+    return [Text(text, warning=True) for text in texts]
+
+
+def _terms(system: System) -> dict[str, str]:
+    judged, limit = system.objective.signal, below(system)
+    filtered = (
+        f", without what is not {limit}, by a low-pass that shifts no phase (sensors ring above "
+        "that)"
+    )
+    unseen = (
+        ""
+        if judged in (output.name for output in system.outputs)
+        else (f" {judged} was measured only to judge by; no estimator sees it.")
+    )
+    weighed = " + ".join(
+        f"{weight} {inverse(system.unit(name))} · |error of {name}|"
+        for name, weight in system.objective.weights.items()
+    )
+    return {
+        f"Error of the {called(system, judged)}": f"Estimated minus measured {judged}"
+        f"{filtered if limit else ''}; root of the mean square {window(system)}, over the mean of "
+        f"|{judged}| in the same time.{unseen}",
+        "Objective z": "As in equation (12) of Schwarz, Brembeck, Heckmann (2018): the mean over "
+        f"the whole recording of {weighed}{f', of errors {limit}' if limit else ''}. Of several "
+        "cases, the largest counts.",
+        "Computing time": "Wall time of the estimator on one processor, without reading, judging "
+        "and drawing. The first run on a machine compiles the loops of the estimators, and this "
+        "time is in it.",
+    }
+
+
+_OTHER = ("run", "meanings", "workbench", "python", "packages", "fmu", "commit", "seed")
+
+
+def _run(system: System, summary: Mapping[str, Any]) -> list[Block]:
+    """Models, versions, and the settings of each estimator."""
+    provenance = summary["provenance"]
+    code = Markup("<code>{}</code>").format
+    fmu = provenance["fmu"]
+    models = {key: model for key, model in provenance.items() if key.endswith("_fmu")}
+    packages = "".join(f", {name} {release}" for name, release in provenance["packages"].items())
+    commit, seed = provenance["commit"], provenance.get("seed")
+    terms = {
+        "Model": f"{fmu['model']}, from {fmu['file']}",
+        **{
+            f"{label(key, system).replace(' fmu', '').capitalize()} model": Markup(
+                "{}, from {}, SHA-256 <code>{}</code>"
+            ).format(model["model"], model["file"], model["sha256"])
+            for key, model in models.items()
+        },
+        "SHA-256 of the FMU": code(fmu["sha256"]),
+        "Versions": f"workbench {provenance['workbench']}, Python {provenance['python']}{packages}",
+        "Commit": code(commit) if commit else "not known: not run from a git checkout",
+        "Random seed": "none, nothing in this run is random" if seed is None else str(seed),
+        "Weights of z": ", ".join(f"{name} = {w}" for name, w in summary["weights"].items()),
+    }
+    meanings = provenance.get("meanings", {})
+    tables = [
+        _settings(label(key, system), settings, meanings.get(key, {}))
+        for key, settings in provenance.items()
+        if key not in (*_OTHER, *models) and isinstance(settings, Mapping)
+    ]
+    repeat = Markup("To repeat the run: <code>python -m workbench simulate</code>.")
+    return [Definitions(terms, grid=True), *tables, repeat]
+
+
+def _settings(name: str, settings: Mapping[str, Any], meanings: Mapping[str, Any]) -> Table:
+    """Settings of an estimator, with their units and what they do."""
+    rows = []
+    for setting, value in settings.items():
+        if setting != "source":
+            meaning = meanings.get(setting, {"unit": "", "text": ""})
+            rows.append((setting, _setting(value), meaning["unit"], meaning["text"]))
+    return Table(
+        f"settings-{anchor(name)}",
+        f"Settings of the {name}: {settings.get('source') or 'as usual'}",
+        ("setting", "value", "unit", "what it does"),
+        rows,
+        sortable=False,
+    )
+
+
+def _setting(value: Any) -> str:
+    """A setting as text; a matrix in columns."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} = {_significant(entry).strip()}" for key, entry in value.items())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        lines = (
+            f"{'  '.join(map(_significant, row))}\n"
+            if isinstance(row, Sequence) and not isinstance(row, str)
+            else f"{_significant(row)}  "
+            for row in value
+        )
+        return Markup("<pre>{}</pre>").format("".join(lines))
+    return _significant(value).strip()
+
+
+def _significant(value: object) -> str:
+    """A setting, in a column if it is a number."""
+    return f"{value:>9.4g}" if isinstance(value, (int, float)) else str(value)

@@ -11,18 +11,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from workbench.arrays import Vector
 from workbench.pages.figures import CaseFigure, Curve, Panel
 
 _CODES = 65534
-
-
 _NONE = 65535
-
-
 _TICKS = 2**32 - 1  # of the time from the first to the last sample
 
 
@@ -68,23 +63,11 @@ def _planes(rows: Sequence[NDArray[np.uint16]]) -> bytes:
 
 
 _LEVELS = 4000  # units of a panel's height: 1 % of it can be zoomed to full height
-
-
 _LEFT, _WIDTH, _RIGHT = 58, 890, 40  # of the panels [px]
-
-
 _BLOCKS = 450  # of a curve before it is drawn anew, each by its extremes: a pixel each
-
-
 _MOST = 2_400_000  # [byte] of a figure's samples; of longer ones only the extremes are drawn
-
-
 FURTHER = {"m/s": ("km/h", 3.6)}  # units that people read beside the one of a panel
-
-
 _HEIGHT = 110  # of a panel of height 1 [px]
-
-
 _HEAD, _FOOT = 24, 40  # room for a panel's title, for the time axis [px]
 
 
@@ -120,7 +103,6 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
         top += height
     return {
         "figure": figure,
-        "elsewhere": "",
         "size": (len(samples) if whole else 0) + _size(panels),  # [byte] about, on the page
         "told": told,
         "samples": samples if whole else "",
@@ -145,6 +127,8 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
 
 def ticks_within(low: float, high: float, most: int) -> list[tuple[float, str]]:
     """Round values from low to high, at most so many, each with its text."""
+    from matplotlib.ticker import MaxNLocator  # loaded where something is drawn
+
     values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
     inside = [float(value) for value in values if low <= value <= high]
     return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]

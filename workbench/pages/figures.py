@@ -1,19 +1,20 @@
 """Figures of recordings: panels of curves, described once and drawn twice.
 
-To files by matplotlib here, and into the page, where they can be zoomed.
+To files by matplotlib here, and into the page, where they can be zoomed. Matplotlib takes longer to
+load than all else together, so that it is imported where something is drawn.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import matplotlib as mpl
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from typing import TYPE_CHECKING, Any
 
 from workbench.arrays import Vector
 from workbench.runtime.files import replacing, warning_if_unwritable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # On white and near black: 3:1 to the ground or more, as WCAG 2.2 asks of graphics, differing in
 # lightness or in the blue-yellow axis, which colour-blind readers keep.
@@ -110,10 +111,30 @@ class CaseFigure:
     axis: tuple[str, str] = ("time", "s")
 
 
-def sheet(figure: CaseFigure) -> Figure:
+@contextmanager
+def in_style(**own: Any) -> Iterator[None]:
+    """Draw in the style of all, and by settings of one's own, with underscores for dots."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE | {name.replace("_", "."): value for name, value in own.items()}):
+        yield
+
+
+@contextmanager
+def styled(width: float, height: float, **own: Any) -> Iterator["Figure"]:
+    """An empty figure [inch], to be drawn on while the context lasts; see `in_style`."""
+    from matplotlib.figure import Figure
+
+    with in_style(**own):
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+def sheet(figure: CaseFigure) -> "Figure":
     """Draw a figure with matplotlib."""
-    own = {"axes.titlesize": 9, "axes.titlelocation": "left", "svg.fonttype": "none"}
-    with mpl.rc_context(STYLE | own):
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    with in_style(axes_titlesize=9, axes_titlelocation="left", svg_fonttype="none"):
         drawn = Figure(figsize=_SHEET)
         rows = drawn.subplots(
             len(figure.panels),
@@ -152,7 +173,7 @@ def sheet(figure: CaseFigure) -> Figure:
 def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
     """Draw a case with matplotlib, once, to each path (PNG or SVG by suffix)."""
     drawn = sheet(figure)
-    with mpl.rc_context(STYLE | {"svg.fonttype": "none"}):
+    with in_style(svg_fonttype="none"):
         save_figure(drawn, paths)
 
 
@@ -172,7 +193,7 @@ def _placed(heights: Sequence[float], entries: int) -> dict[str, Any]:
     }
 
 
-def save_figure(sheet: Figure, paths: Iterable[Path]) -> None:
+def save_figure(sheet: "Figure", paths: Iterable[Path]) -> None:
     """Write one figure in each format, without the date, so that equal figures are equal files.
 
     One that cannot be written is warned of.

@@ -1,24 +1,38 @@
-"""Pages that consist of an answer, figures and tables alone: of what they are made, and one writer.
+"""Pages as values: an answer, then parts made of text, tables and figures; one template shows all.
 
-A page is described in values; where they stand and how they look is the template's affair.
+Texts are escaped; one that holds markup is a `markupsafe.Markup`.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-from workbench.pages.drawing import ticks_within
+from markupsafe import Markup
+
+from workbench.pages.drawing import drawing, ticks_within
+from workbench.pages.figures import CaseFigure
 from workbench.pages.templates import rendered
 from workbench.runtime.files import write_whole
 
 _LEFT, _WIDTH, _ROW, _TOP = 250, 620, 24, 34  # of a figure of dots [px]
+_CELL, _NAMES = 24, 205  # of a matrix, room for names [px]
+_ROOM = 2_600_000  # [byte] of figures on a page, so that it stays below 3 MB and opens at once
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph; a plain text is one too. A warning stands out."""
+
+    text: str
+    warning: bool = False
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry of a table.
+    """One entry of a table; a plain text is one too.
 
     Attributes
     ----------
@@ -29,102 +43,74 @@ class Cell:
     text: str
     value: float | None = None
     heat: float | None = None
+    warning: bool = False
+
+    @property
+    def order(self) -> str:
+        """The value as JavaScript reads it."""
+        if self.value is None:
+            return ""
+        return "Infinity" if self.value == math.inf else str(self.value)
 
 
 @dataclass(frozen=True)
-class Heading:
-    """Heading of a column; `meaning` is told where the heading stands."""
-
-    title: str
-    number: bool = True
-    meaning: str = ""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Rows of cells; the first column holds what a row is of."""
-
-    id: str
-    caption: str
-    columns: tuple[Heading, ...]
-    rows: tuple[tuple[str, tuple[Cell, ...]], ...]
-
-
-@dataclass(frozen=True)
-class Dot:
-    """A number on an axis, with its 95 % interval where there is one."""
-
-    value: float
-    style: str
-    low: float | None = None
-    high: float | None = None
-
-
-@dataclass(frozen=True)
-class Dots:
-    """Rows of dots on one axis, from zero, from `low`, or logarithmic.
+class Numbers:
+    """Heading of a column of numbers; that of a column of words is a plain text.
 
     Attributes
     ----------
-    finding : what it shows, for those who do not see it.
-    axis : what the numbers are, with unit.
-    mark : value and name of a line across all rows; None without.
-    low, high : ends of the axis; None: zero, and that of the data.
+    meaning : shown where the pointer is on the heading.
+    sorted : how the rows are ordered by this column, "ascending" or "descending".
     """
 
-    finding: str
-    axis: str
-    rows: tuple[tuple[str, tuple[Dot, ...]], ...]
-    mark: tuple[float, str] | None = None
-    low: float | None = None
-    high: float | None = None
-    logarithmic: bool = False
+    title: str
+    meaning: str = ""
+    sorted: str = ""
 
-    def drawn(self) -> dict[str, Any]:
-        """Geometry for the template, in pixels."""
-        ends = [one.value if one.high is None else one.high for _, row in self.rows for one in row]
-        high = 1.05 * max(ends, default=1.0) if self.high is None else self.high
-        low = min(ends, default=0.1) / 1.15 if self.logarithmic else self.low or 0.0
 
-        def at(value: float) -> float:
-            inside = max(min(value, high), low)
-            if self.logarithmic:
-                return _LEFT + _WIDTH * (1.0 - math.log(inside / high) / math.log(low / high))
-            return _LEFT + _WIDTH * (inside - low) / ((high - low) or 1.0)
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells; the first column holds what a row is of.
 
-        ticks = ticks_within(low, high, 8)
-        if self.logarithmic:
-            decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-            marks = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
-            ticks = [(mark, f"{mark:g}") for mark in marks if low <= mark <= high]
+    Attributes
+    ----------
+    columns : headings, texts and `Numbers`.
+    rows : texts and `Cell`s.
+    marked : first cells of rows that stand out.
+    sortable : whether a click on a heading sorts the rows.
+    """
 
-        rows = [
-            {
-                "name": name,
-                "y": _TOP + _ROW * (number + 0.5),
-                "dots": [
-                    {
-                        "x": at(dot.value),
-                        "style": dot.style,
-                        "interval": None
-                        if dot.low is None or dot.high is None
-                        else (at(dot.low), at(dot.high)),
-                    }
-                    for dot in dots
-                ],
-            }
-            for number, (name, dots) in enumerate(self.rows)
-        ]
-        bottom = _TOP + _ROW * len(rows)
-        return {
-            "finding": self.finding,
-            "axis": self.axis,
-            "rows": rows,
-            "mark": None if self.mark is None else (at(self.mark[0]), self.mark[1]),
-            "ticks": [(at(value), text) for value, text in ticks],
-            **{"left": _LEFT, "width": _WIDTH, "top": _TOP, "bottom": bottom},
-            "total": _LEFT + _WIDTH + 40,
-        }
+    id: str
+    caption: str
+    columns: Sequence[object]
+    rows: Sequence[Sequence[object]]
+    marked: Sequence[str] = ()
+    sortable: bool = True
+
+
+@dataclass(frozen=True)
+class Definitions:
+    """Meanings by what is defined; in two columns where they are short."""
+
+    terms: Mapping[str, str]
+    grid: bool = False
+
+
+@dataclass(frozen=True)
+class Source:
+    """Text of a program or of a command line."""
+
+    code: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Article:
+    """A heading and what stands below it."""
+
+    id: str
+    title: str
+    content: Sequence["Block"]
 
 
 @dataclass(frozen=True)
@@ -138,7 +124,194 @@ class Strip:
     """
 
     finding: str
-    entries: tuple[tuple[str, str], ...]
+    entries: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A number on an axis, with its 95 % interval where there is one."""
+
+    value: float
+    style: str
+    low: float | None = None
+    high: float | None = None
+    diamond: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Both ends, if there are both."""
+        return None if self.low is None or self.high is None else (self.low, self.high)
+
+
+@dataclass(frozen=True)
+class Dots:
+    """Rows of dots on one axis, from zero, from `low`, or logarithmic.
+
+    Attributes
+    ----------
+    finding : what it shows, for those who do not see it.
+    axis : what the numbers are, with unit.
+    mark : value and name of a line across all rows; None without.
+    low, high : ends of the axis; None: zero, and that of the data.
+    paired : whether a line joins the two dots of a row.
+    total : row that stands for all others.
+    caption : the finding unless given.
+    legend : (style, text) of each entry.
+    """
+
+    finding: str
+    axis: str
+    rows: Sequence[tuple[str, Sequence[Dot]]]
+    mark: tuple[float, str] | None = None
+    low: float | None = None
+    high: float | None = None
+    logarithmic: bool = False
+    paired: bool = False
+    total: str = ""
+    caption: str = ""
+    legend: Sequence[tuple[str, str]] = ()
+
+    def drawn(self) -> dict[str, Any]:
+        """Geometry for the template, in pixels."""
+        ends = [dot.value if dot.high is None else dot.high for _, row in self.rows for dot in row]
+        high = 1.05 * max(ends, default=1.0) if self.high is None else self.high
+        low = self.low or 0.0
+        if self.logarithmic and self.low is None:
+            low = min(ends, default=0.1) / 1.15
+
+        def at(value: float) -> float:
+            inside = max(min(value, high), low)
+            if self.logarithmic:
+                return _LEFT + _WIDTH * (1.0 - math.log(inside / high) / math.log(low / high))
+            return _LEFT + _WIDTH * (inside - low) / ((high - low) or 1.0)
+
+        ticks = ticks_within(low, high, 8)
+        if self.logarithmic:
+            decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+            marks = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
+            ticks = [(mark, f"{mark:g}") for mark in marks if low <= mark <= high]
+        bottom = _TOP + _ROW * len(self.rows)
+        return {
+            "at": at,
+            "rows": [
+                (name, _TOP + _ROW * (number + 0.5), dots)
+                for number, (name, dots) in enumerate(self.rows)
+            ],
+            "across": [(at(value), text) for value, text in ticks],
+            **{"left": _LEFT, "width": _WIDTH, "top": _TOP, "bottom": bottom},
+            "total": _LEFT + _WIDTH + 40,
+        }
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A number that changes from step to step, as the best of a search does.
+
+    Attributes
+    ----------
+    values : after each step, the first before any.
+    mark : value and name of a line across.
+    """
+
+    finding: str
+    axis: str
+    values: Sequence[float]
+    style: str
+    mark: tuple[float, str]
+    caption: str
+
+    def drawn(self) -> dict[str, Any]:
+        """Geometry for the template, in pixels; a value holds until the next one."""
+        left, width, height, top = 58, 850, 220, 16
+        low, high = min(*self.values, self.mark[0]), max(*self.values, self.mark[0])
+        room = 0.08 * (high - low or high)
+        low, high = low - room, high + room
+        last = max(len(self.values) - 1, 1)
+
+        def across(step: float) -> float:
+            return left + width * step / last
+
+        def down(value: float) -> float:
+            return top + height * (high - value) / (high - low)
+
+        steps = (f"H{across(k):.1f}V{down(value):.1f}" for k, value in enumerate(self.values))
+        whole = ((x, text) for x, text in ticks_within(0.0, last, 10) if x % 1 == 0)
+        return {
+            **{"left": left, "width": width, "top": top, "bottom": top + height},
+            "path": f"M{across(0):.1f} {down(self.values[0]):.1f}" + "".join(steps),
+            "end": (across(len(self.values) - 1), down(self.values[-1])),
+            "mark": down(self.mark[0]),
+            "across": [(across(value), text) for value, text in whole],
+            "down": [(down(value), text) for value, text in ticks_within(low, high, 6)],
+            "total": left + width + 40,
+        }
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Shares of 0 to 1 between things, by row and column.
+
+    Attributes
+    ----------
+    least : share from which on it is written.
+    marked : names that stand out.
+    """
+
+    finding: str
+    names: Sequence[str]
+    shares: Sequence[Sequence[float]]
+    least: float
+    marked: Sequence[str]
+    caption: str
+
+    def drawn(self) -> dict[str, Any]:
+        """Geometry for the template, in pixels."""
+        places = list(zip(self.names, count(_NAMES, _CELL)))
+        rows = [
+            (name, y, [(x, share) for (_, x), share in zip(places, shares, strict=True)])
+            for (name, y), shares in zip(places, self.shares, strict=True)
+        ]
+        size = _NAMES + _CELL * len(places) + 2
+        return {"rows": rows, "cell": _CELL, "left": _NAMES, "size": size}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The figure of a recording, which can be zoomed; see `zoomable`.
+
+    Attributes
+    ----------
+    drawing : its geometry.
+    elsewhere : page of its own; empty where it is on this one.
+    own_files : whether its data and pictures lie beside the page.
+    headed : whether its name and what it says stand above it.
+    """
+
+    drawing: Mapping[str, Any]
+    elsewhere: str = ""
+    own_files: bool = False
+    headed: bool = True
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """The provenance of the summary as it is."""
+
+
+Block = (
+    str
+    | Text
+    | Table
+    | Definitions
+    | Source
+    | Article
+    | Strip
+    | Dots
+    | Steps
+    | Matrix
+    | Recording
+    | Provenance
+)
 
 
 @dataclass(frozen=True)
@@ -148,48 +321,82 @@ class Part:
     Attributes
     ----------
     printed : whether it is in the printed report though it is folded on the page.
-    text : paragraphs.
-    recordings : geometry of figures, see `recordings.placed`.
-    terms : definitions by what is defined.
     """
 
     id: str
     title: str
-    text: tuple[str, ...] = ()
-    strips: tuple[Strip, ...] = ()
-    dots: tuple[Dots, ...] = ()
-    recordings: tuple[Mapping[str, Any], ...] = ()
-    tables: tuple[Rows, ...] = ()
-    terms: Mapping[str, str] = field(default_factory=dict)
+    content: Sequence[Block]
     printed: bool = False
 
 
-def number(value: float | None, text: Callable[[float], str], heat: float | None = None) -> Cell:
-    """A number as a cell.
+@dataclass(frozen=True)
+class Page:
+    """All of a page but the summary.
 
-    >>> number(0.25, "{:.0%}".format), number(None, "{:.0%}".format)
-    (Cell(text='25%', value=0.25, heat=None), Cell(text='n/a', value=None, heat=None))
-    """
-    return Cell("n/a") if value is None else Cell(text(value), value, heat)
-
-
-def write_parts(
-    title: str,
-    summary: Mapping[str, Any],
-    parts: Sequence[Part],
-    path: Path,
-    *,
-    file: str,
-    warnings: Sequence[str] = (),
-) -> None:
-    """Write a page.
-
-    Parameters
+    Attributes
     ----------
-    summary : of which the page is; its answer stands at the top.
     file : of the summary, beside the page.
+    headline : the answer of the summary unless given.
+    related : text of a link by its address.
+    run : what was run.
     """
-    text = rendered(
-        "parts.html", summary, title=title, parts=parts, file=file, warnings=list(warnings)
-    )
-    write_whole(path, text)
+
+    title: str
+    parts: Sequence[Part]
+    file: str = "summary.json"
+    headline: str = ""
+    warnings: Sequence[str] = ()
+    related: Mapping[str, str] = field(default_factory=dict)
+    run: Sequence[Block] = (Provenance(),)
+
+    def write(self, summary: Mapping[str, Any], path: Path) -> Path:
+        """Write the page of a summary; returns its path."""
+        write_whole(path, rendered("page.html", summary, page=self))
+        return path
+
+
+def number(value: float | None, digits: str, heat: float | None = None) -> Cell:
+    """A number as a cell, in a format of Python.
+
+    >>> number(0.25, ".0%").text, number(None, ".0%").text
+    ('25%', 'n/a')
+    """
+    return Cell("n/a") if value is None else Cell(format(value, digits), value, heat)
+
+
+def joined(separator: str, texts: Sequence[str]) -> Markup:
+    """Texts with markup, one after the other."""
+    return Markup(separator).join(texts)
+
+
+def term(word: str, meaning: str) -> Markup:
+    """A word whose meaning is shown where the pointer is."""
+    return Markup('<abbr title="{}">{}</abbr>').format(meaning, word)
+
+
+def zoomable(
+    figures: Sequence[CaseFigure],
+    summary: Mapping[str, Any],
+    folder: Path,
+    *,
+    own_files: bool = False,
+) -> list[Recording]:
+    """Figures for the page of a summary, in their order.
+
+    What does not fit the page any more is written to a page of its own in the folder; the first
+    is always here.
+    """
+    room, blocks = _ROOM, []
+    for place, figure in enumerate(figures):
+        drawn = drawing(figure)
+        room -= drawn["size"]
+        elsewhere = f"{figure.name}.html" if place and room < 0 else ""
+        if elsewhere:
+            Page(
+                title=f"{figure.name}: {figure.title}",
+                parts=[Part("figure", "The recording", [Recording(drawn)])],
+                headline=figure.finding,
+                related={"index.html": "All recordings"},
+            ).write(summary, folder / elsewhere)
+        blocks.append(Recording(drawn, elsewhere, own_files))
+    return blocks

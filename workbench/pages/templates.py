@@ -1,39 +1,28 @@
-"""Templates of the pages, and what all of them share: one file each, readable without scripts."""
+"""The template of all pages: one file each, readable without scripts."""
 
 import hashlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import datetime
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from workbench.pages.figures import DARK, LIGHT
-from workbench.pages.views import percent
-from workbench.system.units import with_interval
 
 
-def _spaced(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def rendered(
-    template: str,
-    summary: Mapping[str, Any],
-    label: Callable[[str], str] = _spaced,
-    **content: object,
-) -> str:
+def rendered(template: str, summary: Mapping[str, Any], **content: object) -> str:
     """A page of a summary.
 
     Parameters
     ----------
-    label : name of an estimator or of an entry, for people.
     content : what the template asks for beside the summary.
     """
     run = summary["provenance"]["run"]
-    found = _environment(label).get_template(template)
-    return found.render(summary=summary, run=run, report=number_of(summary), **content)
+    page = _environment().get_template(template)
+    return page.render(summary=summary, run=run, report=number_of(summary), **content)
 
 
 def number_of(summary: Mapping[str, Any]) -> str:
@@ -47,30 +36,24 @@ def number_of(summary: Mapping[str, Any]) -> str:
     return f"{date}-{hashlib.sha256(content).hexdigest()[:8]}"
 
 
-def _environment(label: Callable[[str], str]) -> Environment:
+@cache
+def _environment() -> Environment:
     """Where the pages find templates, filters and the colours of curves."""
-    found = Environment(
+    environment = Environment(
         autoescape=True,
         loader=PackageLoader("workbench", "pages"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    found.filters |= {
-        "label": label,
-        "percent": percent,
-        "anchor": _anchor,
-        "significant": _significant,
-        "day": _day,
-        "lab": _lab,
-    }
-    found.globals["colours"] = {"light": LIGHT, "dark": DARK}
-    return found
+    environment.filters |= {"anchor": anchor, "day": _day, "form": _form}
+    environment.globals["colours"] = {"light": LIGHT, "dark": DARK}
+    return environment
 
 
-def _lab(one: Mapping[str, Any]) -> str:
-    """A size with its interval, as people in a laboratory say it."""
-    return with_interval(one["value"], one["low"], one["high"], one["unit"])
+def _form(block: object) -> str:
+    """Name of the macro that shows a part of a page."""
+    return type(block).__name__.lower()
 
 
 def _day(date: str) -> str:
@@ -82,10 +65,6 @@ def _day(date: str) -> str:
     return f"{datetime.fromisoformat(date):%-d %B %Y, %H:%M} UTC"
 
 
-def _anchor(name: str) -> str:
+def anchor(name: str) -> str:
+    """Place of a recording on a page."""
     return re.sub(r"\s", "_", name)
-
-
-def _significant(value: object) -> str:
-    """A setting, in a column if it is a number."""
-    return f"{value:>9.4g}" if isinstance(value, (int, float)) else str(value)

@@ -6,7 +6,6 @@ Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential e
 from workbench.runtime.pool import NoWorkersError
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
-from workbench.tuning.figures import draw_cases, draw_convergence
 from workbench.tuning.recipe import (
     Lines,
     Problem,
@@ -47,8 +46,6 @@ __all__ = [
     "TuningResult",
     "Workers",
     "cross_validate",
-    "draw_cases",
-    "draw_convergence",
     "evaluate_all",
     "evaluate_gains",
     "evaluators",

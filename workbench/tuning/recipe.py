@@ -109,7 +109,7 @@ class TuningResult:
 
     def plot(self) -> "Figure":
         """Figure of how the search converged."""
-        from workbench.tuning.figures import convergence
+        from workbench.tuning.report import convergence
 
         return convergence(self.search.history)
 

@@ -1,28 +1,41 @@
-"""The page of `tune`: what the search gained, what is wrong with it, what each gain is worth.
+"""What `tune` writes beside gains: the answer, the page, figures, and the table on the terminal.
 
 Numbers come from the summary alone; what is here orders and places them.
 """
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
-from workbench.pages.answer import Answer, Measure
-from workbench.pages.drawing import ticks_within
-from workbench.pages.templates import rendered
-from workbench.runtime.files import write_whole
+from workbench.pages.answer import Answer, Measure, recordings
+from workbench.pages.parts import (
+    Block,
+    Cell,
+    Definitions,
+    Dot,
+    Dots,
+    Numbers,
+    Page,
+    Part,
+    Source,
+    Steps,
+    Table,
+    number,
+    term,
+)
+from workbench.pages.views import capital, percent
+from workbench.runtime.files import replacing, warning_if_unwritable
+from workbench.tuning.checkpoint import Generation
 from workbench.tuning.validation import NEGLIGIBLE, STEP
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _REASONED, _TUNED = "0", "2"  # styles of curves
-
-
-_DOTS = {"left": 250, "width": 620, "row": 24, "top": 34}  # of the figure of the cases [px]
-
-
-_CURVE = {"left": 58, "width": 850, "height": 220, "top": 16}  # of the convergence [px]
 
 
 def headline(summary: Mapping[str, Any]) -> str:
@@ -97,26 +110,25 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
     ----------
     summary : as written to summary.json.
     """
-    text = rendered(
-        "tuning.html",
-        summary,
+    parts = [
+        Part("cases", "Cases, worst first", [_cases(summary), _dots(summary)]),
+        Part("gains", "Gains", _gains(summary, folder), printed=True),
+        Part("search", "Search", [_convergence(summary), _work(summary)]),
+        Part("definitions", "Definitions", [Definitions(_terms(summary))]),
+    ]
+    if compared := _compared(summary):
+        parts.insert(1, Part("beside", "Other estimators, not tuned", [compared]))
+    if summary["folds"]:
+        parts.insert(1, Part("folds", "On cases not seen, worst first", [_unseen(summary)]))
+    cases = recordings(len(summary["provenance"]["cases"]))
+    page = Page(
+        title=f"{capital(summary['label'])}, tuned on {cases}",
+        parts=parts,
         headline=headline(summary),
-        news=bad_news(summary),
-        cases=_worst_first(summary),
-        gains=_gains(summary),
-        folds=_folds(summary),
-        compared=_compared(summary),
-        dots=_dots(summary),
-        curve=_convergence(summary),
-        styles={"reasoned": _REASONED, "tuned": _TUNED},
-        gains_path=shlex.quote(str(folder / "gains.toml")),
-        follows=summary["follows"],
-        negligible=NEGLIGIBLE,
-        step=STEP,
+        warnings=bad_news(summary),
+        run=[Definitions(_run(summary["provenance"]), grid=True)],
     )
-    path = folder / "index.html"
-    write_whole(path, text)
-    return path
+    return page.write(summary, folder / "index.html")
 
 
 def _worst_first(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -125,25 +137,70 @@ def _worst_first(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     return sorted(cases, key=lambda case: -case["z_k"])
 
 
-def _gains(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Gains with what they do, and what z does when they change; None after an interruption."""
-    rows = []
-    for name, gain in summary["gains"].items():
-        effect = summary["sensitivity"].get(name)
-        remarks = ["⚠ at bound"] if gain["at_bound"] else []
-        if effect is not None and not effect["matters"]:
-            remarks.append("does not matter")
-        if effect is not None and _fall(effect):
-            remarks.append("not converged")
-        rows.append({**gain, "name": name, "effect": effect} | {"remark": ", ".join(remarks)})
-    return rows
+def _z(value: float | None) -> Cell:
+    """A z as a cell; that of what diverges sorts as the worst."""
+    return Cell("diverges", np.inf) if value is None else number(value, ".4f")
 
 
-def _fall(effect: Mapping[str, float | None]) -> float:
-    """How much z would fall if the gain alone were changed; 0 where that is negligible."""
-    changes = (effect["less"], effect["more"], effect["without"])
-    fall = -min((change for change in changes if change is not None), default=0.0)
-    return fall if fall > NEGLIGIBLE else 0.0
+def _change(value: float | None) -> Cell:
+    return _z(value) if value is None else Cell(f"{round(100 * value, 1) + 0:+.1f} %", value)
+
+
+def _cases(summary: Mapping[str, Any]) -> Table:
+    return Table(
+        "case-table",
+        "Objective of each case. A candidate is unstable where its estimate diverged or the model "
+        "failed; it is counted in the case where that showed first.",
+        (
+            "case",
+            Numbers(_z_k(", reasoned")),
+            Numbers("z_k, tuned", sorted="descending"),
+            Numbers("change"),
+            Numbers(
+                "unstable candidates",
+                "gains with which an estimate diverged or the model failed here first",
+            ),
+        ),
+        [
+            (
+                case["name"],
+                number(case["z_k_reasoned"], ".4f"),
+                number(case["z_k"], ".4f"),
+                _change(case["z_k"] / case["z_k_reasoned"] - 1),
+                number(case["unstable"], ""),
+            )
+            for case in _worst_first(summary)
+        ],
+    )
+
+
+def _z_k(suffix: str) -> Markup:
+    meaning = "objective of one case: the mean weighed error over its recording"
+    return term("z_k", meaning) + suffix
+
+
+def _dots(summary: Mapping[str, Any]) -> Dots:
+    cases = _worst_first(summary)
+    pairs = (f"{case['name']} {case['z_k_reasoned']:.4f} to {case['z_k']:.4f}" for case in cases)
+    return Dots(
+        finding=f"Objective of each case, reasoned to tuned: {', '.join(pairs)}.",
+        axis="objective of the case, z_k [1]",
+        rows=[
+            (
+                case["name"],
+                (Dot(case["z_k_reasoned"], _REASONED), Dot(case["z_k"], _TUNED, diamond=True)),
+            )
+            for case in cases
+        ],
+        mark=(summary["z"], "z, tuned"),
+        paired=True,
+        caption=Markup(
+            "Objective of each case with the reasoned and with the tuned gains; the search lowers "
+            'the largest. Data and figure: <a href="summary.json">JSON</a>, '
+            '<a href="cases.png">PNG</a>'
+        ),
+        legend=((_REASONED, "reasoned gains (circle)"), (_TUNED, "tuned gains (diamond)")),
+    )
 
 
 def _folds(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -155,25 +212,113 @@ def _folds(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda fold: -np.inf if fold["tuned"] is None else -fold["tuned"])
 
 
-def _compared(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """These gains among untuned estimators, the least z first; empty if there is none to compare.
+def _unseen(summary: Mapping[str, Any]) -> Table:
+    judged = summary["judged"]
+    below = f", below {summary['bandwidth']:g} Hz" if summary["bandwidth"] else ""
 
-    A z is None where an estimate diverges.
-    """
+    def error(share: float | None) -> Cell:
+        return Cell("not judged", np.inf) if share is None else Cell(percent(share), share)
+
+    return Table(
+        "fold-table",
+        "Gains tuned without some of the cases and judged on these, against the reasoned gains on "
+        f"the same. The error of {judged} is the worst of the cases, rms over mean{below}.",
+        (
+            "left out",
+            Numbers("z, reasoned"),
+            Numbers("z, tuned without them", sorted="descending"),
+            Numbers("z of the cases tuned on"),
+            Numbers(f"error of {judged}, reasoned"),
+            Numbers(f"error of {judged}, tuned without them"),
+            "worst of them",
+            "verdict",
+        ),
+        [
+            (
+                ", ".join(fold["cases"]),
+                *(_z(fold[key]) for key in ("reasoned", "tuned", "z")),
+                *(error(fold[key]) for key in ("error_reasoned", "error")),
+                fold["worst"],
+                "better" if fold["better"] else Cell("⚠ not better", warning=True),
+            )
+            for fold in _folds(summary)
+        ],
+    )
+
+
+def _compared(summary: Mapping[str, Any]) -> Table | None:
+    """These gains among untuned estimators, the least z first; None if there is none to compare."""
     if not summary.get("beside"):
-        return []
+        return None
     name, cases = summary["label"], summary["cases"]
     rows = [
-        {
-            "name": f"{name}, {how}",
-            "z": summary[z],
-            "worst": max(cases, key=lambda c: cases[c][z_k]),
-        }
+        (f"{name}, {how}", summary[z], max(cases, key=lambda case: cases[case][z_k]))
         for how, z, z_k in (("tuned", "z", "z_k"), ("reasoned", "z_reasoned", "z_k_reasoned"))
     ]
-    rows[0]["found"] = True
-    rows += [{"name": entry["label"], **entry} for entry in summary["beside"].values()]
-    return sorted(rows, key=lambda row: np.inf if row["z"] is None else row["z"])
+    rows += [(other["label"], other["z"], other["worst"]) for other in summary["beside"].values()]
+    rows.sort(key=lambda row: np.inf if row[1] is None else row[1])
+    return Table(
+        "beside-table",
+        "The same objective on the same cases, the least worst case first.",
+        ("estimator", Numbers("z", sorted="ascending"), "worst case"),
+        [(label, _z(z), worst) for label, z, worst in rows],
+        marked=[f"{name}, tuned"],
+    )
+
+
+def _gains(summary: Mapping[str, Any], folder: Path) -> list[Block]:
+    """What each gain does and is worth; an interrupted search does not say what z does by it."""
+    known = summary["sensitivity"]
+    good = term("as good", f"with a z that is larger by {100 * NEGLIGIBLE:g} % at most")
+    changes = (
+        ", and how z changes when this gain alone becomes a little less, a little more, or zero"
+        if known
+        else ""
+    )
+    caption = Markup(
+        "Each gain, the range that was searched, and that of the last candidates that are {}, in "
+        "which all gains change at once: a wide one is made up for by others{}."
+    ).format(good, changes)
+    rows = []
+    for name, gain in summary["gains"].items():
+        effect = known.get(name)
+        remarks = ["⚠ at bound"] if gain["at_bound"] else []
+        if effect is not None and not effect["matters"]:
+            remarks.append("does not matter")
+        if effect is not None and _fall(effect):
+            remarks.append("not converged")
+        low, high = gain["as_good"]
+        cells = [
+            gain["meaning"],
+            number(gain["value"], ".4g"),
+            number(gain["reasoned"], ".4g"),
+            f"{gain['lower']:.4g}, {gain['upper']:.4g}",
+            f"{low:.4g}, {high:.4g}",
+            gain["unit"],
+        ]
+        if effect is not None:
+            cells += [_change(effect[key]) for key in ("less", "more", "without")]
+        rows.append((name, *cells, Cell(", ".join(remarks), warning=gain["at_bound"])))
+    columns: list[object] = ["gain", "what it does", Numbers("tuned"), Numbers("reasoned")]
+    columns += ["searched from, to", "as good, from, to", "unit"]
+    if known:
+        columns += [Numbers("z, less"), Numbers("z, more"), Numbers("z, without")]
+    interrupted = "The search was interrupted before it was found what z does when a gain changes."
+    use = Markup('With all digits in <a href="gains.toml">gains.toml</a>. To use them:')
+    path = shlex.quote(str(folder / "gains.toml"))
+    return [
+        *([] if known else [interrupted]),
+        Table("gain-table", caption, [*columns, "remark"], rows),
+        use,
+        Source(f"python -m workbench simulate --gains {path}"),
+    ]
+
+
+def _fall(effect: Mapping[str, float | None]) -> float:
+    """How much z would fall if the gain alone were changed; 0 where that is negligible."""
+    changes = (effect["less"], effect["more"], effect["without"])
+    fall = -min((change for change in changes if change is not None), default=0.0)
+    return fall if fall > NEGLIGIBLE else 0.0
 
 
 def _why(summary: Mapping[str, Any], fold: Mapping[str, Any]) -> str:
@@ -187,60 +332,157 @@ def _why(summary: Mapping[str, Any], fold: Mapping[str, Any]) -> str:
     return f"{change} loses also where it is tuned on, because the worst case gains at its cost"
 
 
-def _dots(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Pairs of dots on an axis from zero, in pixels, the worst case first."""
-    cases = _worst_first(summary)
-    left, width, row, top = _DOTS["left"], _DOTS["width"], _DOTS["row"], _DOTS["top"]
-    high = 1.05 * max(case[key] for case in cases for key in ("z_k", "z_k_reasoned"))
+def _convergence(summary: Mapping[str, Any]) -> Steps:
+    best, reasoned = summary["convergence"], summary["z_reasoned"]
+    return Steps(
+        finding=f"Best z by generation: {best[0]:.4f} at first, {best[-1]:.4f} after "
+        f"{summary['work']['generations']} generations; {reasoned:.4f} with the reasoned gains.",
+        axis="generation; 0 is the initial population",
+        values=best,
+        style=_TUNED,
+        mark=(reasoned, "reasoned gains"),
+        caption=Markup(
+            "z of the best candidate. Data and figure, with the work saved and the unstable "
+            'candidates: <a href="summary.json">JSON</a>, <a href="convergence.png">PNG</a>'
+        ),
+    )
 
-    def at(value: float) -> float:
-        return float(left + width * value / high)
 
-    return {
-        **_DOTS,
-        "rows": [
-            {
-                "name": case["name"],
-                "y": top + row * (k + 0.5),
-                "reasoned": at(case["z_k_reasoned"]),
-                "tuned": at(case["z_k"]),
-            }
-            for k, case in enumerate(cases)
-        ],
-        "z": at(summary["z"]),
-        "ticks": [(at(value), text) for value, text in ticks_within(0.0, high, 8)],
-        "bottom": top + row * len(cases),
-        "total": left + width + 40,
+def _work(summary: Mapping[str, Any]) -> Definitions:
+    work = summary["work"]
+    unstable = sum(case["unstable"] for case in summary["cases"].values())
+    converged = ", then converged: z of all candidates was the same" * work["converged"]
+    terms = {
+        "Generations": f"{work['generations']}{', then interrupted' * work['interrupted']}"
+        f"{converged}",
+        "As good": f"{work['as_good']} of the last {work['last']} candidates, within "
+        f"{100 * NEGLIGIBLE:g} % of the best z",
+        "Candidates": f"{work['candidates']}, of which {unstable} were unstable",
+        "Work saved": f"{percent(work['saved'])}, by dropping candidates that have lost",
+        "Time": f"{work['seconds']:.1f} s",
+        "Crashed or blocked workers": str(work["crashed"]),
+    }
+    return Definitions(terms, grid=True)
+
+
+def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
+    provenance, follows = summary["provenance"], summary["follows"]
+    below = f", below {summary['bandwidth']:g} Hz" if summary["bandwidth"] else ""
+    weighed = " + ".join(f"{w} · |error of {name}|" for name, w in provenance["weights"].items())
+    scaled = "".join(
+        f", and again with {name} {100 * error:g} % off, alternately to both sides, as a sensor "
+        "reads whose scale is not known better: gains that trust the difference of two outputs to "
+        "the last digit fail on any other machine"
+        for name, error in provenance["scale_errors"].items()
+    )
+    judged = f"Each case as it is{scaled}."
+    if (judge := provenance["judged_by"]) != "sensors":
+        judged += (
+            f" What no output of the model measures is judged by the {judge}, which knows the "
+            "whole recording, not by a sensor."
+        )
+    terms = {
+        "Objective z": "The largest z_k of all cases, equations (11) and (12) of Schwarz, "
+        "Brembeck, Heckmann (2018): z_k is the mean over the whole recording of "
+        f"{weighed} in SI units{below}.",
+        "Recordings that are judged": judged,
+    }
+    observer = "L11" in summary["gains"]
+    if observer and follows:
+        terms["Candidates refused"] = (
+            f"Those that leave more than {100 * follows['left']:g} % of a step of "
+            f"{follows['quantity']} {follows['within']:g} s or four times as long after it, by the "
+            "linearised model: they would have measured signals right while what is estimated "
+            "drifts behind."
+        )
+    terms["Reasoned gains"] = (
+        "Those before tuning, from the linearised model or the noise of the sensors. The search "
+        "starts around them."
+    )
+    if observer:
+        terms["What a gain does"] = (
+            "It corrects the first by the second: by the deviation of a measured output from its "
+            "estimate, or by the integral ∫ of this deviation."
+        )
+    return terms | {
+        "Bounds": "From the slowest loop that a recording shows to the fastest that its samples "
+        "carry; for levels of noise, a hundredth to a hundred times the reasoned ones. A gain "
+        "within 1 % of its range from an end is at a bound: something better may lie beyond, or it "
+        "does not matter.",
+        "A little less, a little more": f"{100 * STEP:g} % of the searched range, on its "
+        f"logarithmic scale. A gain does not matter if z stays within {100 * NEGLIGIBLE:g} % with "
+        "less, with more and without it; it has not converged if z falls by more than that.",
+        "Work saved": "z_k only grows along a recording, so that a candidate has lost as soon as "
+        "it exceeds the one it has to beat, and the rest of its samples need no evaluation. The "
+        "result is the same.",
     }
 
 
-def _convergence(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Best z by generation, in pixels; it holds until a better candidate is found."""
-    best, before = summary["convergence"], summary["z_reasoned"]
-    left, width, height, top = (_CURVE[key] for key in ("left", "width", "height", "top"))
-    low, high = min(*best, before), max(*best, before)
-    room = 0.08 * (high - low or high)
-    low, high = low - room, high + room
-    last = len(best) - 1
-
-    def across(generation: float) -> float:
-        return left + width * generation / max(last, 1)
-
-    def down(z: float) -> float:
-        return float(top + height * (high - z) / (high - low))
-
-    steps = (f"H{across(k):.1f}V{down(z):.1f}" for k, z in enumerate(best))
-    whole = ((value, text) for value, text in ticks_within(0.0, max(last, 1), 10) if value % 1 == 0)
+def _run(provenance: Mapping[str, Any]) -> dict[str, str]:
+    """What was run, by what it is."""
+    fmu = provenance["fmu"]
+    packages = "".join(f", {name} {release}" for name, release in provenance["packages"].items())
     return {
-        **_CURVE,
-        "path": f"M{across(0):.1f} {down(best[0]):.1f}" + "".join(steps),
-        "end": (across(last), down(best[-1])),
-        "before": down(before),
-        "across": [(across(value), text) for value, text in whole],
-        "down": [(down(value), text) for value, text in ticks_within(low, high, 6)],
-        "bottom": top + height,
-        "total": left + width + 40,
+        "Model": f"{fmu['model']}, from {fmu['file']}",
+        "SHA-256 of the FMU": Markup("<code>{}</code>").format(fmu["sha256"]),
+        "Versions": f"workbench {provenance['workbench']}, Python {provenance['python']}{packages}",
+        "Cases": ", ".join(provenance["cases"]),
+        "Random seed": str(provenance["seed"]),
+        "Candidates per gain": str(provenance["population"]),
+        **{
+            f"Scale of {name}": f"{100 * error:g} % off"
+            for name, error in provenance["scale_errors"].items()
+        },
+        "Weights of z": ", ".join(f"{name} = {w}" for name, w in provenance["weights"].items()),
     }
+
+
+def draw_convergence(history: Sequence[Generation], path: Path) -> None:
+    """Draw `convergence` to a file."""
+    _save(convergence(history), path)
+
+
+def convergence(history: Sequence[Generation]) -> "Figure":
+    """Best z and share of work saved, by generation."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    generations = np.arange(len(history))
+    top.step(generations, [g.z for g in history], where="post")
+    top.set(ylabel="best z [1]", title=f"z = {history[-1].z:.4g}, worst case {history[-1].worst}")
+    bottom.plot(generations, [100 * g.saved for g in history], label="work saved")
+    share = [100 * sum(g.unstable.values()) / g.candidates for g in history]
+    bottom.plot(generations, share, "--", label="unstable candidates")
+    bottom.set(xlabel="generation", ylabel="[%]", ylim=(0, 100))
+    bottom.legend()
+    for axes in (top, bottom):
+        axes.grid(alpha=0.3)
+    return figure
+
+
+def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """Draw z_k of each case of a summary with reasoned and with tuned gains."""
+    from matplotlib.figure import Figure
+
+    names = list(cases)
+    before, after = ([case[z] for case in cases.values()] for z in ("z_k_reasoned", "z_k"))
+    figure = Figure(figsize=(8, 1.2 + 0.32 * len(names)), layout="constrained")
+    axes = figure.subplots()
+    rows = np.arange(len(names))
+    axes.barh(rows - 0.2, before, 0.4, label="reasoned", color="0.7")
+    axes.barh(rows + 0.2, after, 0.4, label="tuned")
+    axes.axvline(max(after), color="0.3", linestyle=":", label="z, tuned")
+    axes.set_yticks(rows, names)
+    axes.invert_yaxis()
+    axes.set_xlabel("z_k [1]")
+    axes.legend()
+    _save(figure, path)
+
+
+def _save(figure: "Figure", path: Path) -> None:
+    with warning_if_unwritable(), replacing(path) as stream:
+        figure.savefig(stream, format="png", dpi=120)
 
 
 def format_tuned(summary: Mapping[str, Any]) -> str:

@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import matplotlib as mpl
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from workbench.diagnosis import Outcome
 from workbench.diagnosis.laws import Proposal
 from workbench.diagnosis.report import relate_diagnosis, write_diagnosis
-from workbench.pages.figures import LIGHT, STYLE, save_figure
+from workbench.pages.figures import LIGHT, save_figure, styled
 from workbench.runtime.files import write_json, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PROPOSED = "proposed"  # folder below that of the diagnosis
 _SHOWN = 3
@@ -47,14 +47,13 @@ def write_proposal(
     return told
 
 
-def functions_figure(found: Proposal) -> Figure:
+def functions_figure(found: Proposal) -> "Figure":
     """Draw the likeliest functions with the 95 % bands of their shapes."""
     shown = [estimate for estimate in found.estimates if estimate.law.influence is not None][
         :_SHOWN
     ]
     table = found.functions()
-    with mpl.rc_context(STYLE | {"font.size": 8}):
-        sheet = Figure(figsize=(4.2 * max(1, len(shown)), 3.0), layout="constrained")
+    with styled(4.2 * max(1, len(shown)), 3.0, font_size=8) as sheet:
         for axes, one in zip(
             sheet.subplots(1, max(1, len(shown)), squeeze=False)[0], shown, strict=False
         ):

@@ -9,7 +9,7 @@ from workbench.machines.wheelset.accuracy import COVERED, ROWS, StopAccuracy, co
 from workbench.machines.wheelset.accuracy_report import cell
 from workbench.observers import label
 from workbench.pages.figures import ESTIMATORS
-from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
+from workbench.pages.parts import Definitions, Dot, Dots, Numbers, Page, Part, Table, number
 from workbench.system.system import System
 
 
@@ -29,30 +29,22 @@ def write_accuracy_page(
         for name, result in stop.estimators.items()
         if result.failure
     ]
+    shown = "Each dot is a stop: error of the estimated force, rms over the mean of the truth."
+    terms = {
+        name.replace("_", " "): f"{quantity['text']} [{quantity['unit']}]"
+        for name, quantity in summary["quantities"].items()
+    }
     parts = [
-        Part(
-            "shown",
-            "Error of the force in every stop",
-            ("Each dot is a stop: error of the estimated force, rms over the mean of the truth.",),
-            dots=(_forces(stops, names),),
-        ),
-        Part("worst", "Worst stop by quantity", tables=(_worst(stops, names),), printed=True),
-        Part("stops", "Every stop", tables=(_stops(stops, names),)),
-        Part(
-            "definitions",
-            "Definitions",
-            terms={
-                name.replace("_", " "): f"{quantity['text']} [{quantity['unit']}]"
-                for name, quantity in summary["quantities"].items()
-            },
-        ),
+        Part("shown", "Error of the force in every stop", [shown, _forces(stops, names)]),
+        Part("worst", "Worst stop by quantity", [_worst(stops, names)], printed=True),
+        Part("stops", "Every stop", [_stops(stops, names)]),
+        Part("definitions", "Definitions", [Definitions(terms)]),
     ]
-    if any(covered(stops, name, one) is not None for name in names for one in COVERED):
-        parts.insert(2, Part("bands", "What the bands hold", tables=(_bands(stops, names),)))
-    path = out / "index.html"
+    if any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED):
+        parts.insert(2, Part("bands", "What the bands hold", [_bands(stops, names)]))
     title = f"Estimates against the truth of {len(stops)} stops"
-    write_parts(title, summary, parts, path, file="accuracy.json", warnings=failures)
-    return path
+    page = Page(title, parts, "accuracy.json", warnings=failures)
+    return page.write(summary, out / "index.html")
 
 
 def _forces(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Dots:
@@ -68,62 +60,39 @@ def _forces(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Dots:
     return Dots(finding, "error of the force [%], logarithmic", tuple(rows), logarithmic=True)
 
 
-def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
-    rows = tuple(
-        (
-            row.text,
-            tuple(
-                Cell(f"{cell(row, one)} ({one.stop})" if one else "")
-                for one in (worst(row, stops, name) for name in names)
-            ),
-        )
-        for row in ROWS
-    )
-    columns = (
-        Heading("quantity", number=False),
-        *(Heading(text, number=False) for text in names.values()),
-    )
+def _worst(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
+    rows = []
+    for row in ROWS:
+        stops_of_row = (worst(row, stops, name) for name in names)
+        cells = (f"{cell(row, stop)} ({stop.stop})" if stop else "" for stop in stops_of_row)
+        rows.append((row.text, *cells))
     caption = "The worst of the stops that a row concerns, below 5 Hz; the stop in brackets."
-    return Rows("worst-table", caption, columns, rows)
+    return Table("worst-table", caption, ("quantity", *names.values()), rows)
 
 
-def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
+def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
     rows = []
     for least in (False, True):
         for quantity in COVERED:
             shares = [covered(stops, name, quantity, least=least) for name in names]
             cells = (
-                number(None if share is None else 100.0 * share, "{:.1f}".format, share)
-                for share in shares
+                number(None if share is None else 100.0 * share, ".1f", share) for share in shares
             )
-            rows.append((f"{quantity}, {'least' if least else 'mean'}", tuple(cells)))
-    columns = (
-        Heading("quantity", number=False),
-        *(Heading(f"{name} [%]") for name in names.values()),
-    )
+            rows.append((f"{quantity}, {'least' if least else 'mean'}", *cells))
+    columns = ("quantity", *(Numbers(f"{name} [%]") for name in names.values()))
     caption = (
         "Share of samples in which a 95 % band holds the truth: mean of all stops, and the stop in "
         "which it does so least; far below 95 % the filter is overconfident there."
     )
-    return Rows("band-table", caption, columns, tuple(rows))
+    return Table("band-table", caption, columns, rows)
 
 
-def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Rows:
+def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
     rows = []
     for stop in stops:
         forces = (stop.estimators[name].force for name in names)
-        cells = tuple(
-            number(
-                None if force is None or not math.isfinite(force) else 100.0 * force,
-                "{:.2f}".format,
-            )
-            for force in forces
-        )
-        rows.append((stop.name, (Cell(stop.title), *cells)))
-    columns = (
-        Heading("stop", number=False),
-        Heading("conditions", number=False),
-        *(Heading(f"{text} [%]") for text in names.values()),
-    )
+        known = (None if f is None or not math.isfinite(f) else 100.0 * f for f in forces)
+        rows.append((stop.name, stop.title, *(number(force, ".2f") for force in known)))
+    columns = ("stop", "conditions", *(Numbers(f"{text} [%]") for text in names.values()))
     caption = "Error of the force in each stop; all quantities are in accuracy.csv."
-    return Rows("stop-table", caption, columns, tuple(rows))
+    return Table("stop-table", caption, columns, rows)

@@ -3,16 +3,12 @@
 import math
 from dataclasses import asdict, dataclass
 from html import escape
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from workbench.arrays import Vector
-from workbench.pages.figures import LIGHT, STYLE
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Tail, plain_runs
@@ -28,12 +24,11 @@ from workbench.system.stopping import SPEED, AskedQuantity
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
-
-
 _BAND = 0.95
-
-
 _SEEN = 0.1  # share of the range of past stops by which one may be beyond it, and is near
 
 
@@ -372,6 +367,8 @@ class Distance:
 
     def plot(self) -> "Figure":
         """Figure of the distribution, of past stops beside predictions, and of the safety level."""
+        from workbench.studies.distance.report import distance_figure
+
         return distance_figure(self)
 
     def _repr_html_(self) -> str:
@@ -398,75 +395,3 @@ def _told(safety: Safety) -> list[str]:
             f"   {level.variation:8.3f}    {level.plain_stops:.1e} stops, {level.plain_hours:.1e} h"
         )
     return lines
-
-
-_MOST = 60  # past stops that have names below the figure
-
-
-def distance_figure(found: Distance) -> Figure:
-    """Draw the distribution with its quantiles, past stops with their bands, the safety level."""
-    rows = 2 if found.safety is None else 3
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(9.0, 0.5 + 2.9 * rows), layout="constrained")
-        panels = sheet.subplots(rows)
-        _distribution(panels[0], found)
-        _past(panels[1], found.past)
-        if found.safety is not None:
-            _levels(panels[2], found.safety)
-    return sheet
-
-
-def _distribution(axes: Axes, found: Distance) -> None:
-    distances = found.ahead.distances
-    axes.hist(distances, bins=60, density=True, color=LIGHT["raw"], alpha=0.5)
-    top = axes.get_ylim()[1]
-    for share in QUANTILES:
-        at = found.ahead.quantile(share)
-        axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
-        axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
-    axes.axvline(found.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
-    axes.legend(fontsize=7, frameon=False)
-    axes.set(title=found.sentence, xlabel="distance [m]", ylabel="density [1/m]")
-    axes.title.set_fontsize(9)
-
-
-def _past(axes: Axes, past: tuple[PastStop, ...]) -> None:
-    """Each stop and its band, over the middle of what the others predict."""
-    middle = np.array([one.forecast.quantile(0.5) for one in past])
-    low, high = np.array([one.forecast.band for one in past]).T / middle
-    made = np.array([one.recorded.distance for one in past]) / middle
-    inside = np.array([not one.recorded.outside for one in past])
-    place = np.arange(len(past))
-    axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
-    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
-    axes.plot(
-        *(place[~inside], made[~inside], "x"),
-        color=LIGHT["1"],
-        markersize=5,
-        label="beyond what the model claims",
-    )
-    axes.legend(fontsize=7, frameon=False)
-    axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
-    names = [one.recorded.stop.name for one in past] if len(past) <= _MOST else []
-    axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
-
-
-def _levels(axes: Axes, safety: Safety) -> None:
-    decades = np.array([level.decade for level in safety.levels])
-    ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
-    axes.errorbar(
-        *(decades, ratio),
-        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
-        color=LIGHT["2"],
-        marker="o",
-        markersize=4,
-        capsize=3,
-    )
-    axes.set(
-        title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
-        "stop in so many reach",
-        xlabel="one stop in",
-        ylabel="ratio",
-    )
-    axes.title.set_fontsize(9)
-    axes.set_xticks(decades, [f"1e{k}" for k in decades])

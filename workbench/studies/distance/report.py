@@ -1,69 +1,194 @@
-"""Files of a predicted distance: distance.json, three tables, a figure, the page."""
+"""Files of a predicted distance: distance.json, tables, a figure, the page."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from workbench.pages.answer import Answer, Measure, with_answer
-from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure
-from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
-from workbench.pages.recordings import placed
+from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
+from workbench.pages.parts import (
+    Definitions,
+    Dot,
+    Dots,
+    Numbers,
+    Page,
+    Part,
+    Table,
+    number,
+    zoomable,
+)
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.distance import Distance
-from workbench.studies.distance.outcome import PastStop, distance_figure
+from workbench.studies.distance.outcome import QUANTILES, PastStop, Safety
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST = 60  # past stops that have names below the figure
 _POINTS = 200  # of the drawn distribution
-
-
 _MADE, _AWAY = "2", "7"
-
-
 _LESS = "stop shorter"
+_RATE = Numbers("deceleration [m/s2]", "equivalent, after the response")
+_EXPLAINED = (
+    "How likely the stop that was asked for is shorter than any distance; 95 of 100 are in the "
+    "shaded range. Below it each past stop beside what the others predict of it, without having "
+    "seen it: the line is where 95 of 100 are expected, the point what was measured."
+)
+_TERMS = {
+    "Predicted by the others": "The fit to all stops but this one, with what the model left of "
+    "them.",
+    "Beyond what the model claims": "The system file says where: such a stop says nothing of the "
+    "model, and its distance is no prediction.",
+    "Deceleration": "Equivalent: constant after the response, over the same distance (EN 14531-1).",
+    "Safety level": "By subset simulation (Au and Beck 2001). Beyond what the past stops show it "
+    "follows from tolerances and from the forms of their distributions.",
+    "Sheet": "The model with its nominal parameters, before any stop was looked at.",
+}
 
 
-def write_distance_page(found: Distance, summary: Mapping[str, Any], out: Path) -> Path:
+def write_distance(result: Distance, provenance: Mapping[str, Any], out: Path) -> Path:
+    """Write distance.json, tables as CSV, the figure and the page; returns this.
+
+    Parameters
+    ----------
+    provenance : what was run.
+    """
+    content = {**result.to_dict(), "provenance": provenance}
+    summary = with_answer(distance_answer(content), content)
+    write_json(out / "distance.json", summary)
+    tables = {"stops": result.to_frame(), "quantiles": result.quantiles()}
+    if result.safety is not None:
+        tables["safety"] = pd.DataFrame(map(asdict, result.safety.levels))
+    if result.plain is not None:
+        tables["plain"] = pd.DataFrame(map(asdict, result.plain.levels))
+    for name, table in tables.items():
+        write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
+    save_figure(distance_figure(result), [out / "distance.png", out / "distance.svg"])
+    return write_distance_page(result, summary, out)
+
+
+def distance_answer(summary: Mapping[str, Any]) -> Answer:
+    """The answer of `distance`."""
+    shares = summary["distance"]
+    middle, low, high = (shares[share] for share in ("0.5", "0.025", "0.975"))
+    headline = {
+        "distance": Measure(middle, "m", "lower", low, high),
+        "deceleration": Measure(summary["deceleration"], "m/s2", "higher"),
+    }
+    for one in summary["safety"] or []:
+        name = f"deceleration over the nominal one, all but one stop in 1e{one['decade']}"
+        headline[name] = Measure(one["ratio"], "1", "higher", one["low"], one["high"])
+    details = {
+        f"{stop['stop']}: measured over predicted distance": Measure(
+            stop["distance [m]"] / stop["predicted [m]"], "1"
+        )
+        for stop in summary["stops"]
+    }
+    return Answer(summary["sentence"], headline, details)
+
+
+def distance_figure(result: Distance) -> "Figure":
+    """Draw the distribution with its quantiles, past stops with their bands, the safety level."""
+    rows = 2 if result.safety is None else 3
+    with styled(9.0, 0.5 + 2.9 * rows) as sheet:
+        panels = sheet.subplots(rows)
+        _draw_distribution(panels[0], result)
+        _draw_past(panels[1], result.past)
+        if result.safety is not None:
+            _draw_levels(panels[2], result.safety)
+    return sheet
+
+
+def _draw_distribution(axes: "Axes", result: Distance) -> None:
+    distances = result.ahead.distances
+    axes.hist(distances, bins=60, density=True, color=LIGHT["raw"], alpha=0.5)
+    top = axes.get_ylim()[1]
+    for share in QUANTILES:
+        at = result.ahead.quantile(share)
+        axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
+        axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
+    axes.axvline(result.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title=result.sentence, xlabel="distance [m]", ylabel="density [1/m]")
+    axes.title.set_fontsize(9)
+
+
+def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
+    """Each stop and its band, over the middle of what the others predict."""
+    middle = np.array([one.forecast.quantile(0.5) for one in past])
+    low, high = np.array([one.forecast.band for one in past]).T / middle
+    made = np.array([one.recorded.distance for one in past]) / middle
+    inside = np.array([not one.recorded.outside for one in past])
+    place = np.arange(len(past))
+    axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
+    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
+    axes.plot(
+        *(place[~inside], made[~inside], "x"),
+        color=LIGHT["1"],
+        markersize=5,
+        label="beyond what the model claims",
+    )
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
+    names = [one.recorded.stop.name for one in past] if len(past) <= _MOST else []
+    axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
+
+
+def _draw_levels(axes: "Axes", safety: Safety) -> None:
+    decades = np.array([level.decade for level in safety.levels])
+    ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
+    axes.errorbar(
+        *(decades, ratio),
+        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
+        color=LIGHT["2"],
+        marker="o",
+        markersize=4,
+        capsize=3,
+    )
+    axes.set(
+        title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
+        "stop in so many reach",
+        xlabel="one stop in",
+        ylabel="ratio",
+    )
+    axes.title.set_fontsize(9)
+    axes.set_xticks(decades, [f"1e{k}" for k in decades])
+
+
+def write_distance_page(result: Distance, summary: Mapping[str, Any], out: Path) -> Path:
     """Write the page into the folder; returns its path.
 
     Parameters
     ----------
     summary : as written to distance.json.
     """
+    (distribution,) = zoomable([_distribution(result)], summary, out)
     parts = [
         Part(
             "shown",
             "The stop that was asked for, and those that were made",
-            (_EXPLAINED,),
-            dots=(_past(found.past),),
-            recordings=tuple(placed([_distribution(found)], summary, out)),
+            [_EXPLAINED, distribution, _past(result.past)],
         ),
-        Part("quantiles", "Distances by chance", tables=(_quantiles(found),), printed=True),
-        Part("stops", "Stops that were made", tables=(_stops(found),), printed=True),
-        Part("definitions", "Definitions", terms=_TERMS),
+        Part("quantiles", "Distances by chance", [_quantiles(result)], printed=True),
+        Part("stops", "Stops that were made", [_stops(result)], printed=True),
+        Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
-    if found.safety is not None:
-        level = Part("safety", "Safety level", dots=(_levels(summary),), tables=(_safety(summary),))
-        parts.insert(2, level)
+    if safety := summary["safety"]:
+        parts.insert(2, Part("safety", "Safety level", [_levels(safety), _safety(safety)]))
     warnings = list(summary["warnings"])
-    if found.interrupted:
+    if result.interrupted:
         warnings.insert(0, "Interrupted: runs of the safety level are missing.")
-    path = out / "index.html"
     title = "Distance of a stop that was not made"
-    write_parts(title, summary, parts, path, file="distance.json", warnings=warnings)
-    return path
+    page = Page(title, parts, "distance.json", warnings=warnings)
+    return page.write(summary, out / "index.html")
 
 
-_EXPLAINED = (
-    "How likely the stop that was asked for is shorter than any distance; 95 of 100 are in the "
-    "shaded range. Below it each past stop beside what the others predict of it, without having "
-    "seen it: the line is where 95 of 100 are expected, the point what was measured."
-)
-
-
-def _past(past: tuple[PastStop, ...]) -> Dots:
+def _past(past: Sequence[PastStop]) -> Dots:
     """Measured over the middle of what the others predict, on its band."""
     rows, ends = [], []
     for one in past:
@@ -86,19 +211,19 @@ def _past(past: tuple[PastStop, ...]) -> Dots:
     return Dots(finding, axis, tuple(rows), (1.0, "predicted"), min(ends), max(ends))
 
 
-def _distribution(found: Distance) -> CaseFigure:
+def _distribution(result: Distance) -> CaseFigure:
     """Share of stops that are shorter, over the distance."""
-    ahead = found.ahead
+    ahead = result.ahead
     # Its far ends are those of the safety level, which say more than what was drawn there.
     at = np.linspace(ahead.quantile(0.001), ahead.quantile(0.999), _POINTS)
     share = 100.0 * np.searchsorted(ahead.distances, at) / ahead.distances.size
-    sheet = np.where(at >= found.nominal, 100.0, 0.0)
+    sheet = np.where(at >= result.nominal, 100.0, 0.0)
     curves = (Curve("2", share), Curve("raw", sheet))
     panel = Panel("Stops that are shorter [%]", "%", 0.0, 105.0, 1.6, curves)
     return CaseFigure(
         name="The stop that was asked for",
-        title=found.sentence.removesuffix("."),
-        finding=f"As its sheet says, the model goes {found.nominal:.1f} m.",
+        title=result.sentence.removesuffix("."),
+        finding=f"As its sheet says, the model goes {result.nominal:.1f} m.",
         time=at,
         window=ahead.band,
         legend=(("2", _LESS), ("raw", "model as its sheet says")),
@@ -107,143 +232,80 @@ def _distribution(found: Distance) -> CaseFigure:
     )
 
 
-def _quantiles(found: Distance) -> Rows:
-    frame = found.quantiles()
-    columns = (
-        Heading(_LESS, number=False),
-        Heading("distance [m]"),
-        Heading("deceleration [m/s2]", meaning="equivalent, after the response"),
-    )
-    rows = tuple(
-        (
-            f"{100.0 * share:g} %",
-            (number(distance, "{:.1f}".format), number(rate, "{:.3f}".format)),
-        )
-        for share, distance, rate in frame.to_numpy()
-    )
-    return Rows("quantile-table", "The stop that was asked for.", columns, rows)
+def _quantiles(result: Distance) -> Table:
+    rows = [
+        (f"{100.0 * share:g} %", number(distance, ".1f"), number(rate, ".3f"))
+        for share, distance, rate in result.quantiles().to_numpy()
+    ]
+    columns = (_LESS, Numbers("distance [m]"), _RATE)
+    return Table("quantile-table", "The stop that was asked for.", columns, rows)
 
 
-def _stops(found: Distance) -> Rows:
+def _stops(result: Distance) -> Table:
     columns = (
-        Heading("stop", number=False),
-        Heading("speed [km/h]"),
-        Heading("measured [m]"),
-        Heading("predicted [m]", meaning="middle of what the other stops say"),
-        Heading("95 % from [m]"),
-        Heading("to [m]"),
-        Heading("deceleration [m/s2]", meaning="equivalent, after the response"),
-        Heading("corrected [m]", meaning="to nominal speed, mass and a level, straight way"),
-        Heading("remark", number=False),
+        "stop",
+        Numbers("speed [km/h]"),
+        Numbers("measured [m]"),
+        Numbers("predicted [m]", "middle of what the other stops say"),
+        Numbers("95 % from [m]"),
+        Numbers("to [m]"),
+        _RATE,
+        Numbers("corrected [m]", "to nominal speed, mass and a level, straight way"),
+        "remark",
     )
     rows = []
-    for one in found.to_frame().to_dict("records"):
-        nominal = one["nominal_distance [m]"]
-        remark = one["outside"] or ("" if one["held"] else "not in its range")
-        cells = [
-            number(3.6 * one["speed [m/s]"], "{:.1f}".format),
-            *(number(one[f"{key} [m]"], "{:.1f}".format) for key in _OF_A_STOP),
-            number(one["deceleration [m/s2]"], "{:.3f}".format),
-            number(None if np.isnan(nominal) else nominal, "{:.1f}".format),
-            Cell(remark),
-        ]
-        rows.append((str(one["stop"]), tuple(cells)))
+    for stop in result.to_frame().to_dict("records"):
+        nominal = stop["nominal_distance [m]"]
+        distances = (stop[f"{key} [m]"] for key in ("distance", "predicted", "low", "high"))
+        row = (
+            str(stop["stop"]),
+            number(3.6 * stop["speed [m/s]"], ".1f"),
+            *(number(distance, ".1f") for distance in distances),
+            number(stop["deceleration [m/s2]"], ".3f"),
+            number(None if np.isnan(nominal) else nominal, ".1f"),
+            stop["outside"] or ("" if stop["held"] else "not in its range"),
+        )
+        rows.append(row)
     caption = "Past stops, each as it was measured and as the others predict it."
-    return Rows("stop-table", caption, columns, tuple(rows))
+    return Table("stop-table", caption, columns, rows)
 
 
-_OF_A_STOP = ("distance", "predicted", "low", "high")
-
-
-def _levels(summary: Mapping[str, Any]) -> Dots:
-    rows = tuple(
-        (f"one stop in 1e{one['decade']}", (Dot(one["ratio"], _MADE, one["low"], one["high"]),))
-        for one in summary["safety"]
-    )
-    last = summary["safety"][-1]
+def _levels(safety: Sequence[Mapping[str, Any]]) -> Dots:
+    rows = [
+        (
+            f"one stop in 1e{level['decade']}",
+            (Dot(level["ratio"], _MADE, level["low"], level["high"]),),
+        )
+        for level in safety
+    ]
+    last = safety[-1]
     finding = (
         f"All but one stop in 1e{last['decade']} reach {last['ratio']:.3f} of the nominal "
         f"deceleration (95 %: {last['low']:.3f} to {last['high']:.3f})."
     )
-    ends = [end for one in summary["safety"] for end in (one["low"], one["high"])]
+    ends = [end for level in safety for end in (level["low"], level["high"])]
     room = 0.05 * (max(ends) - min(ends))
     axis = "deceleration that is reached, over the nominal one"
     return Dots(finding, axis, rows, None, min(ends) - room, max(ends) + room)
 
 
-def _safety(summary: Mapping[str, Any]) -> Rows:
+def _safety(safety: Sequence[Mapping[str, Any]]) -> Table:
     columns = (
-        Heading("one stop in", number=False),
-        Heading("ratio"),
-        Heading("95 % from"),
-        Heading("to"),
-        Heading("variation [%]", meaning="of the probability, from run to run"),
-        Heading("by plain sampling [stops]", meaning="that would tell as much"),
+        "one stop in",
+        Numbers("ratio"),
+        Numbers("95 % from"),
+        Numbers("to"),
+        Numbers("variation [%]", "of the probability, from run to run"),
+        Numbers("by plain sampling [stops]", "that would tell as much"),
     )
-    rows = tuple(
+    rows = [
         (
-            f"1e{one['decade']}",
-            (
-                *(number(one[key], "{:.4f}".format) for key in ("ratio", "low", "high")),
-                number(100.0 * one["variation"], "{:.1f}".format),
-                number(one["plain_stops"], "{:.1e}".format),
-            ),
+            f"1e{level['decade']}",
+            *(number(level[key], ".4f") for key in ("ratio", "low", "high")),
+            number(100.0 * level["variation"], ".1f"),
+            number(level["plain_stops"], ".1e"),
         )
-        for one in summary["safety"]
-    )
+        for level in safety
+    ]
     caption = "Deceleration over the nominal one that all but one stop in so many reach."
-    return Rows("safety-table", caption, columns, rows)
-
-
-_TERMS = {
-    "Predicted by the others": "The fit to all stops but this one, with what the model left of "
-    "them.",
-    "Beyond what the model claims": "The system file says where: such a stop says nothing of the "
-    "model, and its distance is no prediction.",
-    "Deceleration": "Equivalent: constant after the response, over the same distance (EN 14531-1).",
-    "Safety level": "By subset simulation (Au and Beck 2001). Beyond what the past stops show it "
-    "follows from tolerances and from the forms of their distributions.",
-    "Sheet": "The model with its nominal parameters, before any stop was looked at.",
-}
-
-
-def write_distance(found: Distance, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write distance.json, tables as CSV, the figure and the page; returns this.
-
-    Parameters
-    ----------
-    provenance : what was run.
-    """
-    summary = {**found.to_dict(), "provenance": provenance}
-    told = with_answer(distance_answer(summary), summary)
-    write_json(out / "distance.json", told)
-    tables = {"stops": found.to_frame(), "quantiles": found.quantiles()}
-    if found.safety is not None:
-        tables["safety"] = pd.DataFrame(map(asdict, found.safety.levels))
-    if found.plain is not None:
-        tables["plain"] = pd.DataFrame(map(asdict, found.plain.levels))
-    for name, table in tables.items():
-        write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
-    figure = out / "distance.png"
-    save_figure(distance_figure(found), [figure, figure.with_suffix(".svg")])
-    return write_distance_page(found, told, out)
-
-
-def distance_answer(summary: Mapping[str, Any]) -> Answer:
-    """The answer of `distance`."""
-    shares = summary["distance"]
-    middle, low, high = (shares[share] for share in ("0.5", "0.025", "0.975"))
-    headline = {
-        "distance": Measure(middle, "m", "lower", low, high),
-        "deceleration": Measure(summary["deceleration"], "m/s2", "higher"),
-    }
-    for one in summary["safety"] or []:
-        name = f"deceleration over the nominal one, all but one stop in 1e{one['decade']}"
-        headline[name] = Measure(one["ratio"], "1", "higher", one["low"], one["high"])
-    details = {
-        f"{stop['stop']}: measured over predicted distance": Measure(
-            stop["distance [m]"] / stop["predicted [m]"], "1"
-        )
-        for stop in summary["stops"]
-    }
-    return Answer(summary["sentence"], headline, details)
+    return Table("safety-table", caption, columns, rows)

@@ -3,80 +3,75 @@
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from workbench.arrays import Vector
 from workbench.pages.answer import Answer, Measure, recordings, with_answer
-from workbench.pages.figures import LIGHT, STYLE, CaseFigure, Curve, Panel, save_figure
-from workbench.pages.parts import Cell, Heading, Part, Rows, Strip, number, write_parts
-from workbench.pages.recordings import placed
+from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
+from workbench.pages.parts import (
+    Definitions,
+    Numbers,
+    Page,
+    Part,
+    Strip,
+    Table,
+    number,
+    zoomable,
+)
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.monitoring import MonitoringResult, Track
 from workbench.system.units import BAND
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 _POINT, _LEVEL, _CHANGED = "2", "measured", "7"
-
-
 _ENTRY = re.compile(r"(.+)\[(\d+)\]")
+_COLUMNS = 4  # of panels
+_EXPLAINED = (
+    "One point for each recording, with a band that holds 95 %; the level that it is compared "
+    "with, red after a change that was told. The shaded recordings are where the last change was, "
+    "with 95 %. Each quantity is compared with its own past; one of several that are alike against "
+    "the others."
+)
+_TERMS = {
+    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a sound "
+    "machine passes at the stated rate of false alarms (Page 1954).",
+    "Changed after": "The recording after which the change was most likely (Hinkley 1970).",
+    "Against the others": "Less the mean of those that are alike: what moves all of them cancels.",
+    "Standard error": "By the noise of the sensors and by the scatter that the past shows.",
+}
 
 
-def write_monitoring_page(found: MonitoringResult, summary: Mapping[str, Any], out: Path) -> Path:
+def write_monitoring_page(result: MonitoringResult, summary: Mapping[str, Any], out: Path) -> Path:
     """Write the page into the folder; returns its path.
 
     Parameters
     ----------
     summary : as written to summary.json.
     """
-    tracks = [track for track in found.tracks if np.isfinite(track.values).any()]
+    tracks = [track for track in result.tracks if np.isfinite(track.values).any()]
     tracks.sort(key=_first_told)
-    figures = [_figure(track, found) for track in tracks] if len(found.names) > 1 else []
+    figures = [_figure(track, result) for track in tracks] if len(result.names) > 1 else []
     changed = sum(bool(track.changes) for track in tracks)
-    drawn = placed(figures, summary, out)
-    shown = drawn[: max(changed, 1)]
+    drawn = zoomable(figures, summary, out)
+    shown, others = drawn[: max(changed, 1)], drawn[max(changed, 1) :]
     title = "What has changed" if changed else "The quantity that moved most; nothing has changed"
-    parts = [
-        Part(
-            "shown",
-            title,
-            (_EXPLAINED,),
-            strips=tuple(_strips(tracks, found)),
-            recordings=tuple(shown),
-        ),
-        Part("quantities", "Quantities now", tables=(_quantities(summary),), printed=True),
-        Part("definitions", "Definitions", terms=_TERMS),
-    ]
-    if drawn[len(shown) :]:
-        rest = Part("others", "Quantities as they were", recordings=tuple(drawn[len(shown) :]))
-        parts.insert(2, rest)
+    parts = [Part("shown", title, [_EXPLAINED, *_strips(tracks, result), *shown])]
     if summary["alarms"]:
-        alarms = (_alarms(summary["alarms"]),)
-        parts.insert(1, Part("alarms", "Alarms", tables=alarms, printed=True))
+        parts.append(Part("alarms", "Alarms", [_alarms(summary["alarms"])], printed=True))
+    parts.append(Part("quantities", "Quantities now", [_quantities(summary)], printed=True))
+    if others:
+        parts.append(Part("others", "Quantities as they were", others))
     if summary["work"]:
-        parts.insert(-1, Part("work", "Work of friction", tables=(_work(summary["work"]),)))
-    path = out / "index.html"
-    write_parts(
-        f"One machine over its recordings, {found.names[0]} to {found.names[-1]}",
-        summary,
-        parts,
-        path,
-        file="summary.json",
-        warnings=_warnings(found),
-    )
-    return path
-
-
-_EXPLAINED = (
-    "One point for each recording, with a band that holds 95 %; the level that it is "
-    "compared with, red after a change that was told. The shaded recordings are where the last "
-    "change was, with 95 %. Each quantity is compared with its own past; one of several that are "
-    "alike against the others."
-)
+        parts.append(Part("work", "Work of friction", [_work(summary["work"])]))
+    parts.append(Part("definitions", "Definitions", [Definitions(_TERMS)]))
+    title = f"One machine over its recordings, {result.names[0]} to {result.names[-1]}"
+    return Page(title, parts, warnings=_warnings(result)).write(summary, out / "index.html")
 
 
 def _first_told(track: Track) -> tuple[float, float]:
@@ -86,16 +81,16 @@ def _first_told(track: Track) -> tuple[float, float]:
     return float(told), -float(surprises.max(initial=0.0))
 
 
-def _warnings(found: MonitoringResult) -> list[str]:
+def _warnings(result: MonitoringResult) -> list[str]:
     said = []
-    if found.interrupted:
+    if result.interrupted:
         said.append("Interrupted: the same command goes on from here.")
-    said += [f"Not used: {name}: {why}" for name, why in found.refused.items()]
-    said += [f"There twice: {name} is {other}." for name, other in found.again.items()]
+    said += [f"Not used: {name}: {why}" for name, why in result.refused.items()]
+    said += [f"There twice: {name} is {other}." for name, other in result.again.items()]
     return said
 
 
-def _strips(tracks: Sequence[Track], found: MonitoringResult) -> list[Strip]:
+def _strips(tracks: Sequence[Track], result: MonitoringResult) -> list[Strip]:
     """Quantities that are entries of one array, in its order: which of them have changed."""
     arrays: dict[str, dict[int, Track]] = {}
     for track in tracks:
@@ -105,26 +100,26 @@ def _strips(tracks: Sequence[Track], found: MonitoringResult) -> list[Strip]:
     for members in arrays.values():
         if changed := [member.label for member in members.values() if member.changes]:
             entries = tuple(
-                (str(k), _moved(member, found)) for k, member in sorted(members.items())
+                (str(k), _moved(member, result)) for k, member in sorted(members.items())
             )
             finding = capital(f"{', '.join(changed)}: changed; the others are as they were.")
             strips.append(Strip(finding, entries))
     return strips
 
 
-def _moved(track: Track, found: MonitoringResult) -> str:
+def _moved(track: Track, result: MonitoringResult) -> str:
     """By how much a quantity is off its first level; empty where it is not."""
     if not track.changes:
         return ""
     size = track.level[0] - track.changes[0].before[0]
-    if nominal := abs(found.system.values.get(track.name, 0.0)):
+    if nominal := abs(result.system.values.get(track.name, 0.0)):
         return f"{100.0 * size / nominal:+.1f} %"
     return f"{size:+.3g} {track.unit}".removesuffix(" 1")
 
 
-def _figure(track: Track, found: MonitoringResult) -> CaseFigure:
+def _figure(track: Track, result: MonitoringResult) -> CaseFigure:
     """Estimates of a quantity and its levels, over the recordings."""
-    count = len(found.names)
+    count = len(result.names)
     scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
     sound, changed = _levels(track, count)
     reach = BAND * scale * track.deviations
@@ -138,7 +133,7 @@ def _figure(track: Track, found: MonitoringResult) -> CaseFigure:
     return CaseFigure(
         name=label + " against the others" * track.against,
         title=f"{np.isfinite(track.values).sum()} of {count} recordings tell it",
-        finding=_said(track, found),
+        finding=_said(track, result),
         time=np.arange(1.0, count + 1.0),
         window=None if last is None else (last.earliest + 1.0, min(last.latest + 2.0, count)),
         legend=((_POINT, "estimate"), (_LEVEL, "level"), (_CHANGED, "level after a change")),
@@ -158,144 +153,116 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
     return sound, changed
 
 
-def _said(track: Track, found: MonitoringResult) -> str:
+def _said(track: Track, result: MonitoringResult) -> str:
     if not track.changes:
         return "It has not changed."
     first = track.changes[0]
     return (
-        f"Changed by {_moved(track, found)} after {found.names[first.last]}, told at "
-        f"{found.names[first.raised]}."
+        f"Changed by {_moved(track, result)} after {result.names[first.last]}, told at "
+        f"{result.names[first.raised]}."
     )
 
 
-def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Rows:
+def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
     columns = (
-        Heading("told at", number=False),
-        Heading("quantity", number=False),
-        Heading("changed after", number=False),
-        Heading("with 95 %, after", number=False),
-        Heading("change"),
-        Heading("95 % from"),
-        Heading("to"),
-        Heading("of nominal [%]"),
-        Heading("unit", number=False),
+        *("told at", "quantity", "changed after", "with 95 %, after"),
+        *(map(Numbers, ("change", "95 % from", "to", "of nominal [%]"))),
+        "unit",
     )
     rows = []
     for alarm in alarms:
         size, sure, share = alarm["change"], alarm["standard_error"], alarm["share_of_nominal"]
         between = dict.fromkeys((alarm["earliest"], alarm["latest"]))
-        cells = (
-            Cell(alarm["quantity"]),
-            Cell(alarm["changed_after"]),
-            Cell(" to ".join(between)),
-            number(size, "{:+.3g}".format),
-            number(size - BAND * sure, "{:+.3g}".format),
-            number(size + BAND * sure, "{:+.3g}".format),
-            number(None if share is None else 100.0 * share, "{:+.1f}".format),
-            Cell(alarm["unit"]),
+        row = (
+            *(str(alarm["told_at"]), alarm["quantity"], alarm["changed_after"]),
+            " to ".join(between),
+            *(number(value, "+.3g") for value in (size, size - BAND * sure, size + BAND * sure)),
+            number(None if share is None else 100.0 * share, "+.1f"),
+            alarm["unit"],
         )
-        rows.append((str(alarm["told_at"]), cells))
+        rows.append(row)
     caption = "All alarms in their order: the recording at which each was told."
-    return Rows("alarm-table", caption, columns, tuple(rows))
+    return Table("alarm-table", caption, columns, rows)
 
 
-def _quantities(summary: Mapping[str, Any]) -> Rows:
+def _quantities(summary: Mapping[str, Any]) -> Table:
     columns = (
-        Heading("quantity", number=False),
-        Heading("what it is", number=False),
-        Heading("level"),
-        Heading("standard error"),
-        Heading("trend", meaning="by recording, since the last change"),
-        Heading("unit", number=False),
-        Heading("told in", meaning="recordings that tell it"),
+        "quantity",
+        "what it is",
+        Numbers("level"),
+        Numbers("standard error"),
+        Numbers("trend", "by recording, since the last change"),
+        "unit",
+        Numbers("told in", "recordings that tell it"),
     )
-    rows = []
-    for name, quantity in summary["quantities"].items():
-        cells = (
-            Cell(quantity["label"]),
-            *(number(quantity[key], "{:.4g}".format) for key in ("level", "standard_error")),
-            number(quantity["trend_by_recording"], "{:+.2g}".format),
-            Cell(quantity["unit"]),
-            number(quantity["told_in"], "{:.0f}".format),
-        )
-        rows.append((name, cells))
-    caption = "Mean level of each quantity since its last change."
-    return Rows("quantity-table", caption, columns, tuple(rows))
-
-
-def _work(work: Mapping[str, Any]) -> Rows:
-    columns = (
-        Heading("where", number=False),
-        Heading("what it is", number=False),
-        Heading("work [MJ]"),
-        Heading("over the mean", meaning="wear relative to the others, of one material"),
-    )
-    rows = tuple(
+    rows = [
         (
             name,
-            (
-                Cell(one["label"]),
-                number(1e-6 * one["work"], "{:.4g}".format),
-                number(one["of_the_mean"], "{:.3f}".format),
-            ),
+            quantity["label"],
+            *(number(quantity[key], ".4g") for key in ("level", "standard_error")),
+            number(quantity["trend_by_recording"], "+.2g"),
+            quantity["unit"],
+            number(quantity["told_in"], ".0f"),
         )
-        for name, one in work.items()
+        for name, quantity in summary["quantities"].items()
+    ]
+    caption = "Mean level of each quantity since its last change."
+    return Table("quantity-table", caption, columns, rows)
+
+
+def _work(work: Mapping[str, Any]) -> Table:
+    relative = Numbers("over the mean", "wear relative to the others, of one material")
+    rows = [
+        (
+            name,
+            part["label"],
+            number(1e-6 * part["work"], ".4g"),
+            number(part["of_the_mean"], ".3f"),
+        )
+        for name, part in work.items()
+    ]
+    caption = "Friction work in all recordings together."
+    return Table(
+        "work-table", caption, ("where", "what it is", Numbers("work [MJ]"), relative), rows
     )
-    return Rows("work-table", "Friction work in all recordings together.", columns, rows)
 
 
-_TERMS = {
-    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a sound "
-    "machine passes at the stated rate of false alarms (Page 1954).",
-    "Changed after": "The recording after which the change was most likely (Hinkley 1970).",
-    "Against the others": "Less the mean of those that are alike: what moves all of them cancels.",
-    "Standard error": "By the noise of the sensors and by the scatter that the past shows.",
-}
-
-_COLUMNS = 4  # of panels
-
-
-_POINT_COLOUR, _LEVEL_COLOUR, _ALARM_COLOUR = LIGHT["2"], LIGHT["measured"], LIGHT["7"]
-
-
-def write_monitoring(found: MonitoringResult, provenance: Mapping[str, Any], out: Path) -> Path:
+def write_monitoring(result: MonitoringResult, provenance: Mapping[str, Any], out: Path) -> Path:
     """Write all files; returns the page.
 
     Parameters
     ----------
     provenance : what was run.
     """
-    summary = {**found.to_dict(), "provenance": provenance}
-    told = with_answer(monitoring_answer(summary), summary)
-    write_json(out / "summary.json", told)
+    content = {**result.to_dict(), "provenance": provenance}
+    summary = with_answer(monitoring_answer(content), content)
+    write_json(out / "summary.json", summary)
     for name, frame in (
-        ("estimates", found.to_frame()),
-        ("alarms", found.alarms()),
-        ("work", found.worked()),
+        ("estimates", result.to_frame()),
+        ("alarms", result.alarms()),
+        ("work", result.worked()),
     ):
         write_whole(out / f"{name}.csv", frame.to_csv(index=False, float_format="%.8g"))
-    figure = out / "history.png"
-    save_figure(history_figure(found), [figure, figure.with_suffix(".svg")])
-    return write_monitoring_page(found, told, out)
+    save_figure(history_figure(result), [out / "history.png", out / "history.svg"])
+    return write_monitoring_page(result, summary, out)
 
 
-def history_figure(found: MonitoringResult) -> Figure:
+def history_figure(result: MonitoringResult) -> "Figure":
     """Draw each quantity over the recordings: estimates, levels, changes and alarms."""
-    tracks = [track for track in found.tracks if np.isfinite(track.values).any()]
+    tracks = [track for track in result.tracks if np.isfinite(track.values).any()]
     rows = -(-len(tracks) // _COLUMNS)
-    with mpl.rc_context(STYLE | {"font.size": 8}):
-        sheet = Figure(figsize=(11.0, 0.8 + 1.5 * rows), layout="constrained")
+    with styled(11.0, 0.8 + 1.5 * rows, font_size=8) as sheet:
         panels = list(sheet.subplots(rows, _COLUMNS, sharex=True, squeeze=False).flat)
         heights = _heights(tracks)
         for axes, track in zip(panels, tracks, strict=False):
             middle = float(np.nanmedian(track.values))
-            _draw(axes, track, found)
+            _draw(axes, track, result)
             height = heights[track.against, track.unit]
             axes.set_ylim(middle - height, middle + height)
             axes.set_title(f"{track.label} [{track.unit}]".replace(" [1]", ""), fontsize=7)
         for axes in panels[len(tracks) :]:
             axes.set_visible(False)
-        sheet.supxlabel(f"recording, {found.names[0]} to {found.names[-1]}")
+        sheet.supxlabel(f"recording, {result.names[0]} to {result.names[-1]}")
         sheet.suptitle(
             "Estimates with 95 % bands, levels, changes (dashed, with 95 % range) and alarms (line)"
         )
@@ -319,14 +286,14 @@ def _half(track: Track) -> Vector:
     return half
 
 
-def _draw(axes: Axes, track: Track, found: MonitoringResult) -> None:
-    numbers = np.arange(1, len(found.names) + 1)
+def _draw(axes: "Axes", track: Track, result: MonitoringResult) -> None:
+    numbers = np.arange(1, len(result.names) + 1)
     axes.errorbar(
         numbers,
         track.values,
         _half(track),
         fmt=".",
-        color=_POINT_COLOUR,
+        color=LIGHT[_POINT],
         ecolor=LIGHT["raw"],
         elinewidth=0.6,
         markersize=4,
@@ -334,13 +301,13 @@ def _draw(axes: Axes, track: Track, found: MonitoringResult) -> None:
     begin = 0.5
     for change in track.changes:
         end = change.last + 1.5
-        axes.hlines(change.before[0], begin, end, color=_LEVEL_COLOUR)
-        axes.axvspan(change.earliest + 1.0, change.latest + 2.0, color=_ALARM_COLOUR, alpha=0.12)
-        axes.axvline(end, color=_ALARM_COLOUR, linestyle="--", linewidth=0.8)
-        axes.axvline(change.raised + 1.0, color=_ALARM_COLOUR, linewidth=1.2)
+        axes.hlines(change.before[0], begin, end, color=LIGHT[_LEVEL])
+        axes.axvspan(change.earliest + 1.0, change.latest + 2.0, color=LIGHT[_CHANGED], alpha=0.12)
+        axes.axvline(end, color=LIGHT[_CHANGED], linestyle="--", linewidth=0.8)
+        axes.axvline(change.raised + 1.0, color=LIGHT[_CHANGED], linewidth=1.2)
         begin = end
     if np.isfinite(track.level[0]):
-        axes.hlines(track.level[0], begin, numbers[-1] + 0.5, color=_LEVEL_COLOUR)
+        axes.hlines(track.level[0], begin, numbers[-1] + 0.5, color=LIGHT[_LEVEL])
 
 
 def monitoring_answer(summary: Mapping[str, Any]) -> Answer:

@@ -3,22 +3,34 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from workbench.diagnosis.outcome import draw_heat
 from workbench.pages.answer import Answer, Measure, with_answer
-from workbench.pages.figures import LIGHT, STYLE, save_figure
+from workbench.pages.figures import LIGHT, in_style, save_figure, styled
 from workbench.pages.measures import share_measure, share_with_interval
-from workbench.pages.parts import Cell, Dot, Dots, Heading, Part, Rows, number, write_parts
+from workbench.pages.parts import (
+    Cell,
+    Definitions,
+    Dot,
+    Dots,
+    Numbers,
+    Page,
+    Part,
+    Table,
+    number,
+    term,
+)
 from workbench.runtime.files import write_json
 from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
 from workbench.studies.power.planned import SURE, EffectChance
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def write_thresholds(
@@ -211,7 +223,7 @@ def write_plan(
     headline = {f"effects shown at {sizes[-1]:g} times": Measure(float(seen), "1", "higher")}
     content = {"provenance": provenance, "sizes": list(sizes), "effects": list(map(asdict, rows))}
     write_json(out / "plan.json", with_answer(Answer(sentence, headline), content))
-    with mpl.rc_context(STYLE):
+    with in_style():
         save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
 
 
@@ -229,19 +241,19 @@ def format_plan(rows: Sequence[EffectChance], sizes: Sequence[float]) -> str:
     return "\n".join(lines)
 
 
-def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Figure:
+def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> "Figure":
     """Chance that an effect is named [%], by effect and size."""
     table = np.array(
         [[100.0 * c for _, c in row.chances] or [0.0] * len(sizes) for row in rows]
     ).reshape(len(rows), len(sizes))
-    sheet = Figure(figsize=(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)), layout="constrained")
-    axes = sheet.subplots()
-    axes.grid(visible=False)
-    draw_heat(axes, table, 100.0)
-    axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
-    axes.set_yticks(range(len(rows)), [row.effect for row in rows])
-    axes.set_xlabel("size over the least that matters")
-    sheet.suptitle("Chance that the planned recordings show it [%]")
+    with styled(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)) as sheet:
+        axes = sheet.subplots()
+        axes.grid(visible=False)
+        draw_heat(axes, table, 100.0)
+        axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
+        axes.set_yticks(range(len(rows)), [row.effect for row in rows])
+        axes.set_xlabel("size over the least that matters")
+        sheet.suptitle("Chance that the planned recordings show it [%]")
     return sheet
 
 
@@ -268,20 +280,16 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
     if summary["failed"]:
         warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
     parts = [
-        Part("shown", "How often it is right", (_INTERVAL,), dots=(_share_dots(summary),)),
-        Part("definitions", "Definitions", terms=_TERMS),
+        Part("shown", "How often it is right", [_INTERVAL, _share_dots(summary)]),
+        Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
     if summary["effects"]:
-        tables = (_effects(summary),)
-        parts.insert(1, Part("effects", "By effect and size", tables=tables, printed=True))
+        parts.insert(1, Part("effects", "By effect and size", [_effects(summary)], printed=True))
     if summary["confusion"]:
-        parts.insert(
-            -1, Part("confusion", "What is taken for what", tables=(_confusion_rows(summary),))
-        )
-    path = out / "index.html"
+        parts.insert(-1, Part("confusion", "What is taken for what", [_confusion_rows(summary)]))
     title = f"How often the diagnosis is right: {summary['sets']} sets of recordings"
-    write_parts(title, summary, parts, path, file="power.json", warnings=warnings)
-    return path
+    page = Page(title, parts, "power.json", warnings=warnings)
+    return page.write(summary, out / "index.html")
 
 
 def _share_dots(summary: Mapping[str, Any]) -> Dots:
@@ -300,55 +308,55 @@ def _share_dots(summary: Mapping[str, Any]) -> Dots:
     return Dots(finding, "share of sets [%]", tuple(rows), high=100.0)
 
 
-def _effects(summary: Mapping[str, Any]) -> Rows:
+def _effects(summary: Mapping[str, Any]) -> Table:
     """Effects by sizes, a cell for each share."""
     effects = summary["effects"]
     sizes = sorted(
         {size for effect in effects.values() for size in effect["right_first"]}, key=float
     )
     columns = [
-        Heading("effect", number=False),
-        Heading("1 is", number=False, meaning="least size that is worth a finding"),
-        *(Heading(f"x {size} [%]") for size in sizes),
-        Heading("intervals hold [%]"),
-        Heading("remark", number=False),
+        "effect",
+        term("1 is", "least size that is worth a finding"),
+        *(Numbers(f"x {size} [%]") for size in sizes),
+        Numbers("intervals hold [%]"),
+        "remark",
     ]
-    rows = []
-    for name, effect in effects.items():
-        cells = [Cell(with_unit(effect["size"], effect["unit"]))]
-        cells += [_share(effect["right_first"].get(size)) for size in sizes]
-        cells += [_share(effect["coverage"]), Cell("hidden" if effect["hidden"] else "")]
-        rows.append((name, tuple(cells)))
+    rows = [
+        (
+            name,
+            with_unit(effect["size"], effect["unit"]),
+            *(_share(effect["right_first"].get(size)) for size in sizes),
+            _share(effect["coverage"]),
+            "hidden" if effect["hidden"] else "",
+        )
+        for name, effect in effects.items()
+    ]
     caption = (
         "Share of sets in which the planted effect, or a group that it is in, is named first, by "
         "its size over the least that is worth a finding; hits and sets in brackets."
     )
-    return Rows("effect-table", caption, tuple(columns), tuple(rows))
+    return Table("effect-table", caption, columns, rows)
 
 
 def _share(one: Mapping[str, Any] | None) -> Cell:
     if one is None or not one["of"]:
         return Cell("n/a")
-    counts = f"({one['hits']}/{one['of']})"
-    return number(
-        100.0 * one["share"], lambda percent: f"{percent:.0f} {counts}", heat=one["share"]
-    )
+    percent = 100.0 * one["share"]
+    return Cell(f"{percent:.0f} ({one['hits']}/{one['of']})", percent, one["share"])
 
 
-def _confusion_rows(summary: Mapping[str, Any]) -> Rows:
+def _confusion_rows(summary: Mapping[str, Any]) -> Table:
     """Planted by named."""
     said = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
     rows = []
     for planted, row in summary["confusion"].items():
         of = sum(row.values())
-        cells = tuple(
-            number(float(row.get(name, 0)), "{:.0f}".format, row.get(name, 0) / of if of else 0.0)
-            for name in said
-        )
-        rows.append((planted, cells))
+        counts = (row.get(name, 0) for name in said)
+        cells = (number(float(count), ".0f", count / of if of else 0.0) for count in counts)
+        rows.append((planted, *cells))
     caption = f"Sets by what was planted (rows, from size {VISIBLE:g} on) and what was named first."
-    columns = (Heading("planted", number=False), *(Heading(name) for name in said))
-    return Rows("confusion-table", caption, columns, tuple(rows))
+    columns = ("planted", *(Numbers(name) for name in said))
+    return Table("confusion-table", caption, columns, rows)
 
 
 _TERMS = {
@@ -384,41 +392,41 @@ def write_power(
     write_power_page(told, out)
     names = [effect.name for effect in effects]
     measured = summary["effects"]
-    with mpl.rc_context(STYLE | {"font.size": 8}):
-        figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
-        if measured:
-            figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
+    figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
+    if measured:
+        figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
+    with in_style(font_size=8):
         for name, figure in figures.items():
             save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
 
 
-def _curves(effects: Mapping[str, Any]) -> Figure:
+def _curves(effects: Mapping[str, Any]) -> "Figure":
     """Share named right against size, one panel for each effect."""
     columns = min(_COLUMNS, len(effects))
     rows = -(-len(effects) // columns)
-    sheet = Figure(figsize=(0.6 + 2.1 * columns, 1.0 + 1.4 * rows), layout="constrained")
-    panels = sheet.subplots(rows, columns, sharey=True, squeeze=False)
-    for axes in panels.flat[len(effects) :]:
-        axes.set_visible(False)
-    for axes, (name, effect) in zip(panels.flat, effects.items(), strict=False):
-        shares = list(effect["right_first"].values())
-        places = range(len(shares))
-        low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
-        axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
-        axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
-        hidden = ", hidden" if effect["hidden"] else ""
-        axes.set_title(
-            f"{name}\n1 = {with_unit(effect['size'], effect['unit'])}{hidden}", fontsize=6.5
-        )
-        axes.set_xticks(places, list(effect["right_first"]))
-        axes.set_ylim(-5.0, 105.0)
-    for row in panels:
-        row[0].set_ylabel("[%]")
-    sheet.suptitle("Named right, with 95 % interval, against size over the least that matters")
+    with styled(0.6 + 2.1 * columns, 1.0 + 1.4 * rows, font_size=8) as sheet:
+        panels = sheet.subplots(rows, columns, sharey=True, squeeze=False)
+        for axes in panels.flat[len(effects) :]:
+            axes.set_visible(False)
+        for axes, (name, effect) in zip(panels.flat, effects.items(), strict=False):
+            shares = list(effect["right_first"].values())
+            places = range(len(shares))
+            low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
+            axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
+            axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
+            hidden = ", hidden" if effect["hidden"] else ""
+            axes.set_title(
+                f"{name}\n1 = {with_unit(effect['size'], effect['unit'])}{hidden}", fontsize=6.5
+            )
+            axes.set_xticks(places, list(effect["right_first"]))
+            axes.set_ylim(-5.0, 105.0)
+        for row in panels:
+            row[0].set_ylabel("[%]")
+        sheet.suptitle("Named right, with 95 % interval, against size over the least that matters")
     return sheet
 
 
-def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> Figure:
+def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> "Figure":
     """Planted by named, each row in percent."""
     said = {name for row in confusion.values() for name in row}
     order = ["nothing", *names, "unexplained", "failed"]
@@ -429,37 +437,35 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
             for row in confusion.values()
         ]
     ).reshape(len(confusion), len(columns))
-    sheet = Figure(
-        figsize=(3.0 + 0.3 * len(columns), 2.5 + 0.25 * len(confusion)), layout="constrained"
-    )
-    axes = sheet.subplots()
-    axes.grid(visible=False)
-    draw_heat(axes, table, 100.0)
-    axes.set_xticks(range(len(columns)), columns, rotation=90)
-    labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
-    axes.set_yticks(range(len(confusion)), labels)
-    axes.set_xlabel("named first; twins under their own name")
-    axes.set_ylabel("planted (sets)")
-    sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
+    with styled(3.0 + 0.3 * len(columns), 2.5 + 0.25 * len(confusion), font_size=8) as sheet:
+        axes = sheet.subplots()
+        axes.grid(visible=False)
+        draw_heat(axes, table, 100.0)
+        axes.set_xticks(range(len(columns)), columns, rotation=90)
+        labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
+        axes.set_yticks(range(len(confusion)), labels)
+        axes.set_xlabel("named first; twins under their own name")
+        axes.set_ylabel("planted (sets)")
+        sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
     return sheet
 
 
-def _coverage(summary: Mapping[str, Any]) -> Figure:
+def _coverage(summary: Mapping[str, Any]) -> "Figure":
     """Share of the 95 % intervals that hold the truth, by effect."""
     rows = {name: effect["coverage"] for name, effect in summary["effects"].items()}
     rows = {name: row for name, row in rows.items() if row["of"]} | {"all": summary["coverage"]}
-    sheet = Figure(figsize=(7.5, 1.2 + 0.22 * len(rows)), layout="constrained")
-    axes = sheet.subplots()
-    heights = range(len(rows))
-    low, high = ([100.0 * row[key] for row in rows.values()] for key in ("low", "high"))
-    axes.hlines(heights, low, high, color=LIGHT["raw"], linewidth=2.0)
-    values = [np.nan if row["share"] is None else 100.0 * row["share"] for row in rows.values()]
-    axes.plot(values, heights, "o", color=_LINE)
-    axes.axvline(95.0, color=_MARK, linewidth=0.8)
-    axes.set_yticks(heights, [f"{name} ({row['of']})" for name, row in rows.items()])
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, 101.0)
-    axes.set_xlabel("95 % intervals that hold the planted value [%]")
+    with styled(7.5, 1.2 + 0.22 * len(rows), font_size=8) as sheet:
+        axes = sheet.subplots()
+        heights = range(len(rows))
+        low, high = ([100.0 * row[key] for row in rows.values()] for key in ("low", "high"))
+        axes.hlines(heights, low, high, color=LIGHT["raw"], linewidth=2.0)
+        values = [np.nan if row["share"] is None else 100.0 * row["share"] for row in rows.values()]
+        axes.plot(values, heights, "o", color=_LINE)
+        axes.axvline(95.0, color=_MARK, linewidth=0.8)
+        axes.set_yticks(heights, [f"{name} ({row['of']})" for name, row in rows.items()])
+        axes.invert_yaxis()
+        axes.set_xlim(0.0, 101.0)
+        axes.set_xlabel("95 % intervals that hold the planted value [%]")
     return sheet
 
 
