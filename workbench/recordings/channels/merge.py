@@ -47,6 +47,7 @@ class _Track:
     values: Vector
     step: float
     missing: int
+    censored: Vector  # times at which the file says only a bound; nothing goes across them
 
 
 def merge(
@@ -112,7 +113,12 @@ def merge(
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
     zero = min(begun, default=math.nan)
     damaged = [f"{file.path}: {doubt}" for file in files for doubt in file.doubts]
-    doubts = *damaged, *proposal.contradictions, *_mixed(files, proposal)
+    mended = [
+        f"{files[file].path}, '{clock.channel}': {text}"
+        for (file, _), clock in proposal.clocks.items()
+        for text in clock.corrections
+    ]
+    doubts = *damaged, *proposal.contradictions, *mended, *_mixed(files, proposal)
     return MergedRecording(time[known], signals, zero, tuple(notes), doubts)
 
 
@@ -175,7 +181,8 @@ def _track(signal: Signal, assigned: Assignment, proposal: ProposedMapping, star
             remedy="name another channel",
         )
     step = float(np.median(np.diff(times[held])))
-    return _Track(signal, times[held], values[held], step, int((~held).sum()))
+    bounds = times[list(assigned.channel.censored)]
+    return _Track(signal, times[held], values[held], step, int((~held).sum()), bounds)
 
 
 def _at(one: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
@@ -185,5 +192,7 @@ def _at(one: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
     before = np.where(exact, after, np.maximum(after - 1, 0))
     near = one.times[after] - one.times[before] <= limit * (1.0 + 1e-9)
     near &= (time >= one.times[0]) & (time <= one.times[-1])
+    lowest, highest = (np.searchsorted(one.censored, one.times[k]) for k in (before, after))
+    near &= lowest == highest
     values = one.values[before] if one.signal.held else np.interp(time, one.times, one.values)
     return values, near

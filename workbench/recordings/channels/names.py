@@ -16,7 +16,7 @@ from workbench.system.tables import Table, read_table
 TIME = "time"
 _TIME_WORDS = frozenset(
     "time t zeit timestamp zeitstempel datum date datetime uhrzeit temps tiempo tempo elapsed "  # noqa: SIM905
-    "clock utc messzeit relativzeit reltime".split()
+    "clock epoch unix tick ticks utc messzeit relativzeit reltime".split()
 )
 # A value that is asked for is no measurement: words, and what tells within one, as in German.
 _ASKED = frozenset(("set", "sp", "cmd", "req", "dmd", "ref", "reference"))
@@ -185,8 +185,9 @@ def usable(
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
     for group in (group for file in files for group in file.groups):
-        for channel in group.channels:
-            units[channel.name] = units[f"{group.name}/{channel.name}"] = channel.unit
+        for channel in (*group.channels, *group.left):
+            unit = "" if channel.stamp else channel.unit
+            units[channel.name] = units[f"{group.name}/{channel.name}"] = unit
     return {
         signal: one
         for signal, one in stored.items()

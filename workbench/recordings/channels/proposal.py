@@ -68,9 +68,8 @@ class ProposedMapping:
         found = {name: assignment.named for name, assignment in self.assigned.items()}
         for clock in self.clocks.values():
             if clock.channel:
-                found.setdefault(
-                    TIME, NamedChannel(clock.channel, "" if clock.certain else clock.unit)
-                )
+                unit = clock.stated or ("" if clock.certain else clock.unit)
+                found.setdefault(TIME, NamedChannel(clock.channel, unit))
         return found
 
 
@@ -102,7 +101,8 @@ def propose(
         if name != TIME
     }
     _refuse_shared(assigned, where)
-    if TIME in given:
+    texts = {channel.name for file in files for group in file.groups for channel in group.left}
+    if TIME in given and given[TIME].channel not in texts:
         _find(given[TIME], TIME, places, where)
     times = {given[TIME].channel} if TIME in given else set()
     free = [

@@ -4,22 +4,29 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from workbench.errors import InputError
 from workbench.recordings.formats.contents import FileChannel, Group
 from workbench.recordings.formats.numbers import (
-    MISSING,
     all_plain,
+    is_censored,
+    is_missing,
     is_number,
     plain,
     reading_of,
     values_of,
 )
 from workbench.recordings.formats.spelling import is_unit, named, spelled
-from workbench.recordings.formats.stamps import has_day, has_day_alone, is_stamp, read_stamps
+from workbench.recordings.formats.stamps import (
+    has_day,
+    has_day_alone,
+    has_fraction,
+    is_stamp,
+    read_stamps,
+)
 
 # The time between samples, as a preamble states it.
 _PER_SECOND = {"khz": 1e3, "hz": 1.0, "1/s": 1.0, "s/s": 1.0}
@@ -39,6 +46,18 @@ _INTERVAL = re.compile(
 _OTHERS = re.compile("filter|pass|cut-?off|grenz|tr\u00e4ger|carrier|netz|mains", re.IGNORECASE)
 
 _DIGITS = frozenset("0123456789+-.,eE")
+_HEADER_ROWS = 5  # of names, units and kinds
+# What recorders write into a row of units above record numbers, dates and times.
+_NO_UNIT = re.compile(
+    r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text)\.?", re.IGNORECASE
+)
+# Columns that hold parts of a second beside time stamps, and digits of these.
+_PARTS = {
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millis"), 3),
+    **dict.fromkeys(("us", "\u00b5s", "usec", "microseconds", "mikrosekunden", "micros"), 6),
+    **dict.fromkeys(("ns", "nsec", "nanoseconds"), 9),
+}
+_WHOLE_SECONDS = re.compile(r".*\d:\d\d:\d\d")
 
 
 @dataclass(frozen=True)
@@ -130,7 +149,7 @@ def _is_data(row: Sequence[str]) -> bool:
     """Whether a row holds two numbers or times, and little else."""
     if _DIGITS.issuperset("".join(row)) and sum(cell[-1:].isdigit() for cell in row) > 1:
         return True  # as nearly all rows are
-    held = [cell.strip() for cell in row if cell.strip().lower() not in MISSING]
+    held = [cell.strip() for cell in row if not is_missing(cell)]
     count = sum(is_number(cell) or is_stamp(cell) for cell in held)
     return count >= min(2, max(1, len(row) - 1)) and 3 * count > len(held)
 
@@ -139,24 +158,49 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
     """Names and units as they stand above the samples; empty where there are none."""
     rows: list[list[str]] = []
     for row in reversed(above):
-        if not _trimmed(row):
-            continue
         cells = [cell.strip() for cell in row]
+        if not _trimmed(cells):
+            continue
         if len(_trimmed(cells)) > width or len(_trimmed(cells)) < max(2, width // 2):
             break
         rows.insert(0, cells)
-        if len(rows) == 3:
+        if len(rows) == _HEADER_ROWS:
             break
-    if not rows:
-        return [], []
     at = next((i for i in range(1, len(rows)) if _are_units(rows[i])), None)
+    # Below units stand kinds, such as Avg; channel numbers are no names.
+    named = [row for row in rows[:at] if not all(is_number(cell) for cell in row if cell)]
+    if not named:
+        return (rows[-1], []) if rows and at is None else ([], [])
     if at is None:
-        return rows[-1], []
-    return rows[at - 1], [spelled(cell) for cell in rows[at]]
+        return _whole_names(named), []
+    units = [cell if is_unit(cell) or not _says_nothing(cell) else "" for cell in rows[at]]
+    return _whole_names(named), [spelled(cell) for cell in units]
+
+
+def _whole_names(rows: Sequence[list[str]]) -> list[str]:
+    """The last row; where its names are not enough, with what stands over each of them.
+
+    A cell over several columns holds its text in the first of them.
+    """
+    names = rows[-1]
+    held = [name for name in names if name]
+    if len(rows) < 2 or (len(set(held)) == len(held) and len(held) == len(_trimmed(names))):
+        return names
+    over, last = [], ""
+    for cell in rows[-2] + [""] * (len(names) - len(rows[-2])):
+        last = cell or last
+        over.append(last)
+    names = names + [""] * (len(over) - len(names))
+    return [" ".join(filter(None, pair)) for pair in zip(over, names, strict=True)]
+
+
+def _says_nothing(cell: str) -> bool:
+    """Whether a cell in a row of units is of a column that has none, such as one of dates."""
+    return not cell or _NO_UNIT.fullmatch(cell) is not None
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    held = [cell for cell in cells if cell]
+    held = [cell for cell in cells if not _says_nothing(cell)]
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
 
 
@@ -179,33 +223,41 @@ def read_group(
     numbers: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
-    labels, columns = _joined(labels, columns)
+    labels, columns = _with_parts(*_joined(labels, columns))
+    left: list[FileChannel] = []
     for i, cells in enumerate(columns):
-        if _mostly(cells, is_stamp):
-            channel = read_stamps(labels[i][0], cells)
-            if channel is None:
-                notes.append(f"'{labels[i][0]}' holds dates that can be read in two ways")
-            else:
-                stamps.append(channel)
+        if _mostly(cells, is_stamp) and (channel := read_stamps(labels[i][0], cells)) is not None:
+            stamps.append(channel)
+            notes += [f"'{labels[i][0]}' holds {channel.doubt}"] * bool(channel.doubt)
         elif _mostly(cells, is_number):
             numbers[i] = all_plain(cells)
         elif any(cells):
             notes.append(f"'{labels[i][0]}' holds texts")
+            none = np.full(len(cells), math.nan)
+            left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
     reading = reading_of(list(numbers.values()), where, commas=commas)
     channels: list[FileChannel] = []
     for i, cells in numbers.items():
         values = values_of(cells, reading)
         gaps = np.flatnonzero(np.isnan(values)).tolist()
-        bad = [k for k in gaps if cells[k].lower() not in MISSING]
+        beyond = [k for k in gaps if is_censored(cells[k])]
+        if beyond:
+            notes.append(
+                f"'{labels[i][0]}': {len(beyond)} cells say only that a value is below or above "
+                f"another, the first {cells[beyond[0]]!r} in line {table.lines[beyond[0]]}; they "
+                "are no samples"
+            )
+        bad = [k for k in gaps if not is_missing(cells[k]) and k not in set(beyond)]
         if bad:
             notes.append(
                 f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
-        channels.append(FileChannel(*labels[i], values))
+        channels.append(FileChannel(*labels[i], values, censored=tuple(beyond)))
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
     group = Group(name, (*stamps, *channels), step=step, step_doubt=doubt, within=within)
+    group = replace(group, left=tuple(left))
     return group, reading, notes
 
 
@@ -224,6 +276,34 @@ def _joined(
     return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]
 
 
+def _with_parts(
+    labels: list[tuple[str, str]], columns: list[list[str]]
+) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """The same columns, with time stamps of whole seconds and their parts of a second as one."""
+    stamps = [i for i, cells in enumerate(columns) if _mostly(cells, is_stamp)]
+    if len(stamps) != 1 or has_fraction(columns[stamps[0]]):
+        return labels, columns
+    at = stamps[0]
+    for i, (name, unit) in enumerate(labels):
+        digits = _PARTS.get(name.casefold(), 0)
+        if i == at or not digits or (unit and _PARTS.get(unit.casefold()) != digits):
+            continue
+        parts, moments = columns[i], columns[at]
+        held = [cell for cell in parts if cell]
+        if not all(cell.isdecimal() and len(cell.lstrip("0")) <= digits for cell in held):
+            continue
+        if not all(_WHOLE_SECONDS.fullmatch(cell) for cell in moments if cell):
+            continue
+        joined = [
+            f"{moment}.{part.lstrip('0').rjust(digits, '0')}" if moment and part else ""
+            for moment, part in zip(moments, parts, strict=True)
+        ]
+        left = [k for k in range(len(columns)) if k not in (at, i)]
+        label = f"{labels[at][0]} {name}", ""
+        return [label, *(labels[k] for k in left)], [joined, *(columns[k] for k in left)]
+    return labels, columns
+
+
 def _label(table: Cells, i: int) -> tuple[str, str]:
     """Name and unit of a column."""
     name, unit = named(table.names[i])
@@ -233,9 +313,9 @@ def _label(table: Cells, i: int) -> tuple[str, str]:
 def _mostly(cells: Sequence[str], is_one: Callable[[str], bool]) -> bool:
     """Whether more than half of the cells that hold anything are of a kind."""
     few = cells[:: max(1, len(cells) // 1000)]  # a thousand tell, if they hold anything
-    held = [cell for cell in few if cell.lower() not in MISSING]
+    held = [cell for cell in few if not is_missing(cell)]
     if not held:
-        held = [cell for cell in cells if cell.lower() not in MISSING]
+        held = [cell for cell in cells if not is_missing(cell)]
     return len(held) > 0 and 2 * sum(map(is_one, held)) > len(held)
 
 

@@ -22,6 +22,11 @@ class FileChannel:
     stamp : whether values are times that were written as dates or times of day.
     shown : of time stamps without a known date, what they show where they count from [s]; NaN: no
         time of day.
+    zoned : whether `start` is in UTC; else in some local time.
+    corrections : how time stamps were made to go on, in words.
+    doubt : why time stamps cannot be read before somebody says how, in words; empty: they can.
+    censored : samples of which the file says only that they are below or above another value.
+    texts : (n,) cells of time stamps, or of texts that nobody knows; empty for numbers.
     """
 
     name: str
@@ -31,6 +36,11 @@ class FileChannel:
     start: float = math.nan
     stamp: bool = False
     shown: float = math.nan
+    zoned: bool = False
+    corrections: tuple[str, ...] = ()
+    doubt: str = ""
+    censored: tuple[int, ...] = ()
+    texts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +55,7 @@ class Group:
         may be the time.
     step : time between two samples that the file states [s]; NaN: it states none.
     step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
+    left : texts beside the channels, which a user may say are times.
     within : names of what holds it in the file, outermost first: a sheet, nested structures.
     """
 
@@ -54,6 +65,7 @@ class Group:
     step: float = math.nan
     step_doubt: str = ""
     within: tuple[str, ...] = ()
+    left: tuple[FileChannel, ...] = ()
 
     def renamed(self, name: str) -> "Group":
         """The same group with another name."""

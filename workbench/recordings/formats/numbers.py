@@ -10,9 +10,15 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.errors import InputError
 
-MISSING = frozenset(
-    ("", "nan", "na", "n/a", "n.a.", "#n/a", "#nv", "-", "--", "---", "null", "none", "inf", "-inf")
+# What recorders write where there is no number: nothing, words, an overload, dashes.
+_MISSING = re.compile(
+    r"|nan|na|n/a|n\.a\.|n\.d\.|<na>|#n/a|#nv|#value!|#div/0!|#bezug!|#ref!|null|none|[+-]?inf"
+    r"|-?1\.#(inf|qnan|ind)\w*|[+-]?(ol|ovl|over|overload|overrange|overflow|underrange)|burnout"
+    r"|no ?data|invalid|bad|err|error|fault|open|-+|\*+|#+|\?+|_+",
+    re.IGNORECASE,
 )
+_CENSORED = re.compile(r"[<>\u2264\u2265]=?\s*[+-]?[\d.,]+([eE][+-]?\d+)?")
+_SIGN_APART = re.compile(r"([+-])[ \u00a0]+(?=[\d.,])")
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)?")
 _GROUPED = re.compile(r"[+-]?\d{1,3}([ \u00a0\u202f'\u2019]\d{3})+([.,]\d+)?")
 _SPACES = re.compile(r"[ \u00a0\u202f'\u2019]")
@@ -45,6 +51,16 @@ def is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(plain(cell)) is not None
 
 
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no number."""
+    return _MISSING.fullmatch(cell.strip()) is not None
+
+
+def is_censored(cell: str) -> bool:
+    """Whether a cell says only that a value is below or above another: <0.01."""
+    return _CENSORED.fullmatch(cell.strip()) is not None
+
+
 def all_plain(cells: list[str]) -> list[str]:
     """Cells without signs of type setting, which most columns have none of."""
     return [plain(cell) for cell in cells] if _SET.search("".join(cells)) else cells
@@ -53,6 +69,7 @@ def all_plain(cells: list[str]) -> list[str]:
 def plain(cell: str) -> str:
     """A cell without signs of type setting."""
     text = cell.replace("\u2212", "-") if "\u2212" in cell else cell
+    text = _SIGN_APART.sub(r"\1", text, count=1) if text[:1] in "+-" else text
     return _SPACES.sub("", text) if _GROUPED.fullmatch(text) else text
 
 

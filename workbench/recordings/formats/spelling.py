@@ -105,11 +105,15 @@ def named(cell: str) -> tuple[str, str]:
 
     >>> named("pC [bar]"), named("pC (bar)"), named("Kraft (gefiltert)"), named("Druck in bar")
     (('pC', 'bar'), ('pC', 'bar'), ('Kraft (gefiltert)', ''), ('Druck', 'bar'))
+    >>> named("flow (1)")
+    ('flow (1)', '')
     """
     text = cell.strip().strip("'\"").strip()
     if match := _NAMED.fullmatch(text):
         unit = match["square"] if match["square"] is not None else match["round"]
-        if match["name"] and (match["square"] is not None or is_unit(unit)):
+        # A number is one of a channel, not its unit; [1] is none of a quantity without one.
+        number = unit.strip().isdecimal() and (match["square"] is None or unit.strip() != "1")
+        if match["name"] and not number and (match["square"] is not None or is_unit(unit)):
             return match["name"], spelled(unit)
     if (match := _TRAILING.fullmatch(text)) and is_unit(match["unit"]):
         return match["name"], spelled(match["unit"])
