@@ -8,7 +8,7 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.studies.power.following import SHARES, summarise_following
-from workbench.studies.power.report import format_followed
+from workbench.studies.power.report import following_check
 
 from .schemas import check
 
@@ -43,7 +43,7 @@ def test_what_was_followed_is_counted() -> None:
         **{"sensed": (1, 1), "answered": (3, 4)},
         "separations": (4, 6),  # 1.9 of 10 off is within a fifth, the small ones within noise
     }
-    told = format_followed(found, rows)
+    told = following_check(rows).text
     assert "A or B -> A (one that is drawn: does not): a stop" in told
     assert "A or B -> A or B (one that is drawn: ): a stop; with a sensor of the load: A" in told
     assert f"2 of 4 {SHARES['proposed']} (7% to 93%)" in told

@@ -44,7 +44,7 @@ from workbench.studies.power import (
 from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.studies.power.planned import SURE, clear, predict_campaign
 from workbench.studies.power.planting import Group, Kind
-from workbench.studies.power.report import format_plan, format_power, write_plan, write_power
+from workbench.studies.power.report import campaign_check, draw_chances, format_power, write_power
 from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
@@ -396,11 +396,13 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
     assert large > 0.99
     # Only a slide shows it, and these stops have none.
     assert by_name["FallingFriction"].least is None
-    write_plan(rows, sizes, PROVENANCE, tmp_path)
+    plan = campaign_check(rows, sizes)
+    plan.write(PROVENANCE, tmp_path)
+    draw_chances(rows, sizes, tmp_path)
     check("plan", json.loads((tmp_path / "plan.json").read_text()))
     assert (tmp_path / "plan.svg").exists()
-    assert "these recordings cannot show it" in format_plan(rows, sizes)
-    (row,) = (line for line in format_plan(rows, sizes).splitlines() if line.startswith("FxGain "))
+    assert "these recordings cannot show it" in plan.text
+    (row,) = (line for line in plan.text.splitlines() if line.startswith("FxGain "))
     assert row.count("%") == 2 + len(
         sizes
     )  # of the size that matters, of chances, and that is sure

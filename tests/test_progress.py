@@ -3,7 +3,7 @@
 import re
 from concurrent.futures import ThreadPoolExecutor
 
-from workbench.runtime.progress import ProgressReporter
+from workbench.runtime.progress import ProgressReporter, StepReporter
 
 
 def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:
@@ -37,3 +37,12 @@ def test_what_is_soon_done_says_nothing() -> None:
     for one in range(100):
         done(one)
     assert lines == []
+
+
+def test_each_of_a_known_number_of_steps_says_what_came_of_it_and_what_is_left() -> None:
+    lines: list[str] = []
+    progress = StepReporter(lines.append, 12)
+    for name in ("first", "second"):
+        progress.step(name)
+    assert re.fullmatch(r"\[ 1/12\] first, about \d+ s left", lines[0])
+    assert re.fullmatch(r"\[ 2/12\] second, about \d+ s left", lines[1])

@@ -27,7 +27,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 from workbench.recordings.case import read_cases
 from workbench.studies.power.left_out import SHARES, summarise_left_out
-from workbench.studies.power.report import format_left_out
+from workbench.studies.power.report import left_out_check
 from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER
 from workbench.system.template import AREA, OUTLET, write_system
@@ -220,7 +220,7 @@ def test_slots_that_are_proposed_rightly_are_counted() -> None:
         **{"right_slot": (3, 4), "gain": (1, 2), "function": (1, 1)},
         **{"outside": (1, 1), "clean": (0, 1)},
     }
-    assert f"3 of 4 {SHARES['right_slot']} (19% to 99%)" in format_left_out(found, rows)
+    assert f"3 of 4 {SHARES['right_slot']} (19% to 99%)" in left_out_check(rows).text
 
 
 # --- laws that turn, and that begin ---

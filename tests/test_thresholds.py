@@ -26,7 +26,7 @@ from workbench.studies.power import (
 )
 from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
 from workbench.studies.power.planting import plan_sheet_errors, some
-from workbench.studies.power.report import format_sheet, format_thresholds
+from workbench.studies.power.report import sheet_check, thresholds_check
 from workbench.studies.power.run import PowerStudy, Setup
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity, changed, values, vary
 from workbench.studies.power.sheet import named_wrong, summarise_sheet
@@ -129,7 +129,9 @@ def test_sets_are_of_all_kinds_alike() -> None:
 
 def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
     varied = ThresholdSensitivity(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
-    assert "nothing changes by: significant" in format_thresholds([varied], {"significant": 4.0})
+    assert (
+        "nothing changes by: significant" in thresholds_check([varied], {"significant": 4.0}).text
+    )
 
 
 # --- a data sheet that is wrong ---
@@ -158,7 +160,8 @@ def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:
     assert named_wrong(said("RollerInertia", ("DriveTorqueGain",)))
     assert named_wrong(said("RollerInertia", twins, ("BrakeFade",)))
     assert named_wrong(said("", ("BrakeFade",)))  # noise has no name
-    table = format_sheet(summarise_sheet([said("RollerInertia", twins), said("", ("BrakeFade",))]))
+    rows = summarise_sheet([said("RollerInertia", twins), said("", ("BrakeFade",))])
+    table = sheet_check(rows).text
     assert "DriveTorqueGain or RollerInertia" in table
     assert "1 of 2 sets have a wrong name" in table
 

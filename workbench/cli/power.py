@@ -31,6 +31,7 @@ from workbench.runtime.files import locked_folder
 if TYPE_CHECKING:
     from workbench.studies.power import Plantable, PowerStudy, SetVerdict, VirtualRig
     from workbench.studies.power.planting import Group
+    from workbench.studies.power.report import Check
 
 WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
 
@@ -246,72 +247,69 @@ def _usual(
 
 def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     from workbench.studies.power.planting import plan_sheet_errors
-    from workbench.studies.power.report import format_sheet, write_sheet
+    from workbench.studies.power.report import sheet_check
     from workbench.studies.power.sheet import summarise_sheet
 
     out = options.out / "sheet_error"
     groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)
     results, interrupted = _diagnosed(options, output, groups, study, out)
-    rows = summarise_sheet(results)
-    write_sheet(rows, _provenance(options, study, interrupted), out)
-    return _told(output, format_sheet(rows), out / "sheet_error.json", interrupted)
+    return _checked(options, output, study, sheet_check(summarise_sheet(results)), interrupted)
 
 
 def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
-    from workbench.studies.power.left_out import propose_left_out, summarise_left_out
-    from workbench.studies.power.report import format_left_out, write_left_out
+    from workbench.studies.power.left_out import propose_left_out
+    from workbench.studies.power.report import left_out_check
 
-    out = options.out / "left_out"
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
     engine = Engine(options.workers, output.stage)
     rows, interrupted = propose_left_out(_planned(largest, study), study, engine)
-    summary = summarise_left_out(rows)
-    write_left_out(summary, rows, _provenance(options, study, interrupted), out)
-    return _told(output, format_left_out(summary, rows), out / "left_out.json", interrupted)
+    return _checked(options, output, study, left_out_check(rows), interrupted)
 
 
 def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     from workbench.diagnosis.inference.thresholds import of_system
     from workbench.studies.power.planting import some
-    from workbench.studies.power.report import format_thresholds, write_thresholds
+    from workbench.studies.power.report import thresholds_check
     from workbench.studies.power.sensitivity import values, vary_sets
 
     sets = some(_planned(options, study), options.sets, options.seed)
     results, interrupted = vary_sets(sets, study, Engine(options.workers, output.stage))
     usual = values(of_system(study.system.comparison, len(study.effects)))
-    out = options.out / "thresholds"
-    write_thresholds(results, usual, _provenance(options, study, interrupted), out)
-    return _told(output, format_thresholds(results, usual), out / "thresholds.json", interrupted)
+    return _checked(options, output, study, thresholds_check(results, usual), interrupted)
 
 
 def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     from workbench.studies.power.planned import predict_campaign
-    from workbench.studies.power.report import format_plan, write_plan
+    from workbench.studies.power.report import campaign_check, draw_chances
 
-    out = options.out / "plan"
     sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
     output.stage("one set without any effect is made and diagnosed")
     rows = predict_campaign(study, wanted, sizes, options.seed)
-    write_plan(rows, sizes, _provenance(options, study, False), out)
-    return _told(output, format_plan(rows, sizes), out / "plan.json", False)
+    draw_chances(rows, sizes, options.out / "plan")
+    return _checked(options, output, study, campaign_check(rows, sizes), interrupted=False)
 
 
 def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
-    from workbench.studies.power.following import follow_proposals, summarise_following
-    from workbench.studies.power.report import format_followed, write_followed
+    from workbench.studies.power.following import follow_proposals
+    from workbench.studies.power.report import following_check
 
-    out = options.out / "followed"
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
     engine = Engine(options.workers, output.stage)
     rows, interrupted = follow_proposals(_planned(alone, study), study, engine)
-    summary = summarise_following(rows)
-    write_followed(summary, rows, _provenance(options, study, interrupted), out)
-    return _told(output, format_followed(summary, rows), out / "followed.json", interrupted)
+    return _checked(options, output, study, following_check(rows), interrupted)
 
 
-def _told(output: Output, text: str, path: Path, interrupted: bool) -> CommandResult:
-    """Say what was found and where it is written."""
-    output.result(text)
+def _checked(
+    options: argparse.Namespace,
+    output: Output,
+    study: PowerStudy,
+    check: Check,
+    interrupted: bool,
+) -> CommandResult:
+    """Write what a check found into a folder of its own, and say it."""
+    provenance = _provenance(options, study, interrupted)
+    path = check.write(provenance, options.out / check.name)
+    output.result(check.text)
     output.result(f"data: {path.parent}")
     return _written(path, interrupted)
 

@@ -1,4 +1,4 @@
-"""How far work is whose end is open: what was done, and what is left of the part under way."""
+"""How far work is: what was done, and the time that is left."""
 
 import threading
 import time
@@ -45,3 +45,24 @@ class ProgressReporter:
             self._report(line)
 
         return count
+
+
+class StepReporter:
+    """Says after each of a known number of steps what came of it, and the time left.
+
+    Parameters
+    ----------
+    report : takes a line.
+    total : number of steps.
+    """
+
+    def __init__(self, report: Callable[[str], None], total: int) -> None:
+        self._report, self._total, self._done = report, total, 0
+        self._begin = time.perf_counter()
+
+    def step(self, text: str) -> None:
+        """One step more is done."""
+        self._done += 1
+        left = (time.perf_counter() - self._begin) / self._done * (self._total - self._done)
+        place = f"{self._done:>{len(str(self._total))}}/{self._total}"
+        self._report(f"[{place}] {text}, about {left:.0f} s left")

@@ -1,7 +1,6 @@
 """A tuning from a model and recorded cases to gains, and to what they are worth."""
 
 import platform
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
@@ -17,6 +16,7 @@ from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
+from workbench.runtime.progress import StepReporter
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
@@ -139,13 +139,12 @@ class Lines(Progress):
     """A line on each generation, with the time left."""
 
     def __init__(self, plan: Plan, report: Callable[[str], None]) -> None:
-        self._plan, self._report, self._begin = plan, report, time.perf_counter()
+        self._report = report
+        self._generations = StepReporter(report, plan.generations + 1)
 
     def evolved(self, history: Sequence[Generation]) -> None:
         """See Progress."""
-        done, most = len(history), self._plan.generations
-        left = (time.perf_counter() - self._begin) / done * (most + 1 - done)
-        self._report(f"[{done - 1:>3}/{most}] z {history[-1].z:.5f}, at most {left:.0f} s left")
+        self._generations.step(f"z {history[-1].z:.5f}")
 
     def warn(self, message: str) -> None:
         """See Progress."""

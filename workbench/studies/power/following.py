@@ -1,7 +1,6 @@
 """Whether the recording that is proposed next parts what a set leaves together."""
 
-import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import replace
@@ -15,6 +14,7 @@ from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, Engine
 from workbench.runtime.pool import Pool
+from workbench.runtime.progress import StepReporter
 from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
 from workbench.studies.design.candidates import drawn
 from workbench.studies.power.diagnosing import (
@@ -72,7 +72,7 @@ def follow_proposals(
         )
     sets = [one for group in groups for one in group if one.kind == "single"]
     rows: dict[int, dict[str, Any]] = {}
-    begin = time.perf_counter()
+    progress = StepReporter(engine.report, len(sets))
     with (
         study.setup() as setup,
         Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
@@ -85,14 +85,13 @@ def follow_proposals(
                     rows[k] = task.result()
                 except WorkerError as error:
                     rows[k] = _begun(sets[k]) | {"error": repr(error)}
-                left = (time.perf_counter() - begin) / len(rows) * (len(sets) - len(rows))
-                engine.report(f"[{len(rows)}/{len(sets)}] {_said(rows[k])}; {left:.0f} s left")
+                progress.step(_said(rows[k]))
         except KeyboardInterrupt:
             return [rows[k] for k in sorted(rows)], True
     return [rows[k] for k in sorted(rows)], False
 
 
-def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Shares, see `SHARES`, of groups that hold the planted effect."""
     groups = [row for row in rows if row["proposed"] is not None]
     made = [group["proposed"] for group in groups]
@@ -109,7 +108,7 @@ def summarise_following(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _as_predicted(one: dict[str, Any]) -> bool:
+def _as_predicted(one: Mapping[str, Any]) -> bool:
     """Whether a separation is within a fifth, or what noise moves its square by: twice itself."""
     predicted, shown = one["predicted"], one["shown"]
     if shown is None:

@@ -1,7 +1,6 @@
 """What is proposed for a cause that the catalogue lacks: each effect left out in turn."""
 
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from workbench.diagnosis import Problem, diagnose
 from workbench.diagnosis.laws import Proposal, needs_law, propose
 from workbench.recordings.case import read_cases
 from workbench.runtime.engine import Engine
+from workbench.runtime.progress import StepReporter
 from workbench.studies.power.function_error import function_error
 from workbench.studies.power.planting import Group, Planting
 from workbench.studies.power.run import PowerStudy
@@ -65,15 +65,12 @@ def propose_left_out(
     """
     sets = [group[0] for group in groups if group[0].kind != "pair"]
     rows: list[dict[str, Any]] = []
-    begin = time.perf_counter()
+    progress = StepReporter(engine.report, len(sets))
     try:
-        for number, planting in enumerate(sets):
+        for planting in sets:
             rows.append(_row(planting, study, engine.workers))
-            left = (time.perf_counter() - begin) / (number + 1) * (len(sets) - number - 1)
             said = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
-            engine.report(
-                f"[{number + 1}/{len(sets)}] {planting.options}: {said}; {left:.0f} s left"
-            )
+            progress.step(f"{planting.options}: {said}")
     except KeyboardInterrupt:
         return rows, True
     return rows, False

@@ -1,7 +1,7 @@
 """Power of the diagnosis: figures, file and table."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,13 +33,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write_thresholds(
-    results: Sequence[ThresholdSensitivity],
-    usual: Mapping[str, float],
-    provenance: Mapping[str, Any],
-    out: Path,
-) -> None:
-    """Write thresholds.json.
+@dataclass(frozen=True)
+class Check:
+    """What a check of the diagnosis found, for a file and for people.
+
+    Attributes
+    ----------
+    name : of the file.
+    content : of the file, beside its answer and what was run.
+    text : table for the terminal.
+    """
+
+    name: str
+    answer: Answer
+    content: Mapping[str, Any]
+    text: str
+
+    def write(self, provenance: Mapping[str, Any], out: Path) -> Path:
+        """Write the file; returns its path."""
+        path = out / f"{self.name}.json"
+        write_json(path, with_answer(self.answer, {"provenance": provenance, **self.content}))
+        return path
+
+
+def thresholds_check(results: Sequence[ThresholdSensitivity], usual: Mapping[str, float]) -> Check:
+    """What other thresholds change, and those that change nothing.
 
     Parameters
     ----------
@@ -51,53 +69,34 @@ def write_thresholds(
             "kind": result.planting.kind,
             "planted": result.planting.effects,
             "said": result.said,
-            "changed": [asdict(other) for other in result.changed],
+            "changed": [asdict(change) for change in result.changed],
         }
         for result in results
     ]
     changes = sum(bool(result.changed) for result in results)
-    sentence = (
-        f"Half or twice of a threshold changes what is said of {changes} of {len(results)} sets."
+    answer = Answer(
+        f"Half or twice of a threshold changes what is said of {changes} of {len(results)} sets.",
+        {"sets of which something else is said": Measure(float(changes), "1", "lower")},
     )
-    headline = {"sets of which something else is said": Measure(float(changes), "1", "lower")}
-    content = {"provenance": provenance, "usual": usual, "sets": sets}
-    write_json(out / "thresholds.json", with_answer(Answer(sentence, headline), content))
-
-
-def format_thresholds(results: Sequence[ThresholdSensitivity], usual: Mapping[str, float]) -> str:
-    """Table of what changes, and the thresholds that change nothing."""
     lines = [f"{len(results)} sets, each threshold times {' and '.join(map(str, FACTORS))}", ""]
     idle = []
     for name, value in usual.items():
         rows = [
-            (change, result)
+            f"{name} {value:.4g} -> {change.value:.4g}: {', '.join(result.said)} becomes "
+            f"{', '.join(change.said)} ({result.planting.options})"
             for result in results
             for change in result.changed
             if change.threshold == name
         ]
         if not rows:
             idle.append(f"{name} {value:.4g}")
-        for change, one in rows:
-            lines.append(
-                f"{name} {value:.4g} -> {change.value:.4g}: {', '.join(one.said)} becomes "
-                f"{', '.join(change.said)} ({one.planting.options})"
-            )
-    return "\n".join([*lines, "", f"nothing changes by: {', '.join(idle)}"])
+        lines += rows
+    lines += ["", f"nothing changes by: {', '.join(idle)}"]
+    return Check("thresholds", answer, {"usual": usual, "sets": sets}, "\n".join(lines))
 
 
-def write_sheet(
-    rows: Sequence[Mapping[str, Any]], provenance: Mapping[str, Any], out: Path
-) -> None:
-    """Write sheet_error.json."""
-    wrong = sum(row["wrong_name"] for row in rows)
-    sentence = f"A wrong data sheet leads to a wrong name in {wrong} of {len(rows)} sets."
-    headline = {"sets with a wrong name": Measure(float(wrong), "1", "lower")}
-    content = {"provenance": provenance, "sets": list(rows)}
-    write_json(out / "sheet_error.json", with_answer(Answer(sentence, headline), content))
-
-
-def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Table of what was said, and the number of wrong names."""
+def sheet_check(rows: Sequence[Mapping[str, Any]]) -> Check:
+    """What was said of machines that differ from their sheet, and the number of wrong names."""
     lines = [f"{'wrong in the sheet':<26} {'verdict':<12} causes"]
     for row in rows:
         error = " ".join(f"{name}={gain:+g}" for name, gain in row["wrong"].items())
@@ -105,46 +104,61 @@ def format_sheet(rows: Sequence[Mapping[str, Any]]) -> str:
         mark = "  WRONG NAME" if row["wrong_name"] else ""
         lines.append(f"{error:<26} {row['verdict']:<12} {causes or row['error']}{mark}")
     wrong = sum(row["wrong_name"] for row in rows)
-    return "\n".join([*lines, "", f"{wrong} of {len(rows)} sets have a wrong name"])
+    lines += ["", f"{wrong} of {len(rows)} sets have a wrong name"]
+    answer = Answer(
+        f"A wrong data sheet leads to a wrong name in {wrong} of {len(rows)} sets.",
+        {"sets with a wrong name": Measure(float(wrong), "1", "lower")},
+    )
+    return Check("sheet_error", answer, {"sets": list(rows)}, "\n".join(lines))
 
 
-def write_left_out(
-    summary: Mapping[str, Any],
-    rows: Sequence[Mapping[str, Any]],
-    provenance: Mapping[str, Any],
-    out: Path,
-) -> None:
-    """Write left_out.json.
-
-    Parameters
-    ----------
-    summary : shares of all.
-    """
+def left_out_check(rows: Sequence[Mapping[str, Any]]) -> Check:
+    """What was proposed for causes that were left out, and how often it acts where they did."""
+    lines = []
+    for row in rows:
+        what = ", ".join(row["left_out"]) or row["rig"]
+        mark = {True: "right slot", False: "NOT THE SLOT", None: "no cause"}[row["slot_right"]]
+        named = f", {' and '.join(row['named'])}" * bool(row["named"])
+        late = f", {' and '.join(row['late'])} late" * bool(row["late"])
+        nothing = f"nothing proposed ({row['verdict']}{named}{late})"
+        said = "; ".join(row["laws"]) or row["error"] or nothing
+        lines.append(f"{what:<30} {mark if row['asked'] else '':<16} {said}")
+    summary = left_out.summarise_left_out(rows)
     right = summary["right_slot"]
     sentence = (
         f"The slot of the cause that was left out is proposed in {right['hits']} of {right['of']} "
         "sets that nothing else explains."
     )
-    answer = Answer(sentence, _measures(summary, left_out.SHARES, lower=("clean",)))
-    content = {"provenance": provenance, **summary, "sets": list(rows)}
-    write_json(out / "left_out.json", with_answer(answer, content))
+    headline = _measures(summary, left_out.SHARES, lower=("clean",))
+    lines += ["", *_shares(summary, left_out.SHARES)]
+    content = {**summary, "sets": list(rows)}
+    return Check("left_out", Answer(sentence, headline), content, "\n".join(lines))
 
 
-def format_left_out(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
-    """Table of what was proposed, and how often it acts where the cause did."""
+def following_check(rows: Sequence[Mapping[str, Any]]) -> Check:
+    """What was left together, what was said once the proposed recording was made, all shares."""
     lines = []
     for row in rows:
-        what = ", ".join(row["left_out"]) or row["rig"]
-        mark = {True: "right slot", False: "NOT THE SLOT", None: "no cause"}[row["slot_right"]]
-        said = "; ".join(row["laws"]) or row["error"] or _nothing(row)
-        lines.append(f"{what:<30} {mark if row['asked'] else '':<16} {said}")
-    return "\n".join([*lines, "", *_shares(summary, left_out.SHARES)])
-
-
-def _nothing(row: Mapping[str, Any]) -> str:
-    named = f", {' and '.join(row['named'])}" * bool(row["named"])
-    late = f", {' and '.join(row['late'])} late" * bool(row["late"])
-    return f"nothing proposed ({row['verdict']}{named}{late})"
+        made = row["proposed"]
+        said = " or ".join(row["group"]) or row["error"] or row["verdict"]
+        if made is not None:
+            then = " or ".join(made["named"]) or made["verdict"]
+            drawn = ["parts" if other["parts"] else "does not" for other in row["drawn"]]
+            said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+        if (sensed := row["sensed"]) is not None:
+            then = " or ".join(sensed["named"]) or sensed["verdict"]
+            said += f"; with a sensor of {sensed['sensor']}: {then}"
+        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
+    summary = following.summarise_following(rows)
+    proposed, others = summary["proposed"], summary["drawn"]
+    sentence = (
+        f"The recording that is proposed parts {proposed['hits']} of {proposed['of']} groups, one "
+        f"that is drawn {others['hits']} of {others['of']}."
+    )
+    headline = _measures(summary, following.SHARES, lower=("drawn", "never"))
+    lines += ["", *_shares(summary, following.SHARES)]
+    content = {**summary, "sets": list(rows)}
+    return Check("followed", Answer(sentence, headline), content, "\n".join(lines))
 
 
 def _measures(
@@ -167,49 +181,8 @@ def _shares(summary: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
     ]
 
 
-def write_followed(
-    summary: Mapping[str, Any],
-    rows: Sequence[Mapping[str, Any]],
-    provenance: Mapping[str, Any],
-    out: Path,
-) -> None:
-    """Write followed.json.
-
-    Parameters
-    ----------
-    summary : shares of all.
-    """
-    made, drawn = summary["proposed"], summary["drawn"]
-    sentence = (
-        f"The recording that is proposed parts {made['hits']} of {made['of']} groups, one that is "
-        f"drawn {drawn['hits']} of {drawn['of']}."
-    )
-    headline = _measures(summary, following.SHARES, lower=("drawn", "never"))
-    content = {"provenance": provenance, **summary, "sets": list(rows)}
-    write_json(out / "followed.json", with_answer(Answer(sentence, headline), content))
-
-
-def format_followed(summary: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
-    """Table of what was left together and what was said then, and all shares."""
-    lines = []
-    for row in rows:
-        made = row["proposed"]
-        said = " or ".join(row["group"]) or row["error"] or row["verdict"]
-        if made is not None:
-            then = " or ".join(made["named"]) or made["verdict"]
-            drawn = ["parts" if one["parts"] else "does not" for one in row["drawn"]]
-            said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
-        if (sensed := row["sensed"]) is not None:
-            then = " or ".join(sensed["named"]) or sensed["verdict"]
-            said += f"; with a sensor of {sensed['sensor']}: {then}"
-        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
-    return "\n".join([*lines, "", *_shares(summary, following.SHARES)])
-
-
-def write_plan(
-    rows: Sequence[EffectChance], sizes: Sequence[float], provenance: Mapping[str, Any], out: Path
-) -> None:
-    """Write plan.json and the figure of chances.
+def campaign_check(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Check:
+    """Chances that planned recordings show effects, by size.
 
     Parameters
     ----------
@@ -221,24 +194,23 @@ def write_plan(
         f"at {sizes[-1]:g} times the size that matters."
     )
     headline = {f"effects shown at {sizes[-1]:g} times": Measure(float(seen), "1", "higher")}
-    content = {"provenance": provenance, "sizes": list(sizes), "effects": list(map(asdict, rows))}
-    write_json(out / "plan.json", with_answer(Answer(sentence, headline), content))
-    with in_style():
-        save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
-
-
-def format_plan(rows: Sequence[EffectChance], sizes: Sequence[float]) -> str:
-    """Table of chances, by size."""
     lines = [f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)]
     lines[0] += f"{f'found by {SURE:.0%} from':>24}"
-    for one in rows:
-        row = f"{one.effect:<30}{with_unit(one.matters, one.unit):>18}"
-        if one.least is None:
+    for chance in rows:
+        row = f"{chance.effect:<30}{with_unit(chance.matters, chance.unit):>18}"
+        if chance.least is None:
             lines.append(f"{row}  these recordings cannot show it")
             continue
-        row += "".join(f"{f'{chance:.0%}':>8}" for _, chance in one.chances)
-        lines.append(f"{row}{with_unit(one.least, one.unit):>24}")
-    return "\n".join(lines)
+        row += "".join(f"{f'{share:.0%}':>8}" for _, share in chance.chances)
+        lines.append(f"{row}{with_unit(chance.least, chance.unit):>24}")
+    content = {"sizes": list(sizes), "effects": list(map(asdict, rows))}
+    return Check("plan", Answer(sentence, headline), content, "\n".join(lines))
+
+
+def draw_chances(rows: Sequence[EffectChance], sizes: Sequence[float], out: Path) -> None:
+    """Draw the chances of a campaign to plan.png and plan.svg."""
+    with in_style():
+        save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
 
 
 def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> "Figure":
@@ -258,8 +230,6 @@ def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> "Figure":
 
 
 _STYLE = "2"
-
-
 _INTERVAL = (
     "Intervals hold the true share in at least 95 % of such runs, however few sets there are "
     "(Clopper and Pearson 1934)."

@@ -17,6 +17,7 @@ from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case, read_cases
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
+from workbench.runtime.progress import StepReporter
 from workbench.studies.power.diagnosing import build_everything, diagnose_set
 from workbench.studies.power.journal import Journal, SetVerdict, diagnosed
 from workbench.studies.power.planting import Group, Planting, Repertoire
@@ -125,20 +126,14 @@ def diagnose_sets(
 
 def _run(groups: Sequence[Group], setup: Setup, journal: Journal, engine: Engine) -> bool:
     """Diagnose all groups; returns whether the run was interrupted."""
-    total = sum(map(len, groups))
-    begin, done = time.perf_counter(), 0
+    progress = StepReporter(engine.report, sum(map(len, groups)))
 
     def collect(task: Future[list[SetVerdict]]) -> None:
-        nonlocal done
         for result in _results(task, open_tasks.pop(task)):
             journal.append(result)
-            done += 1
-            left = (time.perf_counter() - begin) / done * (total - done)
             name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
             said = ", ".join(cause.effect for cause in result.causes) or result.verdict
-            engine.report(
-                f"[{done:>4}/{total}] {name or 'clean':<40} {said}  about {left:.0f} s left"
-            )
+            progress.step(f"{name or 'clean':<40} {said}")
 
     # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
     with Pool(engine.workers, nullcontext, setup, isolated=True) as pool:

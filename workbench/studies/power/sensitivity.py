@@ -1,7 +1,6 @@
 """Which thresholds of the diagnosis matter: half and twice of each, on the same recordings."""
 
 import dataclasses
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
@@ -23,6 +22,7 @@ from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, silent
 from workbench.runtime.pool import Pool
+from workbench.runtime.progress import StepReporter
 from workbench.studies.power.planting import Planting
 from workbench.studies.power.run import PowerStudy, Setup
 from workbench.system.system import System
@@ -176,7 +176,7 @@ def vary_sets(
         If a model is not what it should be.
     """
     results: list[ThresholdSensitivity] = []
-    begin = time.perf_counter()
+    progress = StepReporter(engine.report, len(plantings))
     names = list(values(of_system(study.system.comparison, len(study.effects))))
     with (
         study.setup() as setup,
@@ -184,8 +184,7 @@ def vary_sets(
     ):
         tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
         try:
-            for done, task in enumerate(as_completed(tasks), start=1):
-                left = (time.perf_counter() - begin) / done * (len(tasks) - done)
+            for task in as_completed(tasks):
                 try:
                     varied = task.result()
                 except WorkerError as error:
@@ -193,10 +192,7 @@ def vary_sets(
                 else:
                     results.append(varied)
                     said = f"{', '.join(varied.said)}; {len(varied.changed)} changes"
-                engine.report(
-                    f"[{done:>3}/{len(tasks)}] {tasks[task].options}: {said}  "
-                    f"about {left:.0f} s left"
-                )
+                progress.step(f"{tasks[task].options}: {said}")
         except KeyboardInterrupt:
             engine.report("interrupted")
             return results, True
