@@ -29,6 +29,7 @@ class Layout(NamedTuple):
     ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
     reported : number of the model's outputs that estimates hold.
     columns : of the Jacobian that laws need: rates, and all outputs if one that is fed is no state.
+    held : (m,) 1 of an input that stays as it was sampled until the next sample, else 0.
     """
 
     seen: NDArray[np.intp]
@@ -45,6 +46,7 @@ class Layout(NamedTuple):
     lead: float
     reported: int
     columns: int
+    held: Vector
 
 
 def layout(fmu: FMU, system: System) -> Layout:
@@ -85,6 +87,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
         reported=len(system.reported),
         columns=len(states) + (len(system.reported) + unseen if unseen else 0),
+        held=np.array([float(signal.held) for signal in system.inputs]),
     )
 
 
@@ -212,6 +215,33 @@ def stick(layout, x, before):  # type: ignore[no-untyped-def]
     rolls = layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
     if rolls and before * lag(layout, x) < 0.0:
         x[layout.follower] = layout.ratio * x[layout.leader]
+
+
+@inlined
+def assign(target, source):  # type: ignore[no-untyped-def]
+    """Copy a vector, in rising order."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@inlined
+def assign_rows(target, source):  # type: ignore[no-untyped-def]
+    """Copy a matrix, in rising order."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@inlined
+def act(layout, before, u, acting):  # type: ignore[no-untyped-def]
+    """Write the inputs that act in a step, (m,): u + held (before - u).
+
+    Parameters
+    ----------
+    before, u : (m,) inputs at the beginning of the step, and at its end.
+    """
+    for j in range(u.size):
+        acting[j] = before[j] if layout.held[j] > 0.0 else u[j]
 
 
 @inlined

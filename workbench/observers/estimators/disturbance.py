@@ -30,7 +30,9 @@ from workbench.observers.gains import (
 )
 from workbench.observers.layout import (
     Layout,
+    act,
     add_slope,
+    assign,
     authority,
     clip,
     correct,
@@ -85,6 +87,7 @@ class ObserverState(NamedTuple):
     target, drift : (q,) what deviations decay to, and by how much it moved in this step.
     system : (s + q, s + q + 1) of the step, with its right-hand side.
     others, innovation : work space.
+    inputs, acting : (m,) the sample before, and what acts in the step, see `act`.
     """
 
     z: Vector
@@ -94,6 +97,8 @@ class ObserverState(NamedTuple):
     system: Matrix
     others: Vector
     innovation: Vector
+    inputs: Vector
+    acting: Vector
 
 
 @inlined
@@ -103,9 +108,10 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
     system, innovation = state.system, state.innovation
     n, s, q, outputs = model.x.size, states.size, z.size, y.size
     change = system[:, s + q]
-    status = measure(model, u)
+    status = 0
     if h > 0.0:
-        status = status or evaluate(model)
+        act(layout, state.inputs, u, state.acting)
+        status = measure(model, state.acting) or evaluate(model)
         for i in range(n):
             state.others[i] = h * model.dx[i]
         for i in range(s):
@@ -152,7 +158,9 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
         for i in range(q):
             z[i] = clip(z[i] + change[s + i], layout.low[i], layout.high[i])
         stick(layout, model.x, before)
-    return status or correct(model, z) or report(model, layout, estimate)
+    assign(state.inputs, u)
+    status = status or measure(model, u) or correct(model, z)
+    return status or report(model, layout, estimate)
 
 
 @compiled
@@ -224,6 +232,8 @@ class DisturbanceObserver(Estimator):
             system=np.zeros((s + q, s + q + 1)),
             others=np.zeros(len(fmu.states)),
             innovation=np.zeros(outputs),
+            inputs=np.zeros(len(system.inputs)),
+            acting=np.zeros(len(system.inputs)),
         )
 
     def _arguments(self) -> tuple[Any, Any]:

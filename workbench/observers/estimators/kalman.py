@@ -24,7 +24,18 @@ from workbench.models.native import (
 )
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains, SearchSpace, noise_space
-from workbench.observers.layout import Layout, clip, fading, lag, measure, put, report, stick
+from workbench.observers.layout import (
+    Layout,
+    act,
+    assign,
+    clip,
+    fading,
+    lag,
+    measure,
+    put,
+    report,
+    stick,
+)
 from workbench.observers.operating import walks
 from workbench.system.system import System
 
@@ -377,7 +388,8 @@ class FilterSettings(NamedTuple):
 class FilterState(NamedTuple):
     """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
 
-    `least` holds the variances of a step of the states, (n,), see `drive`.
+    `least` holds the variances of a step of the states, (n,), see `drive`; `inputs` the sample
+    before, and `acting` what acts in the step, (m,), see `act`.
     """
 
     z: Vector
@@ -389,6 +401,8 @@ class FilterState(NamedTuple):
     change: Vector
     column: Vector
     levels: Levels
+    inputs: Vector
+    acting: Vector
 
 
 @compiled
@@ -501,6 +515,7 @@ def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
         at = layout.seen[j]
         if at >= 0 and not np.isnan(y[j]):
             state.P[at, at] = variance(settings, fade, y, j)
+    assign(state.inputs, u)
     return measure(model, u)
 
 
@@ -508,7 +523,8 @@ def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
 def forecast(model, settings, state, h, u, y):  # type: ignore[no-untyped-def]
     """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
     layout, P, size = settings.layout, state.P, state.z.size
-    status = drive(model, settings, state, state.z, u, h)
+    act(layout, state.inputs, u, state.acting)
+    status = drive(model, settings, state, state.z, state.acting, h)
     status = status or predict(model, settings, state, state.z, h)
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
@@ -518,6 +534,8 @@ def forecast(model, settings, state, h, u, y):  # type: ignore[no-untyped-def]
         state.levels.noise[j] = variance(settings, fade, y, j)
     status = status or transition(model, state.spread, h)
     carry(state.spread[:, model.x.size :], P, state.product)
+    assign(state.inputs, u)
+    status = status or measure(model, u)
     if layout.columns > model.x.size:
         status = status or put(model, state.z) or read(model)
         status = status or linearise(model, layout.columns)
@@ -589,9 +607,7 @@ class ExtendedKalmanFilter(Estimator):
             driven=told * np.array([one.noise for one in system.inputs]),
             driven_relative=told * np.array([one.relative_noise for one in system.inputs]),
         )
-        self._state: Any = FilterState(
-            *buffers(n, q), np.zeros(n + q), levels(n + q, len(system.outputs))
-        )
+        self._state: Any = filter_state(n, system, n + q)
 
     def _spreads(self) -> Vector:
         """What is not known of the states at the start, (n,)."""
@@ -665,9 +681,25 @@ def _share(gains: Gains, output: str) -> float:
     return gains[name] if name in gains.names else 0.0
 
 
-def buffers(n: int, q: int) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix, Vector, Vector]:
-    """Memory and work space of a filter with so many states and quantities: z to change."""
+def filter_state(n: int, system: System, column: int) -> FilterState:
+    """State of a filter on a model with n states, in which everything is zero.
+
+    Parameters
+    ----------
+    column : size of a work space.
+    """
+    q, m, outputs = len(system.estimated), len(system.inputs), len(system.outputs)
     size = n + q
-    z, change, product = np.zeros(size), np.zeros(size), np.zeros((n, size))
-    spread = np.zeros((n, n + size))
-    return z, np.zeros((size, size)), np.zeros((n, n + 1)), spread, product, np.zeros(n), change
+    return FilterState(
+        z=np.zeros(size),
+        P=np.zeros((size, size)),
+        system=np.zeros((n, n + 1)),
+        spread=np.zeros((n, n + size)),
+        product=np.zeros((n, size)),
+        least=np.zeros(n),
+        change=np.zeros(size),
+        column=np.zeros(column),
+        levels=levels(size, outputs),
+        inputs=np.zeros(m),
+        acting=np.zeros(m),
+    )

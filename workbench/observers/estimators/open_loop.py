@@ -17,21 +17,24 @@ from workbench.models.native import (
 )
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, measure, report
+from workbench.observers.layout import Layout, act, assign, measure, report
 from workbench.system.system import System
 
 
 class _State(NamedTuple):
     system: Matrix  # (n, n + 1) of the step, with its right-hand side
+    inputs: Vector  # the sample before, and what acts in the step, see `act`
+    acting: Vector
 
 
 @inlined
 def _step(model, layout, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """One linearly implicit Euler step of the model; y is not used."""
     n, system = model.x.size, state.system
-    status = measure(model, u)
+    status = 0
     if h > 0.0:
-        status = status or evaluate(model)
+        act(layout, state.inputs, u, state.acting)
+        status = measure(model, state.acting) or evaluate(model)
         for i in range(n):
             system[i, n] = h * model.dx[i]
         status = status or linearise(model, n)
@@ -42,7 +45,8 @@ def _step(model, layout, state, h, u, y, estimate):  # type: ignore[no-untyped-d
         for i in range(n):
             model.x[i] += system[i, n]
         status = set_states(model)
-    return status or report(model, layout, estimate)
+    assign(state.inputs, u)
+    return status or measure(model, u) or report(model, layout, estimate)
 
 
 @compiled
@@ -66,8 +70,8 @@ class OpenLoop(Estimator):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        n = len(fmu.states)
-        self._state = _State(np.zeros((n, n + 1)))
+        n, m = len(fmu.states), len(system.inputs)
+        self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
 
     def _arguments(self) -> tuple[Layout, Any]:
         return self._layout, self._state

@@ -23,7 +23,9 @@ from workbench.observers.gains import (
 )
 from workbench.observers.layout import (
     Layout,
+    act,
     add_slope,
+    assign,
     authority,
     clip,
     correct,
@@ -52,6 +54,8 @@ class _State(NamedTuple):
     z: Vector  # corrections
     system: Matrix  # (n, n + 1) of the step, with its right-hand side
     innovation: Vector
+    inputs: Vector  # the sample before, and what acts in the step, see `act`
+    acting: Vector
 
 
 @compiled
@@ -60,9 +64,10 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     layout, integral, gains = settings.layout, state.integral, state.gains
     z, system, innovation = state.z, state.system, state.innovation
     n, q, outputs = model.x.size, z.size, y.size
-    status = measure(model, u)
+    status = 0
     if h > 0.0:
-        status = status or evaluate(model)
+        act(layout, state.inputs, u, state.acting)
+        status = measure(model, state.acting) or evaluate(model)
         for i in range(n):
             system[i, n] = h * model.dx[i]
         for j in range(outputs):
@@ -101,7 +106,8 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
             integral[k] = clip(integral[k], layout.low[k], layout.high[k])
             z[k] = clip(integral[k] + direct, layout.low[k], layout.high[k])
         status = correct(model, z)
-    return status or report(model, layout, estimate)
+    assign(state.inputs, u)
+    return status or measure(model, u) or report(model, layout, estimate)
 
 
 @compiled
@@ -150,6 +156,8 @@ class ParameterEstimator(Estimator):
             z=np.zeros(q),
             system=np.zeros((n, n + 1)),
             innovation=np.zeros(outputs),
+            inputs=np.zeros(len(system.inputs)),
+            acting=np.zeros(len(system.inputs)),
         )
 
     def _arguments(self) -> tuple[Any, Any]:

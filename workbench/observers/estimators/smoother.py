@@ -19,8 +19,6 @@ from workbench.observers.estimators.moving_horizon.estimator import (
 )
 from workbench.observers.estimators.moving_horizon.window import (
     Window,
-    assign,
-    assign_rows,
     end,
     measurement_update,
     solve_damped,
@@ -30,7 +28,7 @@ from workbench.observers.estimators.moving_horizon.window import (
 from workbench.observers.estimators.moving_horizon.window_bounds import push
 from workbench.observers.estimators.moving_horizon.window_cost import cost
 from workbench.observers.estimators.moving_horizon.window_spread import gather_spread, spread
-from workbench.observers.layout import clip, measure
+from workbench.observers.layout import assign, assign_rows, clip, measure
 
 # Share of its noise below which a step follows the model: where feedback has faded to a thousandth.
 _FAINTEST = 1e-6
@@ -49,6 +47,7 @@ def _keep(settings, whole, part, k):  # type: ignore[no-untyped-def]
     whole.filled[0] = at + 1
     whole.steps[at] = part.steps[k]
     assign(whole.inputs[at], part.inputs[k])
+    assign(whole.reached[at], part.reached[k])
     assign(whole.samples[at], part.samples[k])
     assign(whole.levels[at], part.levels[k])
     assign(whole.weight[at], part.weight[k])

@@ -11,12 +11,11 @@ from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
     Levels,
     begin,
-    buffers,
     drive,
     ekf_step,
+    filter_state,
     finish,
     learn,
-    levels,
     note,
     predict,
     process_noise,
@@ -25,7 +24,7 @@ from workbench.observers.estimators.kalman import (
     variance,
 )
 from workbench.observers.gains import Gains
-from workbench.observers.layout import clip, fading, put
+from workbench.observers.layout import act, assign, clip, fading, measure, put
 from workbench.system.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -49,6 +48,8 @@ class PointsState(NamedTuple):
     change: Vector
     column: Vector
     levels: Levels
+    inputs: Vector
+    acting: Vector
     start: Vector  # z before the step
     root: Matrix
     points: Matrix  # (2 size, size)
@@ -113,7 +114,7 @@ def _covariance_to_root(state):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _spread(model, settings, state, spread, h):  # type: ignore[no-untyped-def]
+def _spread(model, settings, state, spread, h, u):  # type: ignore[no-untyped-def]
     """Advance all sigma points and read their outputs; leaves their mean in z; a status."""
     z, root, points, layout = state.z, state.root, state.points, settings.layout
     size, n, status = z.size, model.x.size, 0
@@ -126,7 +127,8 @@ def _spread(model, settings, state, spread, h):  # type: ignore[no-untyped-def]
                 point[n + j] = clip(point[n + j], layout.low[j], layout.high[j])
             status = status or predict(model, settings, state, point, h)
             if layout.columns > n:
-                status = status or put(model, point) or read(model)
+                status = status or measure(model, u) or put(model, point) or read(model)
+                status = status or measure(model, state.acting)
             for j in range(layout.seen.size):
                 at = layout.seen[j]
                 state.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
@@ -208,7 +210,8 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
         status = ekf_step(model, settings, state, h, u, y, estimate)
         _covariance_to_root(state)
         return status
-    status = drive(model, settings, state, z, u, h)
+    act(layout, state.inputs, u, state.acting)
+    status = drive(model, settings, state, z, state.acting, h)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
         moves = np.sqrt(process_noise(settings, state, fade, h, i))
@@ -218,7 +221,7 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
             stack[size + i, j] = moves if j == i else 0.0
     triangularise(stack[: 2 * size, :size], root)
     spread = POINT_DISTANCE * np.sqrt(1.0 * size)
-    status = status or _spread(model, settings, state, spread, h)
+    status = status or _spread(model, settings, state, spread, h, u)
     if status:
         return status
     _absorb(settings, state, spread, fade, y, estimate)
@@ -230,10 +233,12 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
             _covariance_to_root(state)
             return status
         state.levels.surprised[0] = 0.0
+    assign(state.inputs, u)
+    status = measure(model, u)
     _root_to_covariance(state)
     if settings.learning.within < np.inf:
         learn(settings, state, fade, h)
-    return finish(model, settings, state, estimate)
+    return status or finish(model, settings, state, estimate)
 
 
 @compiled
@@ -270,9 +275,7 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(self.system.outputs)
         self._state = PointsState(
-            *buffers(len(fmu.states), len(system.estimated)),
-            np.zeros(max(size, 2 * outputs)),
-            levels(size, outputs),
+            *filter_state(len(fmu.states), self.system, max(size, 2 * outputs)),
             start=np.zeros(size),
             root=np.zeros((size, size)),
             points=np.zeros((2 * size, size)),

@@ -67,8 +67,16 @@ def build_observer(
     Raises
     ------
     InputError
-        If the sources have errors.
+        If the sources have errors, or the system has an input that is held.
     """
+    if held := [signal.name for signal in observer.system.inputs if signal.held]:
+        raise InputError(
+            where=f"{observer.system.source}, [export.classes]",
+            found=f"a class of {observer.kind.name}, and the input {held[0]} that is held",
+            expected="inputs that are not, as the FMU of a class takes those of the step's end",
+            remedy=f"leave {observer.kind.name} out of [export.classes]: its step is then "
+            "translated from Python, which holds them",
+        )
     space = _with_gains(make_explicit(flatten(observer.system.library, observer.model)), observer)
     law = SteppingLaw(
         sources={"integrator.c": _LAW},

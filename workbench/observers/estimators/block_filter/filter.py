@@ -40,7 +40,7 @@ from workbench.observers.estimators.block_filter.block_step import predict
 from workbench.observers.estimators.block_filter.blocks import Blocks, blocks, widths
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter, FilterSettings, variance
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, clip, fading, measure, put, report
+from workbench.observers.layout import Layout, act, assign, clip, fading, measure, put, report
 from workbench.system.system import System
 
 
@@ -80,6 +80,7 @@ class ArrowState(NamedTuple):
     column, row, told : (m,), (w,), (w,) work space of an output.
     measured : (l, m + s) derivatives of the outputs that are no states.
     reported : (n + q, r) derivatives of reported outputs, in the order of blocks.
+    inputs, acting : (m,) the sample before, and what acts in the step, see `act`.
     """
 
     z: Vector
@@ -110,6 +111,8 @@ class ArrowState(NamedTuple):
     told: Vector
     measured: Matrix
     reported: Matrix
+    inputs: Vector
+    acting: Vector
 
 
 @compiled
@@ -152,6 +155,7 @@ def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
                 state.P[own, own] = known
             else:
                 state.C[place, own] = known
+    assign(state.inputs, u)
     return measure(model, u)
 
 
@@ -163,7 +167,10 @@ def arrow_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-un
         return status or finish(model, settings, state, estimate)
     layout = settings.filter.layout
     fade = fading(layout, y)
-    status = measure(model, u) or predict(model, settings, state, h, fade)
+    act(layout, state.inputs, u, state.acting)
+    status = measure(model, state.acting) or predict(model, settings, state, h, fade)
+    assign(state.inputs, u)
+    status = status or measure(model, u)
     if layout.columns > model.x.size:
         status = status or put(model, state.z) or read(model)
         status = status or slopes_of_fed(model, settings, state)
@@ -291,4 +298,6 @@ def _state(parts: Blocks, layout: Layout, n: int) -> ArrowState:
         told=np.zeros(s + m),
         measured=np.zeros((outputs, m + s)),
         reported=np.zeros((size, layout.reported)),
+        inputs=np.zeros(layout.held.size),
+        acting=np.zeros(layout.held.size),
     )

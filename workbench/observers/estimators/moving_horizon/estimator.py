@@ -27,8 +27,6 @@ from workbench.observers.estimators.kalman import (
 )
 from workbench.observers.estimators.moving_horizon.window import (
     Window,
-    assign,
-    assign_rows,
     end,
     shift,
     solve_free,
@@ -37,7 +35,7 @@ from workbench.observers.estimators.moving_horizon.window import (
 from workbench.observers.estimators.moving_horizon.window_bounds import bound
 from workbench.observers.estimators.moving_horizon.window_cost import cost, reweigh
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, fading, measure, put
+from workbench.observers.layout import Layout, act, assign, assign_rows, fading, measure, put
 from workbench.system.system import System
 
 HORIZON = 20  # samples
@@ -96,7 +94,8 @@ def _append(settings, state, h, u, y):  # type: ignore[no-untyped-def]
             held[j] = y[j]
     fade = fading(settings.layout, held)
     window.steps[k] = h
-    assign(window.inputs[k], u)
+    assign(window.inputs[k], state.filter.acting)
+    assign(window.reached[k], u)
     assign(window.samples[k], y)
     for j in range(y.size):
         levels.noise[j] = variance(settings, fade, held, j)
@@ -128,6 +127,7 @@ def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
         for j in range(arrived.size):
             window.F[k, i, j] = state.filter.spread[i, n + j]
     if layout.columns > n:
+        status = status or measure(model, window.reached[k])
         status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
     for j in range(layout.seen.size):
         at = layout.seen[j]
@@ -240,13 +240,15 @@ def horizon_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-
         assign(window.mean, state.filter.z)
         assign_rows(window.covariance, state.filter.P)
         return status or finish(model, settings, state.filter, estimate)
-    status = drive(model, settings, state.filter, state.filter.z, u, h)
+    act(settings.layout, state.filter.inputs, u, state.filter.acting)
+    status = drive(model, settings, state.filter, state.filter.z, state.filter.acting, h)
     _append(settings, state, h, u, y)
     status = status or expand(model, settings, state, window.filled[0] - 1)
     for iteration in range(settings.iterations):
         _solve(settings, state, iteration == 0, estimate)
         status = status or _relinearise(model, settings, state)
-    return status or finish(model, settings, state.filter, estimate)
+    assign(state.filter.inputs, u)
+    return status or measure(model, u) or finish(model, settings, state.filter, estimate)
 
 
 @compiled

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.models.native import compiled, inlined
 from workbench.observers.estimators.kalman import carry
+from workbench.observers.layout import assign, assign_rows
 
 Tensor = NDArray[np.float64]
 
@@ -37,7 +38,8 @@ class Window(NamedTuple):
     filled : (1,) nodes that are there.
     mean, covariance : of the first node before the noise of the model; all older samples.
     low, high : (s,) bounds.
-    nodes : (N, s) where the steps are linearised; inputs, samples, steps : of each node's step.
+    nodes : (N, s) where the steps are linearised; inputs, samples, steps : of each node's step;
+        reached : (N, m) inputs at its end.
     noise : (N, s) variances of the model's noise; levels : (N, l) variances of samples.
     arrived : (N, s) where a step from the node leads; F : (N, n, s) its derivatives.
     slopes : (N, l, s) derivatives of outputs there; errors : (N, l) samples less outputs.
@@ -63,6 +65,7 @@ class Window(NamedTuple):
     high: Vector
     nodes: Matrix
     inputs: Matrix
+    reached: Matrix
     samples: Matrix
     steps: Vector
     noise: Matrix
@@ -109,6 +112,7 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
         high=high,
         nodes=np.zeros((N, s)),
         inputs=np.zeros((N, m)),
+        reached=np.zeros((N, m)),
         samples=np.zeros((N, outputs)),
         steps=np.zeros(N),
         noise=np.zeros((N, s)),
@@ -144,21 +148,6 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
     )
 
 
-@inlined
-def assign(target, source):  # type: ignore[no-untyped-def]
-    """Copy a vector, in rising order."""
-    for i in range(target.size):
-        target[i] = source[i]
-
-
-@inlined
-def assign_rows(target, source):  # type: ignore[no-untyped-def]
-    """Copy a matrix, in rising order."""
-    for i in range(target.shape[0]):
-        for j in range(target.shape[1]):
-            target[i, j] = source[i, j]
-
-
 @compiled
 def shift(window):  # type: ignore[no-untyped-def]
     """Forget the oldest node: what it tells becomes the mean and covariance of the next one."""
@@ -168,6 +157,7 @@ def shift(window):  # type: ignore[no-untyped-def]
     assign_rows(window.covariance, window.next_covariance)
     assign(window.steps[:last], window.steps[1:])
     assign_rows(window.inputs[:last], window.inputs[1:])
+    assign_rows(window.reached[:last], window.reached[1:])
     assign_rows(window.nodes[:last], window.nodes[1:])
     assign_rows(window.noise[:last], window.noise[1:])
     assign_rows(window.arrived[:last], window.arrived[1:])

@@ -1,0 +1,125 @@
+"""An input that is held between samples acts as it was at the beginning of each step."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from workbench import case_from_frame
+from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.observers import estimators_of
+from workbench.observers.export import ObserverModel, build_observer
+from workbench.observers.replay import replay
+from workbench.recordings.case import Case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+VESSEL = """
+package Vessel "A vessel that a pump fills"
+  model Observer "Its volume"
+    parameter Real leak(unit="m3/s") = 0.0 "What is lost";
+    input Real q(unit="m3/s") "Flow of the pump";
+    input Real dl(unit="m3/s") "Correction of leak";
+    output Real V(unit="m3", start=0.0, fixed=true, nominal=0.01) "Volume";
+    output Real through(unit="m3/s") = q "Flow that a meter sees, too";
+  equation
+    der(V) = q - (leak + dl);
+  end Observer;
+end Vessel;
+"""
+SYSTEM = """
+title = "A vessel"
+sample_time = "1 s"
+
+[models]
+observer = { class = "Observer" }
+
+[inputs.q]
+unit = "m3/s"
+noise = "0 m3/s"
+scale = "1e-3 m3/s"
+held = true
+
+[outputs.V]
+unit = "m3"
+noise = "1e-5 m3"
+scale = "0.01 m3"
+
+[outputs.through]
+unit = "m3/s"
+noise = "1e-6 m3/s"
+scale = "1e-3 m3/s"
+
+[estimated.leak]
+correction = "dl"
+unit = "m3/s"
+range = ["-5e-4 m3/s", "5e-4 m3/s"]
+walk = "1e-6 m3/s"
+spread = "1e-5 m3/s"
+acts_on = "V"
+"""
+ESTIMATORS = [
+    "open_loop",
+    "disturbance_observer",
+    "parameter_estimator",
+    "ekf",
+    "arrow",
+    "ukf",
+    "mhe",
+    "imm",
+    "smoother",
+]
+
+
+@pytest.fixture(scope="module")
+def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
+    folder = tmp_path_factory.mktemp("vessel")
+    (folder / "package.mo").write_text(VESSEL)
+    (folder / "system.toml").write_text(SYSTEM)
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def fmu(vessel: System) -> Iterator[FMU]:
+    with open_model(vessel) as model:
+        yield model
+
+
+@pytest.fixture(scope="module")
+def filled(vessel: System) -> Case:
+    """A litre in a second for ten seconds, switched at samples: ten litres, without any noise."""
+    time = np.arange(31.0)
+    flow = np.where(time < 10.0, 1e-3, 0.0)
+    volume = np.minimum(time, 10.0) * 1e-3
+    columns = {"q [m3/s]": flow, "V [m3]": volume, "through [m3/s]": flow}
+    return case_from_frame(vessel, pd.DataFrame({"time [s]": time, **columns}))
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch(
+    vessel: System, fmu: FMU, filled: Case, name: str
+) -> None:
+    kind = estimators_of(vessel)[name]
+    run = replay(filled, kind(fmu, vessel, kind.default_gains(fmu, vessel)))
+    assert_allclose(run.signal("V"), filled["V"], rtol=0.0, atol=1e-12)
+    assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
+    # What a sensor sees at a sample is the input from there on.
+    assert_allclose(run.signal("through"), filled["through"], rtol=0.0, atol=1e-12)
+
+
+def test_a_modelica_class_of_an_observer_is_not_exported_with_it(
+    vessel: System, fmu: FMU, tmp_path: Path
+) -> None:
+    kind = estimators_of(vessel)["disturbance_observer"]
+    listed = replace(vessel, export=replace(vessel.export, classes={kind.name: "Observer"}))
+    model = ObserverModel(listed, kind, kind.default_gains(fmu, vessel), "")
+    with pytest.raises(InputError, match=r"the input q that is held.*leave disturbance_observer"):
+        build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
