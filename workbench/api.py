@@ -16,36 +16,31 @@ from typing import Any
 
 import pandas as pd
 
-from workbench.diagnosis import Effect, Outcome, Problem, catalogue, choose
-from workbench.diagnosis import diagnose as diagnose_system
-from workbench.diagnosis.laws import Proposal, needs_law
-from workbench.diagnosis.laws import propose as propose_law
+from workbench import diagnosis, observers, recordings, tuning
+from workbench.diagnosis import Effect, Outcome, Problem, laws
+from workbench.diagnosis.laws import Proposal
 from workbench.errors import InputError
 from workbench.models.modelica import Library, read_library
 from workbench.observers import Gains
-from workbench.observers import choose as choose_estimators
 from workbench.observers.replay import observed
 from workbench.observers.run import Run
 from workbench.recordings.case import Case, check_recording, make_case, read_conditions
-from workbench.recordings.case import read_cases as read_folders
 from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.recordings.csv import header
 from workbench.recordings.datasets import read_recorded, write_cases
 from workbench.recordings.plausibility import Origin
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
+from workbench.studies import design, monitoring
 from workbench.studies.design import NextStop
-from workbench.studies.design import next_stop as next_experiment
 from workbench.studies.distance import Distance, Effort, distance_of_stop
 from workbench.studies.monitoring import RATE, MonitoringResult
-from workbench.studies.monitoring import monitor as watch_machine
 from workbench.system.installed import usual_system
 from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.tables import Table
 from workbench.system.units import quantity, si_factor
 from workbench.tuning import Lines, Plan, TuningResult, evaluators, pose
-from workbench.tuning import tune as tune_problem
 
 
 def read_cases(
@@ -78,12 +73,12 @@ def read_cases(
     paths = [path] if isinstance(path, str | Path) else path
     known = system or load_system(usual_system())
     named = [f"{signal}={channel}" for signal, channel in (columns or {}).items()]
-    told = RecordingOptions(
+    options = RecordingOptions(
         conditions or {},
-        dict(parse_named(one, "columns", known) for one in named),
+        dict(parse_named(column, "columns", known) for column in named),
         None if sample_rate is None else 1.0 / quantity(sample_rate, "Hz", "sample_rate"),
     )
-    cases = read_folders([Path(path) for path in paths], known, told)
+    cases = recordings.case.read_cases([Path(path) for path in paths], known, options)
     _warn(cases)
     return cases
 
@@ -106,11 +101,8 @@ def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list
     InputError
         If the recordings are not in `source`, or are not those that were published.
     """
-    held_out = {
-        write_case.name
-        for write_case in write_cases(which, Path(source), Path(out))
-        if write_case.held_out
-    }
+    written = write_cases(which, Path(source), Path(out))
+    held_out = {recording.name for recording in written if recording.held_out}
     cases = read_cases(out, load_system(which))
     return (
         [case for case in cases if case.name not in held_out],
@@ -139,25 +131,25 @@ def case_from_frame(
     """
     where = f"table '{name}'"
     units = {"time": "s", **{signal.name: signal.unit for signal in system.signals.values()}}
-    found = {}
+    signals = {}
     for column in map(str, frame.columns):
         signal, unit = header(column)
         if signal in units:
             factor = si_factor(unit or "", units[signal], f"{where}, column '{column}'")
-            found[signal] = frame[column].to_numpy(float, copy=True) * factor
+            signals[signal] = frame[column].to_numpy(float, copy=True) * factor
     asked = ["time", *(signal.name for signal in (*system.inputs, *system.outputs))]
-    if missing := [signal for signal in asked if signal not in found]:
+    if missing := [signal for signal in asked if signal not in signals]:
         raise InputError(
             where=where,
             found=f"no column '{missing[0]}' among {', '.join(map(str, frame.columns))}",
             expected=f"a column '{missing[0]} [{units[missing[0]]}]'",
             remedy="name the columns as signals of the system, with units",
         )
-    time_ = found.pop("time")
-    check_recording(time_, system, f"{where}, column 'time'", None)
+    time = signals.pop("time")
+    check_recording(time, system, f"{where}, column 'time'", None)
     given = read_conditions(Table(conditions or {}, f"{where}, conditions"), system)
     origin = Origin(where, None, {}, f"{where}, conditions")
-    case = make_case(name, (time_, found), given, system, origin)
+    case = make_case(name, (time, signals), given, system, origin)
     _warn([case])
     return case
 
@@ -182,8 +174,8 @@ def observe(system: System, case: Case, estimator: str, gains: Gains | None = No
     InputError
         If there is no such estimator, or the model is not fit for it.
     """
-    (kind,) = choose_estimators(system, [estimator]).values()
-    return observed(case, system, kind, gains)
+    (chosen,) = observers.choose(system, [estimator]).values()
+    return observed(case, system, chosen, gains)
 
 
 def tune(
@@ -209,15 +201,15 @@ def tune(
 
     Returns
     -------
-    Tuned, or None if it was interrupted before there was anything to return.
+    The result, or None if it was interrupted before there was anything to return.
     """
     problem = pose(system, estimator, cases, judge_by=judge_by)
     plan = Plan(generations, population, seed)
     with (
-        tempfile.TemporaryDirectory(prefix="tune-") as scratch,
+        tempfile.TemporaryDirectory(prefix="tune-") as temporary,
         evaluators(problem.job, _number(workers)) as pool,
     ):
-        return tune_problem(pool, problem, plan, Path(scratch), progress=Lines(plan, report))
+        return tuning.tune(pool, problem, plan, Path(temporary), progress=Lines(plan, report))
 
 
 def diagnose(
@@ -250,16 +242,16 @@ def diagnose(
     library, chosen = _catalogue(system, effects)
     problem = Problem(system, cases, library, chosen, held_out)
     engine = Engine(_number(workers), report, _folder(out, "diagnosis"))
-    return diagnose_system(problem, engine, certainty=certainty)
+    return diagnosis.diagnose(problem, engine, certainty=certainty)
 
 
 def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:
     library = read_library(system.library)
-    return library, choose(effects, catalogue(system, library))
+    return library, diagnosis.choose(effects, diagnosis.catalogue(system, library))
 
 
-def _folder(out: str | Path | None, kind: str) -> Path:
-    return Path(out) if out is not None else Path(tempfile.mkdtemp(prefix=f"{kind}-"))
+def _folder(out: str | Path | None, name: str) -> Path:
+    return Path(out) if out is not None else Path(tempfile.mkdtemp(prefix=f"{name}-"))
 
 
 def _number(workers: int | None) -> int:
@@ -288,7 +280,7 @@ def propose(
     InputError
         If nothing is missing, or one effect explains it.
     """
-    if not needs_law(found):
+    if not laws.needs_law(found):
         raise InputError(
             where="the diagnosis",
             found=f"the verdict '{found.diagnosis.verdict}'",
@@ -297,7 +289,7 @@ def propose(
         )
     library, chosen = _catalogue(found.system, effects)
     problem = Problem(found.system, found.cases, library, chosen, held_out)
-    return propose_law(found, problem, Engine(_number(workers), report, _folder(out, "proposal")))
+    return laws.propose(found, problem, Engine(_number(workers), report, _folder(out, "proposal")))
 
 
 def monitor(
@@ -323,10 +315,10 @@ def monitor(
     InputError
         If no recording can be used, or the state is of another model.
     """
-    with tempfile.TemporaryDirectory(prefix="monitor-") as scratch:
-        folder = Path(out) if out is not None else Path(scratch)
+    with tempfile.TemporaryDirectory(prefix="monitor-") as temporary:
+        folder = Path(out) if out is not None else Path(temporary)
         with locked_folder(folder):
-            return watch_machine(
+            return monitoring.monitor(
                 system,
                 Path(history),
                 Engine(_number(workers), out=folder),
@@ -360,7 +352,7 @@ def next_stop(
             expected="a cause that was found, whose rivals or size are to be told better",
             remedy="diagnose more recordings first",
         )
-    return next_experiment(found.system, found.rivals, Engine(_number(workers), report))
+    return design.next_stop(found.system, found.rivals, Engine(_number(workers), report))
 
 
 def distance(
