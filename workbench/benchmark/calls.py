@@ -39,7 +39,7 @@ def points(fmu: FMU, system: System, rng: np.random.Generator) -> Matrix:
     x, u = settle(fmu, system, system.design)
     values = {name: fmu.defaults.get(name, 0.0) for name in fmu.inputs}
     values |= dict(zip(fmu.states, x.tolist(), strict=True))
-    driven = [*(one.name for one in system.inputs), *system.corrections]
+    driven = [*(signal.name for signal in system.inputs), *system.corrections]
     values |= dict(zip(driven, u.tolist(), strict=True))
     columns = []
     for name in (*fmu.states, *fmu.inputs):
@@ -71,12 +71,12 @@ def format_calls(calls: "Mapping[str, CallTimes]", step: float) -> str:
     ]
     for name, times in calls.items():
         ratios = times.ratios()
-        for kind, plain, through in (
+        for evaluation, plain, through in (
             ("derivatives", times.derivatives, times.derivatives_fmi),
             ("jacobian", times.jacobian, times.jacobian_fmi),
         ):
             spent = f"{1e9 * plain:>6.0f} ns {1e9 * through:>6.0f} ns"
-            lines.append(f"{name:<16} {kind:<12} {spent}  {ratios[kind]:5.2f}")
+            lines.append(f"{name:<16} {evaluation:<12} {spent}  {ratios[evaluation]:5.2f}")
     for name, times in calls.items():
         rate = f"Co-Simulation steps of {1e3 * step:g} ms per second"
         lines.append(f"{name:<16} {1.0 / times.step:>9.0f} {rate}")

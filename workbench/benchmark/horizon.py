@@ -103,7 +103,7 @@ def _converged(fmu: FMU, system: System, case: Case) -> Window:
 
 def _step(space: StateSpace, fmu: FMU, system: System) -> ca.Function:
     """The linearly implicit step: node, measured inputs and h to where it leads and outputs."""
-    measured, corrections = [one.name for one in system.inputs], list(system.corrections)
+    measured, corrections = [signal.name for signal in system.inputs], list(system.corrections)
     z = ca.SX.sym("z", len(space.states) + len(corrections))
     given, h = ca.SX.sym("u", len(measured)), ca.SX.sym("h")
     n = len(space.states)
@@ -124,7 +124,7 @@ def _step(space: StateSpace, fmu: FMU, system: System) -> ca.Function:
 
 def _ours(fmu: FMU, name: str) -> str:
     """Name by which the system knows a variable of the model."""
-    ours = {theirs: one for one, theirs in fmu.names.items()}
+    ours = {theirs: our for our, theirs in fmu.names.items()}
     return ours.get(name, name)
 
 
@@ -152,6 +152,6 @@ def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float
     start: Vector = window.nodes[:N].ravel()
     for _ in range(_REPEATS):
         begin = time.perf_counter()
-        found = solver(x0=start, lbx=low, ubx=high)
+        solution = solver(x0=start, lbx=low, ubx=high)
         spent.append(time.perf_counter() - begin)
-    return spent, float(found["f"])
+    return spent, float(solution["f"])

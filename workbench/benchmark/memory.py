@@ -53,9 +53,9 @@ def watch_command(command: Sequence[str]) -> list[int]:
 
 def _descendants(process: int) -> list[int]:
     """Processes that the threads of a process, and those that it started, have started."""
-    found: list[int] = []
+    children: list[int] = []
     with suppress(OSError):  # the process has ended
         for thread in Path(f"/proc/{process}/task").iterdir():
             with suppress(OSError):  # the thread has ended
-                found += map(int, (thread / "children").read_text().split())
-    return found + [descendant for child in found for descendant in _descendants(child)]
+                children += map(int, (thread / "children").read_text().split())
+    return children + [descendant for child in children for descendant in _descendants(child)]

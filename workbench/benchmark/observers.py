@@ -104,9 +104,9 @@ def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[lis
     """
     with ExitStack() as stack:
         ready = []
-        for kind in choose(system, names).values():
-            fmu = stack.enter_context(open_model(system, role or kind.role))
-            ready.append(kind(fmu, system, kind.default_gains(fmu, system)))
+        for estimator in choose(system, names).values():
+            fmu = stack.enter_context(open_model(system, role or estimator.role))
+            ready.append(estimator(fmu, system, estimator.default_gains(fmu, system)))
         yield ready
 
 
@@ -123,7 +123,7 @@ def plain_filters(system: System) -> System:
 
 def tuned_names(system: System) -> list[str]:
     """Estimators that are measured: standard ones with gains, the others do little."""
-    return [name for name, kind in choose(system, []).items() if kind.tunable]
+    return [name for name, estimator in choose(system, []).items() if estimator.tunable]
 
 
 def time_observers(case: Case, system: System) -> list[ObserverTimes]:
@@ -132,14 +132,14 @@ def time_observers(case: Case, system: System) -> list[ObserverTimes]:
     What they are measured against is written for FMUs of FMI 2.0 with C sources.
     """
     names = tuned_names(system)
-    kinds = choose(system, names)
+    known = choose(system, names)
     times = []
     with opened(plain_filters(system), [OpenLoop.name, *names]) as estimators:
         for estimator in estimators:
             with by_fmpy(estimator.name, estimator.fmu, system, estimator.gains) as loop:
                 plain = by_c(estimator.name, estimator.fmu, system, estimator.gains)
                 times.append(_time(case, estimator, loop, plain))
-    larger = [name for name, kind in kinds.items() if kind.role == OBSERVER]
+    larger = [name for name, chosen in known.items() if chosen.role == OBSERVER]
     if FULL in system.models and larger:
         with opened(system, larger, FULL) as estimators:
             for estimator in estimators:

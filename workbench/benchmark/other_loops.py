@@ -72,7 +72,7 @@ def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Ma
     def references(*names: str) -> list[int]:
         return [known[fmu.names.get(name, name)] for name in names]
 
-    inputs = references(*(one.name for one in system.inputs))
+    inputs = references(*(signal.name for signal in system.inputs))
     read = references(*(output.name for output in system.outputs), *system.reported)
     given = references(*system.given)
     places = [j for j, output in enumerate(system.outputs) if output.name in fmu.states]
@@ -94,7 +94,7 @@ def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Ma
 
     def run(time: Vector, u: Matrix, y: Matrix) -> Matrix:
         begin(y[0])
-        found = np.empty((time.size, len(read)))
+        values = np.empty((time.size, len(read)))
         for k, h in enumerate(np.diff(time, prepend=time[0])):
             model.setReal(inputs, u[k])
             if h > 0.0:
@@ -102,8 +102,8 @@ def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Ma
                 columns = [model.getDirectionalDerivative(rows, [j], [1.0]) for j in states]
                 x[:] += np.linalg.solve(np.eye(n) - h * np.array(columns).T, h * dx)
                 model.setContinuousStates(at_x, n)
-            found[k] = model.getReal(read)
-        return found
+            values[k] = model.getReal(read)
+        return values
 
     try:
         yield run

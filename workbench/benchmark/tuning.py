@@ -107,13 +107,13 @@ class TuningMemory:
 def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
     """Time reasoned gains on one recording, of the standard observers whose feedback is tuned."""
     times = []
-    for kind in (kind for kind in choose(system, []).values() if kind.tunable):
-        job = tuning_job(kind, system, [case])
-        if kind.adapts:
+    for estimator in (estimator for estimator in choose(system, []).values() if estimator.tunable):
+        job = tuning_job(estimator, system, [case])
+        if estimator.adapts:
             continue  # a filter makes its feedback as it goes
         with (
-            open_model(system, kind.role) as fmu,
-            by_fmpy(kind.name, fmu, system, job.gains) as loop,
+            open_model(system, estimator.role) as fmu,
+            by_fmpy(estimator.name, fmu, system, job.gains) as loop,
         ):
             if loop is not None:
                 by_loop = functools.partial(evaluate_by_loop, loop, case, system)
@@ -121,12 +121,12 @@ def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:
     return times
 
 
-def tuning_job(kind: type[Estimator], system: System, cases: Sequence[Case]) -> Job:
+def tuning_job(estimator: type[Estimator], system: System, cases: Sequence[Case]) -> Job:
     """What is to be evaluated, about the reasoned gains."""
-    with open_model(system, kind.role) as fmu:
-        gains, model = kind.default_gains(fmu, system), fmu.path.read_bytes()
+    with open_model(system, estimator.role) as fmu:
+        gains, model = estimator.default_gains(fmu, system), fmu.path.read_bytes()
     recordings = tuple(recording(case, system) for case in cases)
-    return Job(kind.name, system, model, gains, recordings)
+    return Job(estimator.name, system, model, gains, recordings)
 
 
 def evaluate_by_loop(loop: Callable[..., Estimate], case: Case, system: System) -> float:
@@ -184,7 +184,7 @@ def time_evaluation(job: Job, by_loop: Callable[[], float]) -> EvaluationTimes:
 
 def first_tuned(system: System) -> str:
     """The standard estimator that workers and memory are measured with."""
-    return next(name for name, kind in choose(system, []).items() if kind.tunable)
+    return next(name for name, estimator in choose(system, []).items() if estimator.tunable)
 
 
 def time_workers(
@@ -234,7 +234,7 @@ def _cluster(job: Job) -> Iterator[Workers]:
 
 def _evaluate(pool: Workers, candidates: Sequence[Candidate]) -> list[float]:
     """The z of candidates; the first time that a pool is asked, it starts its workers."""
-    return [one.z for one in evaluate_all(pool, candidates, len(candidates[0].order))]
+    return [evaluation.z for evaluation in evaluate_all(pool, candidates, len(candidates[0].order))]
 
 
 def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[float]:

@@ -142,10 +142,10 @@ def _propose(
         output.result("\nNo law is proposed: nothing is missing, or one effect explains it.")
         return
     engine = Engine(options.workers, output.stage, options.out / PROPOSED)
-    found = propose(outcome, problem, engine)
-    told = write_proposal(found, outcome, provenance, options.out, options.workers)
-    output.result(f"\n{found.summary()}")
-    output.result(f"to read: {told}, data and figures beside it")
+    proposal = propose(outcome, problem, engine)
+    page = write_proposal(proposal, outcome, provenance, options.out, options.workers)
+    output.result(f"\n{proposal.summary()}")
+    output.result(f"to read: {page}, data and figures beside it")
 
 
 def _run(options: argparse.Namespace, output: Output, problem: Problem) -> CommandResult:

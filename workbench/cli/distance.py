@@ -97,12 +97,12 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     system = load_system(options.system)
     if options.fmu is not None:
         system = with_model(system, OBSERVER, options.fmu)
-    said = dict(_said(one) for one in options.ask)
+    said = dict(_said(entry) for entry in options.ask)
     cases = given_cases(options, system)
     effort = Effort(options.samples, options.safety, options.seed, options.plain)
     with locked_folder(options.out):
         engine = Engine(options.workers, output.stage)
-        found = distance_of_stop(system, cases, said, effort, engine)
+        predicted = distance_of_stop(system, cases, said, effort, engine)
         provenance = {
             "run": run_of("distance", system, sources(cases)),
             **software(["numpy", "scipy"]),
@@ -110,12 +110,12 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             "models": models(system, [OBSERVER]),
             "seed": options.seed,
         }
-        page = write_distance(found, provenance, options.out)
+        page = write_distance(predicted, provenance, options.out)
     output.stage("done")
-    output.result(found.summary())
+    output.result(predicted.summary())
     output.result(f"to read: {page}, data and figure beside it")
     result = read_result(options.out / "distance.json")
-    return CommandResult(result, _UNITS, 130 if found.interrupted else 0, page)
+    return CommandResult(result, _UNITS, 130 if predicted.interrupted else 0, page)
 
 
 def _said(text: str) -> tuple[str, str | float]:

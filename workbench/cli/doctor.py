@@ -104,16 +104,16 @@ def _findings() -> Iterator[Inspection]:
 
 def _manifest(manifest: Mapping[str, Any]) -> Iterator[Inspection]:
     """Whether the FMUs are those that were built."""
-    for name, one in manifest["fmus"].items():
+    for name, listed in manifest["fmus"].items():
         path = fmus() / name
-        found = "as in the manifest"
+        state = "as in the manifest"
         if not path.is_file():
-            found = "no such file"
-        elif hashlib.sha256(path.read_bytes()).hexdigest() != one["sha256"]:
-            found = f"its SHA-256 is not that of {nearby(fmus() / 'manifest.json')}"
-        sound = found.startswith("as")
+            state = "no such file"
+        elif hashlib.sha256(path.read_bytes()).hexdigest() != listed["sha256"]:
+            state = f"its SHA-256 is not that of {nearby(fmus() / 'manifest.json')}"
+        sound = state.startswith("as")
         yield Inspection(
-            f"fmus/{name}", "ok" if sound else "wrong", found, "" if sound else _anew()
+            f"fmus/{name}", "ok" if sound else "wrong", state, "" if sound else _anew()
         )
 
 
@@ -128,8 +128,8 @@ def _sources() -> Inspection:
 
     manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
     same = manifest["source_sha256"] == source_hash(*built_models())
-    found = "those that the FMUs were built from" if same else "not those of the FMUs"
-    return Inspection("Modelica sources", "ok" if same else "wrong", found, "" if same else _anew())
+    state = "those that the FMUs were built from" if same else "not those of the FMUs"
+    return Inspection("Modelica sources", "ok" if same else "wrong", state, "" if same else _anew())
 
 
 def _compiled() -> Inspection:
@@ -143,11 +143,11 @@ def _compiled() -> Inspection:
         try:
             build(package, "Small.Decay", path, platforms=[native()])
             with FMU(path) as fmu:
-                found = f"compiled and ran a model with the state {', '.join(fmu.states)}"
+                state = f"compiled and ran a model with the state {', '.join(fmu.states)}"
         except (InputError, FMUError, OSError) as error:
             remedy = f"{installing('compiler')}, in an environment of its own"
             return Inspection("compiler", "wrong", str(error), remedy)
-    return Inspection("compiler", "ok", found)
+    return Inspection("compiler", "ok", state)
 
 
 def _kept() -> Inspection:

@@ -144,15 +144,15 @@ def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
     if asked is None:
         usual = next(iter(system.export.classes), ExtendedKalmanFilter.name)
         asked = usual if path is None else estimator_of(path, known)
-    kind = choose(system, [asked])[asked]
-    name = kind.tuned_as or kind.name
-    with open_model(system, kind.role) as fmu:
-        gains = kind.default_gains(fmu, system)
+    estimator = choose(system, [asked])[asked]
+    name = estimator.tuned_as or estimator.name
+    with open_model(system, estimator.role) as fmu:
+        gains = estimator.default_gains(fmu, system)
     path = path or tuned_file(system, name)
     if path is None:
-        return _Choice(kind, gains, format_gains(gains, kind.meaning, {}), gains.source)
+        return _Choice(estimator, gains, format_gains(gains, estimator.meaning, {}), gains.source)
     gains = read_gains(path, {name: gains})
-    return _Choice(kind, gains, path.read_text(encoding="utf-8"), path.name)
+    return _Choice(estimator, gains, path.read_text(encoding="utf-8"), path.name)
 
 
 def _maker(
@@ -162,12 +162,12 @@ def _maker(
     from workbench.observers.export import EstimatorLaw, ObserverModel, build_law, build_observer
     from workbench.system.registry import open_model
 
-    kind, gains = chosen.kind, chosen.gains
-    if kind.name in system.export.classes:
-        observer = ObserverModel(system, kind, gains, chosen.text)
+    estimator, gains = chosen.kind, chosen.gains
+    if estimator.name in system.export.classes:
+        observer = ObserverModel(system, estimator, gains, chosen.text)
         return observer.model, partial(build_observer, observer, platforms=platforms)
-    fmu = stack.enter_context(open_model(system, kind.role))
-    law = EstimatorLaw(kind(fmu, system, gains), chosen.text)
+    fmu = stack.enter_context(open_model(system, estimator.role))
+    law = EstimatorLaw(estimator(fmu, system, gains), chosen.text)
     return law.model, partial(build_law, law, platforms=platforms)
 
 

@@ -44,12 +44,12 @@ def _requirements(extra: str) -> list[str]:
         project = tomllib.loads(text)["project"]
         listed = project["optional-dependencies"][extra] if extra else project["dependencies"]
         return list(map(str, listed))
-    found = []
+    own = []
     for requirement in requires("wheelset-workbench") or ():
         asked = re.search(r"extra == ['\"](.*?)['\"]", requirement)
         if (asked[1] if asked else "") == extra:
-            found.append(requirement)
-    return found
+            own.append(requirement)
+    return own
 
 
 def require_compiler() -> None:

@@ -129,9 +129,9 @@ def _build(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.compiler == "omc":
         return _build_with_omc(options, output)
     if options.all and options.check:
-        found = compiler.differences(built_models(), fmus())
-        output.result("\n".join(found) or f"{nearby(fmus())} matches its sources")
-        return CommandResult({"differences": found}, status=1 if found else 0)
+        differences = compiler.differences(built_models(), fmus())
+        output.result("\n".join(differences) or f"{nearby(fmus())} matches its sources")
+        return CommandResult({"differences": differences}, status=1 if differences else 0)
     if options.all:
         _require_checkout()
         all_built = compiler.build_all(built_models(), nearby(fmus()))
@@ -210,9 +210,9 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.limit is not None:
         limits = replace(limits, processor=options.limit, answer=max(limits.answer, options.limit))
     output.result(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit")
-    found = partial(_show_finding, output)
+    show = partial(_show_finding, output)
     findings = check(
-        options.fmu, options.instantiations, limits, partial(_show_begin, output), found
+        options.fmu, options.instantiations, limits, partial(_show_begin, output), show
     )
     unknown = any(finding.unknown for finding in findings)
     fit = None if unknown and is_fit(findings) else is_fit(findings)
@@ -229,8 +229,8 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
         "sha256": description.sha256,
     }
     listed = [asdict(finding) for finding in findings]
-    told = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
-    return CommandResult(told, status={True: 0, False: 1, None: 3}[fit])
+    result = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
+    return CommandResult(result, status={True: 0, False: 1, None: 3}[fit])
 
 
 def _show_begin(output: Output, name: str) -> None:

@@ -81,16 +81,14 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
                 record, errors = _files(paths, record, system, known, options, output)
             except InputError as error:
                 errors = [error]
-            for one in errors:
-                print(f"error: {one}", file=sys.stderr, flush=True)
-                refused.append(str(one))
+            for refusal in errors:
+                print(f"error: {refusal}", file=sys.stderr, flush=True)
+                refused.append(str(refusal))
     if record is not before:
         output.result(f"see {IMPORTED} in {nearby(options.out)}")
         output.result(f"next: workbench simulate --system {options.system} {nearby(options.out)}")
-    told_all = {"out": options.out, "imports": record, "refused": refused}
-    return CommandResult(
-        told_all, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0
-    )
+    result = {"out": options.out, "imports": record, "refused": refused}
+    return CommandResult(result, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
 
 
 def _files(
@@ -102,7 +100,7 @@ def _files(
     output: Output,
 ) -> tuple[list[dict[str, Any]], list[InputError]]:
     """Import the recordings of some files; returns what is imported by now, and what is not."""
-    from workbench.cli.confirming import confirmed
+    from workbench.cli.import_confirmation import confirm
     from workbench.cli.import_figure import draw_cuts
     from workbench.recordings.channels import stored_columns
     from workbench.recordings.formats import read_recorded_file
@@ -116,29 +114,30 @@ def _files(
 
     files = [read_recorded_file(path) for path in paths]
     stored = stored_columns(options.out, system)
-    found, conditions = confirmed(files, system, stored, known, output, options.yes)
+    proposed, conditions = confirm(files, system, stored, known, output, options.yes)
     hashes = [file.sha256 for file in files]
-    names = {one.name or None for one in found.held}
+    names = {recording.name or None for recording in proposed.held}
     by_now = [
-        one
-        for one in record
-        if [file["sha256"] for file in one["files"]] != hashes or one.get("recording") not in names
+        entry
+        for entry in record
+        if [file["sha256"] for file in entry["files"]] != hashes
+        or entry.get("recording") not in names
     ]
-    refused = list(found.refused)
+    refused = list(proposed.refused)
     warned: set[str] = set()
-    for recording in found.held:
+    for recording in proposed.held:
         name = _free_name(paths[0], recording.name, by_now)
         try:
-            one = import_recording(name, recording, system, conditions, whole=options.whole)
+            imported = import_recording(name, recording, system, conditions, whole=options.whole)
         except InputError as error:
             refused.append(error)
             continue
-        write(one, options.out, system)
-        store(options.out, {**stored, **found.named})
-        if len(one.parts) > 1:
-            draw_cuts(one, name, system, options.out)
-        _tell(one, output, warned)
-        by_now = [*by_now, describe(one, system)]
+        write(imported, options.out, system)
+        store(options.out, {**stored, **proposed.named})
+        if len(imported.parts) > 1:
+            draw_cuts(imported, name, system, options.out)
+        _tell(imported, output, warned)
+        by_now = [*by_now, describe(imported, system)]
         record = by_now
         write_record(options.out, system, record)
     return record, refused
@@ -153,15 +152,15 @@ def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> st
     name = case_name(path, part)
     second = f"{name}_{path.suffix[1:] or 'file'}"
     further = (f"{second}_{number}" for number in count(2))
-    return next(one for one in chain((name, second), further) if one.casefold() not in taken)
+    return next(free for free in chain((name, second), further) if free.casefold() not in taken)
 
 
-def _tell(one: Import, output: Output, warned: set[str]) -> None:
+def _tell(imported: Import, output: Output, warned: set[str]) -> None:
     """Say what was written, what nobody knows, and what is unlikely and was not said by now."""
     from workbench.recordings.case import UNKNOWN
 
-    doubts = list(one.measured.doubts)
-    for piece in one.pieces:
+    doubts = list(imported.measured.doubts)
+    for piece in imported.pieces:
         unknown = [key for key, source in piece.sources.items() if source == UNKNOWN]
         known = [f"{key} {value}" for key, value in piece.conditions.items() if key not in unknown]
         words = [f"{piece.time.size} samples, {piece.time[-1]:.4g} s", *known]

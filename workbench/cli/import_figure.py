@@ -13,7 +13,7 @@ from workbench.system.units import si_factor
 _MOST = 4000  # samples of a curve, twice the pixels that it is drawn on
 
 
-def draw_cuts(one: Import, name: str, system: System, out: Path) -> None:
+def draw_cuts(imported: Import, name: str, system: System, out: Path) -> None:
     """Draw the signals that cuts follow, with what is kept shaded, as `NAME_cuts.png` and SVG.
 
     Without a rule of the system it shows the first output.
@@ -22,8 +22,8 @@ def draw_cuts(one: Import, name: str, system: System, out: Path) -> None:
     shown = [rule.begins, rule.ends] if rule else []
     names = [threshold.signal for threshold in shown] or [system.outputs[0].name]
     sheet = Figure(figsize=(11.0, 1.0 + 2.0 * len(names)), layout="constrained")
-    sheet.suptitle(f"{name}: {len(one.pieces)} recordings", fontsize=10)
-    time, signals = one.measured.time, one.measured.signals
+    sheet.suptitle(f"{name}: {len(imported.pieces)} recordings", fontsize=10)
+    time, signals = imported.measured.time, imported.measured.signals
     some = np.arange(0, time.size, max(1, time.size // _MOST))
     rows = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axes, signal in zip(rows, names, strict=True):
@@ -34,11 +34,11 @@ def draw_cuts(one: Import, name: str, system: System, out: Path) -> None:
         axes.plot(time[some], values[some] / scale, linewidth=0.8, color="0.2")
         label = known.label if known else signal
         axes.set_title(f"{label} [{unit}]", fontsize=9, loc="left")
-        for part in one.parts:
+        for part in imported.parts:
             span = time[part.first], time[part.end - 1]
             if not part.reason:
                 axes.axvspan(*span, color="tab:green", alpha=0.15, linewidth=0)
-    for piece in one.pieces:
+    for piece in imported.pieces:
         rows[0].annotate(
             piece.name.split("_")[0],
             (time[piece.samples[0]], 1.0),

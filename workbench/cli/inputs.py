@@ -24,8 +24,8 @@ def recording_options(options: argparse.Namespace, system: System) -> RecordingO
     InputError
         If an entry cannot be read.
     """
-    conditions = dict(read_condition(one, system) for one in options.condition)
-    columns = dict(parse_named(one, "command line, --column", system) for one in options.column)
+    conditions = dict(read_condition(entry, system) for entry in options.condition)
+    columns = dict(parse_named(entry, "command line, --column", system) for entry in options.column)
     step = None
     if options.sample_rate is not None:
         rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
@@ -49,8 +49,8 @@ def read_condition(text: str, system: System) -> tuple[str, Any]:
         If it is none of the system's.
     """
     name, equals, value = (part.strip() for part in text.partition("="))
-    kind = next((condition for condition in system.conditions if condition.name == name), None)
-    if not equals or kind is None:
+    known = next((condition for condition in system.conditions if condition.name == name), None)
+    if not equals or known is None:
         raise InputError(
             where=f"condition {text}",
             found=f"'{name}'{closest(name, [condition.name for condition in system.conditions])}",
@@ -61,9 +61,9 @@ def read_condition(text: str, system: System) -> tuple[str, Any]:
             ),
             remedy="correct the name",
         )
-    words = {str(choice): choice for choice in kind.choices}
+    words = {str(choice): choice for choice in known.choices}
     entries = [words.get(part.strip(), part.strip()) for part in value.split(",")]
-    whole = value == UNKNOWN or not kind.count
+    whole = value == UNKNOWN or not known.count
     return name, words.get(value, value) if whole else entries
 
 

@@ -99,7 +99,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         require_compiler()
     with locked_folder(options.out):
         begin = time.perf_counter()
-        found = monitor(
+        watched = monitor(
             system,
             history,
             Engine(options.workers, out=options.out),
@@ -108,19 +108,22 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             step=partial(output.step, begin=begin),
         )
         provenance = provenance_of(system, history)
-        page = write_monitoring(found, provenance, options.out)
-        output.result(found.summary())
+        page = write_monitoring(watched, provenance, options.out)
+        output.result(watched.summary())
         output.result(f"to read: {page}, data and figure beside it")
-        if found.interrupted:
+        if watched.interrupted:
             output.progress("interrupted: what was estimated is kept; run it again to go on")
         result = read_result(options.out / "summary.json")
-        if options.diagnose and found.changes and not found.interrupted:
-            result["cause"] = _cause(options, output, found, provenance)
-    return CommandResult(result, {"work": "J"}, 130 * found.interrupted, page)
+        if options.diagnose and watched.changes and not watched.interrupted:
+            result["cause"] = _cause(options, output, watched, provenance)
+    return CommandResult(result, {"work": "J"}, 130 * watched.interrupted, page)
 
 
 def _cause(
-    options: argparse.Namespace, output: Output, found: MonitoringResult, provenance: dict[str, Any]
+    options: argparse.Namespace,
+    output: Output,
+    watched: MonitoringResult,
+    provenance: dict[str, Any],
 ) -> dict[str, Any]:
     """Diagnose what has changed; returns the summary of the diagnosis."""
     from workbench.diagnosis import Problem, catalogue, diagnose
@@ -129,10 +132,10 @@ def _cause(
     from workbench.recordings.datasets import read_recorded
     from workbench.studies.monitoring.cause import known_from_before, recordings_after
 
-    system, out = known_from_before(found), options.out / "cause"
+    system, out = known_from_before(watched), options.out / "cause"
     library = read_library(system.library)
     effects = catalogue(system, library)
-    names = recordings_after(found)
+    names = recordings_after(watched)
     output.stage(f"cause of the change, from {', '.join(names)}")
     cases = [read_recorded(Path(options.history) / name, system) for name in names]
     engine = Engine(options.workers, output.stage, out)

@@ -60,25 +60,29 @@ def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
         pool = _pool(options, fleet, count)
         try:
             step = partial(output.step, begin=begin)
-            found, interrupted = watch_fleet(fleet, options.out, pool, step)
+            machines, interrupted = watch_fleet(fleet, options.out, pool, step)
         finally:
             pool.close()
-        summary = _summary(found, provenance, time.perf_counter() - begin, interrupted)
+        summary = _summary(machines, provenance, time.perf_counter() - begin, interrupted)
         write_json(options.out / "fleet.json", summary)
         table = pd.DataFrame(summary["machines"])
         write_whole(options.out / "fleet.csv", table.to_csv(index=False))
     output.result(summary["answer"]["sentence"])
-    for one in found:
-        if one.alarms or one.refusal:
-            told = f"{one.alarms} alarms" if not one.refusal else f"no result: {one.refusal}"
-            output.result(f"  {one.machine}: {told}")
+    for machine in machines:
+        if machine.alarms or machine.refusal:
+            outcome = (
+                f"{machine.alarms} alarms"
+                if not machine.refusal
+                else f"no result: {machine.refusal}"
+            )
+            output.result(f"  {machine.machine}: {outcome}")
     output.result(f"to read: {options.out / 'fleet.csv'}, a folder for each machine beside it")
     return CommandResult(summary, {"seconds": "s"}, 130 * interrupted)
 
 
-def _written(provenance: dict[str, Any], found: MonitoringResult, out: Path) -> None:
+def _written(provenance: dict[str, Any], watched: MonitoringResult, out: Path) -> None:
     """Write what was found of a machine, in a worker."""
-    write_monitoring(found, provenance, out)
+    write_monitoring(watched, provenance, out)
 
 
 def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet] | DaskPool[Fleet]":
@@ -88,13 +92,15 @@ def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet]
 
 
 def _summary(
-    found: list[MachineResult], provenance: dict[str, Any], seconds: float, interrupted: bool
+    machines: list[MachineResult], provenance: dict[str, Any], seconds: float, interrupted: bool
 ) -> dict[str, Any]:
-    raised = [one for one in found if one.alarms]
-    refused = [one for one in found if one.refusal]
-    recordings = sum(one.recordings for one in found)
-    said = f"{len(found)} machines, {recordings} recordings: alarms of {len(raised)} machines"
-    said += f", no result of {len(refused)}" * bool(refused)
+    raised = [machine for machine in machines if machine.alarms]
+    refused = [machine for machine in machines if machine.refusal]
+    recordings = sum(machine.recordings for machine in machines)
+    sentence = (
+        f"{len(machines)} machines, {recordings} recordings: alarms of {len(raised)} machines"
+    )
+    sentence += f", no result of {len(refused)}" * bool(refused)
     headline = {
         "machines with alarms": Measure(len(raised), "1", "lower"),
         "machines without a result": Measure(len(refused), "1", "lower"),
@@ -104,9 +110,12 @@ def _summary(
         "recordings": recordings,
         "seconds": seconds,
         "machines": [
-            {name: getattr(one, name) for name in ("machine", "recordings", "alarms", "refusal")}
-            for one in found
+            {
+                name: getattr(machine, name)
+                for name in ("machine", "recordings", "alarms", "refusal")
+            }
+            for machine in machines
         ],
         "interrupted": interrupted,
     }
-    return with_answer(Answer(f"{said}.", headline), entries)
+    return with_answer(Answer(f"{sentence}.", headline), entries)

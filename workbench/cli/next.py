@@ -67,16 +67,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     system = load_system(options.system or str(summary["provenance"]["system"]))
     require_compiler()
     with locked_folder(options.out):
-        found = next_stop(system, rivals, Engine(options.workers, output.stage))
+        proposed = next_stop(system, rivals, Engine(options.workers, output.stage))
         provenance = {
             "run": run_of("next", system, {"diagnosis": file}),
             "workbench": version("wheelset-workbench"),
             "system": system.name,
             "diagnosis": str(options.result),
         }
-        page = write_next_stop(found, provenance, options.out)
+        page = write_next_stop(proposed, provenance, options.out)
     output.stage("done")
-    output.result(found.summary())
+    output.result(proposed.summary())
     output.result(f"to read: {page}, data and figure beside it")
     return CommandResult(
         read_result(options.out / "next.json"), {"duration": "s", "every": "s"}, page=page

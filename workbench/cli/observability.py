@@ -89,24 +89,24 @@ def _run(
     setup = (system, scales, options.out)
     with Pool(min(options.workers, len(cases)), nullcontext, setup) as pool:
         try:
-            for _, one in pool.completed(_test_case, cases):
-                done.append(one)
-                output.step(len(done), len(cases), one.case.name, begin)
+            for _, result in pool.completed(_test_case, cases):
+                done.append(result)
+                output.step(len(done), len(cases), result.case.name, begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
     summary: dict[str, Any] = {}
     page: Path | None = None
     if done:
-        done.sort(key=lambda one: one.case.name)
+        done.sort(key=lambda result: result.case.name)
         tests = list(linear.values())
         output.result(format_observability(system, tests, done))
         path = options.out / "observability.json"
         write_observability(system, tests, done, provenance, path)
         summary = read_result(path)
         page = write_observability_page(summary, done, len(cases), options.out)
-        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
-        output.result(told)
+        line = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(line)
     return CommandResult(summary, _units(system), 130 if interrupted else 0, page)
 
 
@@ -127,7 +127,7 @@ def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> 
     from workbench.observers.observability_report import draw_observability, write_windows
 
     system, scales, out = setup
-    one = case_observability(system, scales, case)
-    write_windows(one, out / f"{case.name}.csv")
-    draw_observability(one, out / f"{case.name}.png")
-    return one
+    result = case_observability(system, scales, case)
+    write_windows(result, out / f"{case.name}.csv")
+    draw_observability(result, out / f"{case.name}.png")
+    return result

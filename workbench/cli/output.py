@@ -69,8 +69,8 @@ class Output:
     def close(self, command: str, done: CommandResult) -> int:
         """Print the document, if it is asked for; returns the status."""
         if self.json:
-            told = {"units": done.units, "result": done.result}
-            _print(_document(command, done.status, told))
+            content = {"units": done.units, "result": done.result}
+            _print(_document(command, done.status, content))
         return done.status
 
     def fail(self, command: str, status: int, error: Exception | str) -> int:
@@ -79,8 +79,8 @@ class Output:
         if self.json:
             parts = ("where", "found", "expected", "remedy")
             known = isinstance(error, InputError)
-            told = {part: getattr(error, part) for part in parts} if known else {}
-            _print(_document(command, status, {"error": {"message": str(error), **told}}))
+            content = {part: getattr(error, part) for part in parts} if known else {}
+            _print(_document(command, status, {"error": {"message": str(error), **content}}))
         return status
 
 
@@ -89,8 +89,8 @@ def warn(message: object) -> None:
     print(f"warning: {message}", file=sys.stderr, flush=True)
 
 
-def _document(command: str, status: int, told: Mapping[str, Any]) -> str:
-    content = _plain({"command": command, "status": status, **told})
+def _document(command: str, status: int, content: Mapping[str, Any]) -> str:
+    content = _plain({"command": command, "status": status, **content})
     return json.dumps(content, indent=2, allow_nan=False)
 
 
@@ -111,9 +111,9 @@ def read_result(path: Path) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     """The same without what JSON lacks: paths are text, and what is no number is null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value

@@ -35,20 +35,20 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
             commands.add_parser(name, help=text)
         else:
             import_module(module).add(commands, text).set_defaults(module=module)
-    for one in parsers(parser):
-        one.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
-        _add_output(one)
+    for command in parsers(parser):
+        command.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
+        _add_output(command)
     return parser
 
 
 def parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
     """A parser, those of its commands, and theirs."""
-    found = [parser]
+    every = [parser]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for choice in action.choices.values():
-                found += parsers(choice)
-    return found
+                every += parsers(choice)
+    return every
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:

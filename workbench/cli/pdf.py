@@ -22,8 +22,8 @@ def browser() -> str:
         If there is none.
     """
     for name in _BROWSERS:
-        if found := shutil.which(name):
-            return found
+        if program := shutil.which(name):
+            return program
     raise InputError(
         where="command line, --pdf",
         found=f"none of {', '.join(_BROWSERS)}",

@@ -25,7 +25,10 @@ def make_planted(options: argparse.Namespace, output: Output, system: System) ->
     known = {plantable.name: plantable for plantable in rig.plantables}
     if options.list:
         recordings = "\n".join(f"  {name}" for name in rig.recordings)
-        effects = "\n".join(f"  {f'{n} [{one.unit}]':<28} {one.effect}" for n, one in known.items())
+        effects = "\n".join(
+            f"  {f'{n} [{plantable.unit}]':<28} {plantable.effect}"
+            for n, plantable in known.items()
+        )
         output.result(f"recordings:\n{recordings}\n\neffects, zero if not given:\n{effects}")
         return CommandResult(
             {"recordings": rig.recordings, "effects": {n: known[n].effect for n in known}}

@@ -197,7 +197,7 @@ def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
                 expected=f"some of {', '.join(known)}",
                 remedy="choose others, or leave --effects out for all",
             )
-    return tuple(one for name, one in known.items() if name in names or not names)
+    return tuple(plantable for name, plantable in known.items() if name in names or not names)
 
 
 def _provenance(

@@ -33,19 +33,19 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.recordings.datasets import PREPARED, published, write_cases
 
     if options.source is None:
-        told = str(published(options.system))
-        output.result(told)
+        description = str(published(options.system))
+        output.result(description)
         output.result(f"\nnext: workbench prepare {options.system} --from FOLDER --out CASES")
-        return CommandResult({"published": told})
+        return CommandResult({"published": description})
     recordings = write_cases(options.system, options.source, options.out)
     output.result(f"{len(recordings)} recordings in {nearby(options.out)}, see {PREPARED} there")
     machines = list(dict.fromkeys(recording.machine for recording in recordings))
     for machine in machines:
         own = [recording for recording in recordings if recording.machine == machine]
-        folders = [str(nearby(options.out / one.name)) for one in own]
+        folders = [str(nearby(options.out / recording.name)) for recording in own]
         if len(machines) == 1:
             folders = [str(nearby(options.out))]
-        held_out = [one.name for one in own if one.held_out]
+        held_out = [recording.name for recording in own if recording.held_out]
         words = ["workbench diagnose --system", options.system, *folders]
         output.result(" ".join(["next:", *words, *["--held-out"] * bool(held_out), *held_out]))
     return CommandResult(

@@ -47,15 +47,15 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         read_runs,
     )
 
-    found = read_runs(options.folder, warn)
+    runs = read_runs(options.folder, warn)
     if options.other is None:
-        output.result(format_runs(found))
-        return CommandResult({"runs": [one.to_dict() for one in found]})
-    told: list[dict[str, Any]] = []
-    for before, after in _pairs(found, read_runs(options.other, warn), options.other):
+        output.result(format_runs(runs))
+        return CommandResult({"runs": [run.to_dict() for run in runs]})
+    comparisons: list[dict[str, Any]] = []
+    for before, after in _pairs(runs, read_runs(options.other, warn), options.other):
         changes = compare_runs(before, after)
-        output.result(f"{chr(10) * bool(told)}{format_changes(before, after, changes)}")
-        told.append(
+        output.result(f"{chr(10) * bool(comparisons)}{format_changes(before, after, changes)}")
+        comparisons.append(
             {
                 "before": before.to_dict(),
                 "after": after.to_dict(),
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
                 "changes": [change.to_dict() for change in changes],
             }
         )
-    return CommandResult({"comparisons": told})
+    return CommandResult({"comparisons": comparisons})
 
 
 def _pairs(
@@ -72,17 +72,17 @@ def _pairs(
     """Runs of the same place; a single one of each, wherever they are."""
     if len(before) == len(after) == 1:
         return [(before[0], after[0])]
-    places = {(one.place, one.summary): one for one in after}
+    places = {(run.place, run.summary): run for run in after}
     pairs = [
-        (one, places[one.place, one.summary])
-        for one in before
-        if (one.place, one.summary) in places
+        (run, places[run.place, run.summary])
+        for run in before
+        if (run.place, run.summary) in places
     ]
     if not pairs:
         raise InputError(
             where=str(other),
-            found=f"results in {', '.join(one.place for one in after)}",
-            expected=f"results in one of {', '.join(one.place for one in before)}, as in the first",
+            found=f"results in {', '.join(run.place for run in after)}",
+            expected=f"results in one of {', '.join(run.place for run in before)}, as in the first",
             remedy="name the folders of two runs of the same command",
         )
     return pairs

@@ -142,8 +142,8 @@ def _run(
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
         write_page(system, summary, [case_figure(result) for result in done], len(cases), page)
-        told = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
-        output.result(told)
+        line = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        output.result(line)
     if window is not None and not interrupted:
         window.wait()
     if failure is not None:
@@ -194,11 +194,14 @@ def _models(simulation: Simulation) -> dict[str, Any]:
     from workbench.pages.provenance import models, software
     from workbench.system.system import OBSERVER
 
-    roles = dict.fromkeys([OBSERVER, *(kind.role for kind in simulation.kinds.values())])
+    roles = dict.fromkeys([OBSERVER, *(estimator.role for estimator in simulation.kinds.values())])
     named = models(simulation.system, [role for role in roles if role in simulation.system.models])
     return {
         **software(("fmpy", "numpy", "scipy", "numba")),
-        **{"fmu" if role == OBSERVER else f"{role}_fmu": one for role, one in named.items()},
+        **{
+            "fmu" if role == OBSERVER else f"{role}_fmu": identity
+            for role, identity in named.items()
+        },
     }
 
 
@@ -219,5 +222,5 @@ def _write(out: Path, result: CaseResult) -> None:
     from workbench.pages.figures import draw_case
 
     write_estimates(result, out / f"{result.case.name}.csv")
-    paths = [out / f"{result.case.name}.{kind}" for kind in ("png", "svg")]
+    paths = [out / f"{result.case.name}.{suffix}" for suffix in ("png", "svg")]
     draw_case(case_figure(result), paths)

@@ -19,11 +19,11 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """List the systems."""
     from workbench.system.tables import read_table
 
-    found = {}
+    systems = {}
     files = system_files()
     width = max(map(len, files))
     for name, path in files.items():
         title = read_table(path, "install the workbench again", 'title = "..."').take("title", str)
         output.result(f"{name:<{width}} {title}\n{'':<{width}} {nearby(path)}")
-        found[name] = {"title": title, "file": path}
-    return CommandResult({"systems": found})
+        systems[name] = {"title": title, "file": path}
+    return CommandResult({"systems": systems})

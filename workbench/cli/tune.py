@@ -158,12 +158,12 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.tuning import pose, tunable
 
     system = load_system(options.system)
-    kind = tunable(system, options.estimator)
+    estimator = tunable(system, options.estimator)
     cases = given_cases(options, system)
     _check(options, cases)
     system = system.with_names(model_names(options.map, system, cases))
     if options.fmu is not None:
-        system = with_model(system, kind.role, options.fmu)
+        system = with_model(system, estimator.role, options.fmu)
     out = options.out or Path("results/tune") / options.estimator
     errors = None
     if options.scale_error is not None:

@@ -19,14 +19,14 @@ _ROWS, _FITTED = 1000, 3
 
 def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[PublishedRecording]:
     """The record in cycles of the compressor."""
-    found = []
+    pieces = []
     for number, (a, b) in enumerate(pairwise((*_BEGINS, _ROWS)), start=1):
         columns = {
             "time [s]": time[a:b] - time[a],
             "COMP [1]": intake[a:b],
             "reservoir [bar]": pressure[a:b],
         }
-        found.append(
+        pieces.append(
             PublishedRecording(
                 name=f"cycle_{number}",
                 title=f"Cycle {number} of the compressor",
@@ -37,7 +37,7 @@ def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[Publ
                 held_out=number > _FITTED,
             )
         )
-    return found
+    return pieces
 
 
 def _read_csv(folder: Path) -> list[PublishedRecording]:

@@ -41,13 +41,13 @@ def _read_mat(folder: Path) -> list[PublishedRecording]:
 
 
 def _read_folders(folder: Path) -> list[PublishedRecording]:
-    found = []
+    recordings = []
     for name in _TITLES:
         file = f"{name}/measured.csv"
         columns = read_columns(folder / file, ("time", "pump", "level2"))
         pump, level = columns["pump"].values, columns["level2"].values
-        found.append(_recording(name, pump, level, 4.0, file))
-    return found
+        recordings.append(_recording(name, pump, level, 4.0, file))
+    return recordings
 
 
 PUBLISHED = PublishedSet(

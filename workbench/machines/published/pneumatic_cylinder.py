@@ -33,7 +33,7 @@ def layouts(
     recordings : of one file, by its name, its columns and its path.
     """
     theirs, columns_of = own
-    told, folder, names = folders
+    title_of_folders, folder, names = folders
 
     def layout(title: str, path: str, which: int, read: Callable[[Path], Columns]) -> FolderLayout:
         paths = {name: path.format(name) for name in files}
@@ -43,8 +43,8 @@ def layouts(
     by_name = partial(_columns, names)
     return (
         layout("the publisher's own files", theirs + "/{}.csv", 0, columns_of),
-        layout(told, folder + "/{}/measured.csv", 1, by_name),
-        layout(told, "{}/measured.csv", 1, by_name),
+        layout(title_of_folders, folder + "/{}/measured.csv", 1, by_name),
+        layout(title_of_folders, "{}/measured.csv", 1, by_name),
     )
 
 

@@ -83,7 +83,7 @@ def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecordi
     seal, pressure = name.removesuffix("bar").rsplit("_", 1)
     size = columns["time"].size
     time, stroke, p, force = (
-        columns[one][_DROPPED:] for one in ("time", "stroke", "pressure", "force")
+        columns[channel][_DROPPED:] for channel in ("time", "stroke", "pressure", "force")
     )
     recording = PublishedRecording(
         name,

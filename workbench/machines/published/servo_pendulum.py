@@ -135,7 +135,7 @@ def _recording(name: str, columns: Mapping[str, Vector], file: str) -> Published
 
 
 def _read_theirs(folder: Path) -> list[PublishedRecording]:
-    found = []
+    recordings = []
     for name, (file, _) in _THEIRS.items():
         path = f"{_FOLDER}/{file}"
         entries = json.loads((folder / path).read_text())["entries"]
@@ -144,19 +144,19 @@ def _read_theirs(folder: Path) -> list[PublishedRecording]:
             column: np.array([entry[theirs] for entry in entries], np.float64)
             for column, (theirs, _) in _COLUMNS.items()
         }
-        found.append(_recording(name, columns, path))
-    return found
+        recordings.append(_recording(name, columns, path))
+    return recordings
 
 
 def _read_folders(folder: Path) -> list[PublishedRecording]:
-    found = []
+    recordings = []
     for name in _OURS:
         file = f"{name}/measured.csv"
         read = read_columns(folder / file, ("time", *(ours for _, ours in _COLUMNS.values())))
         columns = {"time [s]": read["time"].values}
         columns |= {column: read[ours].values for column, (_, ours) in _COLUMNS.items()}
-        found.append(_recording(name, columns, file))
-    return found
+        recordings.append(_recording(name, columns, file))
+    return recordings
 
 
 PUBLISHED = PublishedSet(

@@ -122,13 +122,13 @@ def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
 
 def _faults(gains: Mapping[str, float]) -> Faults:
     """Faults by their names, `NAME[PLACE]` where there are several places."""
-    found: dict[str, Any] = {}
+    faults: dict[str, Any] = {}
     for name, gain in gains.items():
-        kind, _, place = name.partition("[")
+        fault, _, place = name.partition("[")
         if place:
-            nothing = getattr(Faults(), kind)
-            found[kind] = found.get(kind, np.zeros_like(nothing))
-            found[kind][int(place.removesuffix("]")) - 1] = gain
+            nothing = getattr(Faults(), fault)
+            faults[fault] = faults.get(fault, np.zeros_like(nothing))
+            faults[fault][int(place.removesuffix("]")) - 1] = gain
         else:
-            found[kind] = gain
-    return dataclasses.replace(Faults(), **found)
+            faults[fault] = gain
+    return dataclasses.replace(Faults(), **faults)

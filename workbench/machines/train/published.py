@@ -27,15 +27,15 @@ _CURVE = 0.6  # resistance over weight, times the radius [m]
 
 
 def _read(folder: Path) -> list[PublishedRecording]:
-    found = [_recording(path.parent) for path in sorted(folder.glob(f"*/{_CASE}"))]
-    if not found:
+    recordings = [_recording(path.parent) for path in sorted(folder.glob(f"*/{_CASE}"))]
+    if not recordings:
         raise InputError(
             where=str(folder),
             found="no folder with a case.toml",
             expected="a folder for each stop, with what the train's computer wrote",
             remedy="give the folder that holds them",
         )
-    return found
+    return recordings
 
 
 def _recording(folder: Path) -> PublishedRecording:
@@ -85,11 +85,11 @@ def _columns(
     file: Path, needed: Mapping[str, str], aids: Mapping[str, str] = _NONE
 ) -> dict[str, Vector]:
     """Columns of a file, by name, in these units; aids may be missing, in fields or wholly."""
-    found = read_columns(file, list(needed), list(aids), list(aids))
-    units = {name: unit for name, unit in {**needed, **aids}.items() if name in found}
+    columns = read_columns(file, list(needed), list(aids), list(aids))
+    units = {name: unit for name, unit in {**needed, **aids}.items() if name in columns}
     where = f"{file}, line 1, column"
     return {
-        name: found[name].values * si_factor(found[name].unit, unit, f"{where} '{name}'")
+        name: columns[name].values * si_factor(columns[name].unit, unit, f"{where} '{name}'")
         for name, unit in units.items()
     }
 
@@ -106,8 +106,8 @@ def _held(time: Vector, values: Vector, at: Vector) -> Vector:
     A line from or to a sample that is missing is missing.
     """
     new = np.flatnonzero(np.diff(np.floor(time / _STEP + 1e-6), prepend=-1.0) > 0.0)
-    found: Vector = np.interp(at, time[new], values[new], right=np.nan)
-    return found
+    held: Vector = np.interp(at, time[new], values[new], right=np.nan)
+    return held
 
 
 def _along(file: Path, position: Vector) -> tuple[Matrix, Matrix]:

@@ -83,7 +83,7 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
     InputError
         If there is none in a folder, or a truth is not understood.
     """
-    found: list[Path] = []
+    every: list[Path] = []
     for folder in folders:
         inner = [folder, *sorted(path for path in folder.glob("*") if path.is_dir())]
         sets = [path for path in inner if (path / _TRUTH).is_file()]
@@ -94,8 +94,8 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
                 expected="folders of stops, each with what is wrong in them",
                 remedy="name the folder that holds them",
             )
-        found += sets
-    rig = RecordedTrain(tuple(found))
+        every += sets
+    rig = RecordedTrain(tuple(every))
     _ = rig.groups  # a truth that is not understood is refused here
     return rig
 
@@ -104,7 +104,7 @@ def _planting(number: int, folder: Path) -> Planting:
     path, known = folder / _TRUTH, {plantable.name: plantable for plantable in PLANTABLE}
     try:
         effects = json.loads(read_text(path, "name another folder"))["effects"]
-        gains = dict(_gain(name, told) for name, told in effects.items())
+        gains = dict(_gain(name, fault) for name, fault in effects.items())
         planted = [known[name] for name in gains]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
@@ -114,13 +114,15 @@ def _planting(number: int, folder: Path) -> Planting:
             remedy="correct it, or leave the set out",
         ) from None
     kinds: tuple[Kind, ...] = ("clean", "single", "pair")
-    multiple = min((abs(gains[one.name]) / one.unit_size for one in planted), default=0.0)
-    kind, names = kinds[min(len(gains), 2)], tuple(one.effect for one in planted)
+    multiple = min(
+        (abs(gains[plantable.name]) / plantable.unit_size for plantable in planted), default=0.0
+    )
+    kind, names = kinds[min(len(gains), 2)], tuple(plantable.effect for plantable in planted)
     return Planting(kind, number, multiple, gains, names)
 
 
-def _gain(name: str, told: Mapping[str, float]) -> tuple[str, float]:
+def _gain(name: str, fault: Mapping[str, float]) -> tuple[str, float]:
     """Name of what can be planted, and its gain."""
     own, unit = _KNOWN[name]
-    place = f"[{int(told['at'])}]" if "at" in told else ""
-    return own + place, unit * float(told["size"])
+    place = f"[{int(fault['at'])}]" if "at" in fault else ""
+    return own + place, unit * float(fault["size"])

@@ -276,16 +276,16 @@ def _satellites(ridden: Ridden, time: Vector, seed: int, number: int, n: float) 
 
 def _filtered(values: Vector) -> Vector:
     """Behind a filter of first order at 5 Hz, (n,) every STEP."""
-    share, found = 1.0 - np.exp(-2.0 * np.pi * 5.0 * STEP), values.copy()
-    for k in range(1, found.size):
-        found[k] = found[k - 1] + share * (values[k] - found[k - 1])
-    return found
+    share, filtered = 1.0 - np.exp(-2.0 * np.pi * 5.0 * STEP), values.copy()
+    for k in range(1, filtered.size):
+        filtered[k] = filtered[k - 1] + share * (values[k] - filtered[k - 1])
+    return filtered
 
 
 def _table(columns: dict[str, Vector], form: str) -> str:
-    row = ",".join([form] * len(columns))
+    line = ",".join([form] * len(columns))
     rows = np.column_stack(list(columns.values())).tolist()
-    lines = ((row % tuple(one)).replace("nan", "") for one in rows)
+    lines = ((line % tuple(row)).replace("nan", "") for row in rows)
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 

@@ -46,7 +46,7 @@ class Held:
 
 def held(stop: "KnownStop", name: str) -> dict[str, Held]:
     """What bands of an estimator hold, where that is judged and claimed, by quantity."""
-    run, found = stop.runs[name], {}
+    run, bands = stop.runs[name], {}
     window = np.zeros(stop.case.time.size, bool)
     window[judged_window(stop.case, stop.system)] = True
     for quantity in COVERED:
@@ -59,8 +59,8 @@ def held(stop: "KnownStop", name: str) -> dict[str, Held]:
             errors = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[judged]
         if (reach > 0.0).any() and np.isfinite(errors + reach).all():
             shares = errors / reach
-            found[quantity] = Held(float(np.mean(shares < 1.0)), np.quantile(shares, _RANKS))
-    return found
+            bands[quantity] = Held(float(np.mean(shares < 1.0)), np.quantile(shares, _RANKS))
+    return bands
 
 
 def covered(
@@ -88,11 +88,11 @@ def needed(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> float |
 
 def needed_bands(stops: Sequence["StopAccuracy"]) -> dict[str, dict[str, float]]:
     """What bands must be multiplied by, by estimator and quantity that the stops have."""
-    found: dict[str, dict[str, float]] = {}
+    factors: dict[str, dict[str, float]] = {}
     for name in stops[0].estimators:
         known = {q: needed(stops, name, q) for q in COVERED if q != INNOVATIONS}
-        found[name] = {q: one for q, one in known.items() if one is not None}
-    return {name: one for name, one in found.items() if one}
+        factors[name] = {q: factor for q, factor in known.items() if factor is not None}
+    return {name: factor for name, factor in factors.items() if factor}
 
 
 def _of_stops(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> list[Held]:
@@ -441,7 +441,7 @@ def rail_error(stop: KnownStop, name: str) -> float | None:
 
 def worst(row: Row, stops: Sequence[StopAccuracy], estimator: str) -> Worst | None:
     """The worst value of an estimator over the stops that a row concerns; None if it has none."""
-    found: Worst | None = None
+    worst_stop: Worst | None = None
     for stop in stops:
         result = stop.estimators[estimator]
         if not row.concerns(stop):
@@ -449,6 +449,8 @@ def worst(row: Row, stops: Sequence[StopAccuracy], estimator: str) -> Worst | No
         if result.failure:
             return Worst(stop.name, math.nan)
         value = getattr(result, row.quantity)
-        if value is not None and (found is None or row.badness(value) > row.badness(found.value)):
-            found = Worst(stop.name, value)
-    return found
+        if value is not None and (
+            worst_stop is None or row.badness(value) > row.badness(worst_stop.value)
+        ):
+            worst_stop = Worst(stop.name, value)
+    return worst_stop

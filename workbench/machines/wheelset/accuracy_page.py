@@ -48,15 +48,15 @@ def write_accuracy_page(
 
 
 def _forces(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Dots:
-    rows, told = [], []
+    rows, words = [], []
     for k, (name, text) in enumerate(names.items()):
         errors = [stop.estimators[name].force for stop in stops]
         known = [100.0 * error for error in errors if error is not None and math.isfinite(error)]
         style = ESTIMATORS[k % len(ESTIMATORS)]
         rows.append((text, tuple(Dot(error, style) for error in known)))
         if known:
-            told.append(f"{text} up to {max(known):.2f} %")
-    finding = f"Worst stop: {'; '.join(told)}."
+            words.append(f"{text} up to {max(known):.2f} %")
+    finding = f"Worst stop: {'; '.join(words)}."
     return Dots(finding, "error of the force [%], logarithmic", tuple(rows), logarithmic=True)
 
 

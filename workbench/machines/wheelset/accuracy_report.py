@@ -69,9 +69,13 @@ def write_accuracy(
         },
         "worst": {
             name: {
-                row.text: {"quantity": row.quantity, "value": _finite(one.value), "stop": one.stop}
+                row.text: {
+                    "quantity": row.quantity,
+                    "value": _finite(worst_stop.value),
+                    "stop": worst_stop.stop,
+                }
                 for row in ROWS
-                if (one := worst(row, stops, name)) is not None
+                if (worst_stop := worst(row, stops, name)) is not None
             }
             for name in stops[0].estimators
         },
@@ -91,9 +95,9 @@ def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
     headline, force = {}, {}
     for name in stops[0].estimators:
         for row in ROWS:
-            if (one := worst(row, stops, name)) is not None:
+            if (worst_stop := worst(row, stops, name)) is not None:
                 unit, factor = _shown(row.quantity)
-                value = _finite(factor * row.badness(one.value))
+                value = _finite(factor * row.badness(worst_stop.value))
                 headline[f"{row.text}, {name}"] = Measure(value, unit, "lower")
         errors = [stop.estimators[name].force for stop in stops]
         if all(error is not None and math.isfinite(error) for error in errors):
@@ -178,7 +182,7 @@ def _covers(
     return "".join(f"  {texts[name]:>{max(_CELL, len(name))}}" for name in names)
 
 
-def cell(row: Row, found: Worst | None) -> str:
+def cell(row: Row, worst_stop: Worst | None) -> str:
     """A value as a text; empty if there is nothing to judge.
 
     >>> cell(ROWS[0], Worst("01", 0.00271)), cell(ROWS[4], Worst("09", 0.0729))
@@ -186,9 +190,9 @@ def cell(row: Row, found: Worst | None) -> str:
     >>> cell(ROWS[5], Worst("01", math.inf)), cell(ROWS[6], Worst("01", 0.02))
     ('never', 'none')
     """
-    if found is None:
+    if worst_stop is None:
         return ""
-    value = found.value
+    value = worst_stop.value
     if math.isnan(value):
         return "failed"
     if math.isinf(value):

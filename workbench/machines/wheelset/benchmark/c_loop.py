@@ -45,7 +45,7 @@ class CLoop:
         tail = [rR, rR / rW, system.fading.half]
         effect = gains.design["effect"]
         self._settings = np.concatenate([gains.values, effect, low, high, nominal, tail])
-        names = [*(one.name for one in system.inputs), *system.corrections, *system.reported]
+        names = [*(signal.name for signal in system.inputs), *system.corrections, *system.reported]
         self._references = fmu.variables(names).references.astype(np.intc)
         self._width = len(system.columns)
         self._run = _compile(fmu.path)

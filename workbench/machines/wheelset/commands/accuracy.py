@@ -77,10 +77,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     stops: list[StopAccuracy] = []
     begin = time.perf_counter()
     with locked_folder(options.out), ExitStack() as stack:
-        roles = dict.fromkeys(kind.role for kind in chosen.values())
+        roles = dict.fromkeys(estimator.role for estimator in chosen.values())
         models = {role: stack.enter_context(open_model(system, role)) for role in roles}
-        gains = {name: usual_gains(one, models[one.role], system) for name, one in chosen.items()}
-        ready = [kind(models[kind.role], system, gains[name]) for name, kind in chosen.items()]
+        gains = {
+            name: usual_gains(estimator, models[estimator.role], system)
+            for name, estimator in chosen.items()
+        }
+        ready = [
+            estimator(models[estimator.role], system, gains[name])
+            for name, estimator in chosen.items()
+        ]
         provenance = {
             "run": run_of("accuracy", system, sources(cases)),
             "workbench": version("wheelset-workbench"),
@@ -119,18 +125,18 @@ def _stops(options: argparse.Namespace, system: System) -> list[Case]:
 
     if len(options.cases) < 2:
         return given_cases(options, system)
-    found: dict[str, Case] = {}
+    stops: dict[str, Case] = {}
     for folder in options.cases:
         alone = argparse.Namespace(**{**vars(options), "cases": [folder]})
         before = "" if (folder / "case.toml").exists() else f"{folder.resolve().name}/"
         for case in given_cases(alone, system):
             name = before + case.name
-            if name in found:
+            if name in stops:
                 raise InputError(
                     where=str(case.source),
-                    found=f"a second stop '{name}' beside {found[name].source}",
+                    found=f"a second stop '{name}' beside {stops[name].source}",
                     expected="a different name for each stop, because results are kept by name",
                     remedy="rename one of the folders, or give it once",
                 )
-            found[name] = replace(case, name=name)
-    return list(found.values())
+            stops[name] = replace(case, name=name)
+    return list(stops.values())

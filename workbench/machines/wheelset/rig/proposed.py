@@ -66,7 +66,7 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     said, asked = experiment["conditions"], experiment["inputs"]["pB"]
     if system.experiments is None:
         raise ValueError
-    (varied,) = (one for one in system.experiments.varied if one.name == "pB")
+    (varied,) = (profile for profile in system.experiments.varied if profile.name == "pB")
     levels = tuple(map(float, asked["levels"]))
     profile = Profile(varied, str(asked["profile"]), levels, float(asked["every"]))
     demand = profile.demand(_DEMAND + varied.begins)

@@ -26,7 +26,7 @@ from workbench.system.units import si_factor
 _Row = tuple[tuple[str, ...], str, float, float]  # what is said, of which recording, and its range
 
 
-def confirmed(
+def confirm(
     files: Sequence[RecordedFile],
     system: System,
     stored: Mapping[str, NamedChannel],
@@ -46,29 +46,29 @@ def confirmed(
     InputError
         If they are not confirmed, or something is missing.
     """
-    found = propose_recordings(files, system, stored, known)
-    output.result(_shown(files, found, system))
+    proposed = propose_recordings(files, system, stored, known)
+    output.result(_shown(files, proposed, system))
     conditions = dict(known.conditions)
-    if found.certain:
-        return found, conditions
+    if proposed.certain:
+        return proposed, conditions
     if yes or output.json:  # a program is asked nothing
-        return _complete(files, found, found.doubts), conditions
+        return _complete(files, proposed, proposed.doubts), conditions
     columns = dict(known.columns)
-    for answer in _answers(files, found):
+    for answer in _answers(files, proposed):
         if answer.partition("=")[0].strip() in (TIME, *system.signals):
             signal, channel = parse_named(answer, "answer", system)
             columns[signal] = channel
         else:
             name, value = read_condition(answer, system)
             conditions[name] = value
-    found = propose_recordings(files, system, stored, replace(known, columns=columns))
-    return _complete(files, found, []), conditions
+    proposed = propose_recordings(files, system, stored, replace(known, columns=columns))
+    return _complete(files, proposed, []), conditions
 
 
-def _answers(files: Sequence[RecordedFile], found: ProposedRecordings) -> list[str]:
+def _answers(files: Sequence[RecordedFile], proposed: ProposedRecordings) -> list[str]:
     """What the user answers to a proposal: nothing, or corrections."""
-    taken = "name what is missing" if found.problems else "Enter takes this"
-    print(f"{taken}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
+    action = "name what is missing" if proposed.problems else "Enter takes this"
+    print(f"{action}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
     try:
         answer = input().strip()
     except EOFError:
@@ -85,7 +85,7 @@ def _answers(files: Sequence[RecordedFile], found: ProposedRecordings) -> list[s
 
 
 def _complete(
-    files: Sequence[RecordedFile], found: ProposedRecordings, doubts: Sequence[str]
+    files: Sequence[RecordedFile], proposed: ProposedRecordings, doubts: Sequence[str]
 ) -> ProposedRecordings:
     """The proposal, if all that is needed has a channel.
 
@@ -94,40 +94,40 @@ def _complete(
     InputError
         If something has none.
     """
-    if problems := [*found.problems, *doubts]:
+    if problems := [*proposed.problems, *doubts]:
         raise InputError(
             where=", ".join(str(file.path) for file in files),
             found="; ".join(problems),
             expected="a channel for each signal that the system needs",
             remedy="name it, --column 'SIGNAL=CHANNEL [unit]'"
-            + (f", of {listed(found.left)}" if found.left else ""),
+            + (f", of {listed(proposed.left)}" if proposed.left else ""),
         )
-    return found
+    return proposed
 
 
-def _shown(files: Sequence[RecordedFile], found: ProposedRecordings, system: System) -> str:
+def _shown(files: Sequence[RecordedFile], proposed: ProposedRecordings, system: System) -> str:
     """What files are and what their channels are taken for, a line each."""
     lines = [f"{file.path}: {file.kind}" for file in files]
-    if len(found.held) > 1:
-        names = listed([f"'{one.name}'" for one in found.held])
-        lines.append(f"  {len(found.held)} recordings, with the same channels: {names}")
-    lines += [*_clocks(found.held), *_channels(found.held, system)]
-    lines += [f"  ? {one}" for one in (*found.problems, *found.unmatched)]
-    lines += [f"  left out   {entry}" for entry in found.beside]
-    if found.left:
-        lines.append(f"  left out   {listed(found.left)}")
+    if len(proposed.held) > 1:
+        names = listed([f"'{recording.name}'" for recording in proposed.held])
+        lines.append(f"  {len(proposed.held)} recordings, with the same channels: {names}")
+    lines += [*_clocks(proposed.held), *_channels(proposed.held, system)]
+    lines += [f"  ? {problem}" for problem in (*proposed.problems, *proposed.unmatched)]
+    lines += [f"  left out   {entry}" for entry in proposed.beside]
+    if proposed.left:
+        lines.append(f"  left out   {listed(proposed.left)}")
     return "\n".join(lines)
 
 
 def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
     """Times of recordings; those that are alike are one line."""
     rows: list[_Row] = []
-    for one in held:
-        for clock in one.proposal.clocks.values():
+    for recording in held:
+        for clock in recording.proposal.clocks.values():
             times = clock.times[np.isfinite(clock.times)]
             channel = f"{clock.channel} [{clock.unit}]" if clock.channel else "-"
             every = f"{float(np.median(np.diff(times))):.4g} s"
-            rows.append(((channel, every, clock.reason), one.name, times.size, times.size))
+            rows.append(((channel, every, clock.reason), recording.name, times.size, times.size))
     for (channel, every, reason), low, high, where in _alike(rows, len(held)):
         counted = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
         steps = f"{counted} samples, every {every}"
@@ -139,14 +139,14 @@ def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str
     for signal in system.signals.values():
         scale = si_factor(signal.shown, signal.unit, signal.name)
         rows: list[_Row] = []
-        having = [one for one in held if signal.name in one.proposal.assigned]
-        for one in having:
-            taken = one.proposal.assigned[signal.name]
+        having = [recording for recording in held if signal.name in recording.proposal.assigned]
+        for recording in having:
+            taken = recording.proposal.assigned[signal.name]
             via = f" = {taken.formula}" if taken.formula else ""
             key = f"{taken.label} [{taken.unit}]{via}", taken.reason
             low = float(np.nanmin(taken.values)) / scale
             high = float(np.nanmax(taken.values)) / scale
-            rows.append((key, one.name, low, high))
+            rows.append((key, recording.name, low, high))
         for (channel, reason), low, high, where in _alike(rows, len(held)):
             yield (
                 f"  {signal.name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} "
