@@ -14,13 +14,14 @@ from scipy.stats import chi2, multivariate_normal
 
 from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis import build_everything, given_values, read_effects
+from workbench.diagnosis import Errors, build_everything, given_values, read_effects
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.laws.outcome import _falls
 from workbench.diagnosis.laws.periods import strongest_period
-from workbench.diagnosis.laws.places import LawInfluence, places
+from workbench.diagnosis.laws.places import LawInfluence, places, turning
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -373,6 +374,61 @@ def test_slots_tell_where_a_law_may_act(folder: Path) -> None:
     (outlet,) = places(library, base, read_slots(library, base))
     assert (outlet.name, outlet.output.unit) == ("OutletActual", "m3/s")
     assert [(one.name, one.unit) for one in outlet.inputs] == [("nominal", "m3/s"), ("h", "m")]
+
+
+def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path: Path) -> None:
+    """So that what turns once per turn of a shaft is looked for in the slot of any friction."""
+    (tmp_path / "package.mo").write_text(
+        """
+        package Drive "A shaft that turns"
+          type Speed = Real "m/s or rad/s";
+
+          partial model PartialFriction "Slot: what resists a motion"
+            input Speed v "Velocity or angular velocity";
+            input Speed other "Another one";
+            output Real f(unit="N.m") "Resistance";
+          end PartialFriction;
+
+          model Frictionless "Null version"
+            extends PartialFriction;
+          equation
+            f = 0.0;
+          end Frictionless;
+
+          model Motor "What drives"
+            Real w(unit="rad/s") "Speed";
+          end Motor;
+
+          model Observer "A shaft"
+            Motor motor "Drive";
+            replaceable Frictionless friction(v=motor.w, other=2*motor.w)
+              constrainedby PartialFriction(v=motor.w, other=2*motor.w) "Bearings";
+          equation
+            der(motor.w) = -friction.f;
+          end Observer;
+        end Drive;
+        """
+    )
+    library = read_library(tmp_path / "package.mo")
+    (bearings,) = places(library, "Drive.Observer", read_slots(library, "Drive.Observer"))
+    assert [(one.name, one.unit) for one in bearings.inputs] == [("v", "rad/s"), ("other", "")]
+    turns = [influence.factors for influence in turning(bearings)]
+    assert turns == [(), (bearings.inputs[0],)]
+
+
+@pytest.mark.parametrize(
+    ("rms", "falls"),
+    [
+        ([(10.0, 9.6), (1.0, 1.0)], False),  # a few percent are nobody's law
+        ([(10.0, 8.0), (1.0, 1.0)], True),
+        ([(10.0, 8.0), (1.0, 1.4)], False),  # what is better in one channel is worse in another
+    ],
+)
+def test_a_law_is_worth_a_tenth_of_an_error(rms: list[tuple[float, float]], falls: bool) -> None:
+    errors = [
+        Errors("new", f"channel {k}", "m", True, 100, pair, pair) for k, pair in enumerate(rms)
+    ]
+    assert _falls(errors) is falls
 
 
 @pytest.mark.long

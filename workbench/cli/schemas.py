@@ -668,7 +668,11 @@ def _diagnose() -> Schema:
         "gain": or_null(closed(gain)),
         "model": closed(model),
         "partial": listed(TEXT),
-        "late": or_null(closed({"signals": listed(TEXT), "skew": NUMBER, "sigma": NUMBER})),
+        "late": or_null(
+            closed(
+                {"signals": listed(TEXT), "skew": NUMBER, "sigma": NUMBER, "skews": by_name(NUMBER)}
+            )
+        ),
         "lasting_errors": by_name(BOTH),
         "dependences": listed(closed({"channel": TEXT, "influence": TEXT, **ends})),
         "confusability": closed({"effects": listed(TEXT), "cosines": matrix}),

@@ -314,8 +314,9 @@ class Outcome:
 
 def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
-    if not late.signals:
-        return "several signals are late by different times; say in [loggers] which share a logger"
+    if len({*late.skews.values()}) > 1:
+        each = ", ".join(f"{name} by {1e3 * skew:.3g} ms" for name, skew in late.skews.items())
+        return f"signals are late by different times ({each}); say in [loggers] which share one"
     reach = BAND * late.sigma
     size = with_interval(late.skew, late.skew - reach, late.skew + reach, "s")
     signals = " and ".join(late.signals)

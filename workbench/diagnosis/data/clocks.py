@@ -22,6 +22,7 @@ from workbench.system.system import OBSERVER, System
 KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
 # Of a sample time: a logger that scans five channels one after another has them as far apart.
 _MATTERS = 0.2
+LEAST_SKEW = 0.1  # of a sample time: within it, a clock is a matter of how inputs are held
 
 
 def catalogue(system: System, library: Library) -> tuple[Effect, ...]:

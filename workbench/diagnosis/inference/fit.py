@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.clocks import own_clocks, reference
+from workbench.diagnosis.data.clocks import LEAST_SKEW, own_clocks, reference
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -96,6 +96,11 @@ class Fit:
     def reference(self) -> str:
         """The signal against which clocks of others are late."""
         return reference(self._simulations.system)
+
+    @property
+    def least_skew(self) -> float:
+        """What the clock of a signal is late by at least to be late [s]."""
+        return LEAST_SKEW * self._simulations.system.sample_time
 
     @property
     def own_clocks(self) -> tuple[Effect, ...]:

@@ -4,7 +4,7 @@ What the system file says of loggers may be wrong, or not known. So clocks of al
 alone: where they leave clearly less than what was found, a name would be one of chance.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -18,17 +18,19 @@ from workbench.diagnosis.inference.search import FittedModel, beyond, fitted
 
 @dataclass(frozen=True)
 class LateSignals:
-    """Signals that are late together against all others, by themselves.
+    """Signals that are late against all others, by themselves.
 
     Attributes
     ----------
-    signals : none, where several are late by different times.
-    skew, sigma : by how much, and its standard deviation [s].
+    signals : those that are late together; or all that are late, by different times.
+    skew, sigma : by how much, and its standard deviation [s]; 0 where times differ.
+    skews : by how much each of them is late [s].
     """
 
     signals: tuple[str, ...]
     skew: float
     sigma: float
+    skews: Mapping[str, float]
 
 
 def by_themselves(
@@ -36,24 +38,31 @@ def by_themselves(
 ) -> LateSignals | None:
     """Signals whose clocks explain clearly more than what was found; None: no clocks do.
 
-    Several causes that explain no more than clocks are less likely than these.
+    Several causes that explain no more than clocks are less likely than these. Clocks that are late
+    by less than matters are none: as inputs go from sample to sample, as much is a matter of form.
 
     Parameters
     ----------
     base, best : the nominal model and the last one, with all derivatives.
     clean : whether the last one leaves nothing that lasts.
     """
-    clocks = fit.own_clocks
-    other = fit.beside(clocks)
+    clocks = list(fit.own_clocks)
+    other, least = fit.beside(clocks), fit.least_skew
     needed = fit.decides.needed if len(best.active) < 2 else 0.0
     if clean and len(best.active) < 2 and _fall(other, clocks, best) < needed:
         return None
-    sizes = {(clock.name, clock.size): 0.0 for clock in clocks}
-    one = fitted(other, other.at(replace(base.point, sizes=sizes)), tuple(clocks))
-    explains = float(one.linearised.variance_factors.max()) < fit.decides.wrong
-    if not explains or beyond(best, one) < needed:
-        return None
-    return _together(other, clocks, one)
+    while True:
+        if not clocks:
+            return None
+        sizes = {(clock.name, clock.size): 0.0 for clock in clocks}
+        model = fitted(other, other.at(replace(base.point, sizes=sizes)), tuple(clocks))
+        explains = float(model.linearised.variance_factors.max()) < fit.decides.wrong
+        if not explains or beyond(best, model) < needed:
+            return None
+        late = [clock for clock in clocks if abs(model.point.sizes[clock.name, clock.size]) > least]
+        if late == clocks:
+            return _together(other, clocks, model, least)
+        clocks = late
 
 
 def _fall(fit: Fit, clocks: Sequence[Effect], best: FittedModel) -> float:
@@ -65,28 +74,33 @@ def _fall(fit: Fit, clocks: Sequence[Effect], best: FittedModel) -> float:
     return known.at(minimum(known)) - total.at(minimum(total))
 
 
-def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel) -> LateSignals:
+def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel, least: float) -> LateSignals:
     """The fewest signals that, late together, explain as well as each by its own clock.
 
-    The clock of the one signal that has none is what the others are late against.
+    They do, too, where each is as late as all within the `least` time that matters [s]. The clock
+    of the one signal that has none is what the others are late against.
     """
     joint = fit.quadratics(fit.linearise(fitted.linearised, fitted.active))
     at = [joint.shared.index((clock.name, clock.size)) for clock in clocks]
     N = np.linalg.inv(covariance(joint.total().N)[np.ix_(at, at)])
     skews = np.array([fitted.point.sizes[clock.name, clock.size] for clock in clocks])
     names = [fit.reference, *(signal for clock in clocks for signal in clock.late)]
+    # The reference is late itself where all others are early.
+    able = range(0 if len(clocks) == len(fit.own_clocks) else 1, len(names))
     for count in range(1, len(names) // 2 + 1):
         tried = []
-        for chosen in combinations(range(len(names)), count):
+        for chosen in combinations(able, count):
             own = np.isin(range(len(names)), chosen).astype(float)
             along = own[1:] - own[0]
             information = float(along @ N @ along)
             skew = float(along @ N @ skews) / information
             left = skews - skew * along
-            tried.append((float(left @ N @ left), skew, information, chosen))
-        behind, skew, information, chosen = min(tried)
-        if behind < fit.decides.form:
-            return LateSignals(
-                tuple(names[j] for j in chosen), skew, float(1.0 / np.sqrt(information))
-            )
-    return LateSignals((), 0.0, 0.0)
+            away = float(np.abs(left).max())
+            tried.append((float(left @ N @ left), away, skew, information, chosen))
+        behind, away, skew, information, chosen = min(tried)
+        if behind < fit.decides.form or away < least:
+            signals = tuple(names[j] for j in chosen)
+            sigma = float(1.0 / np.sqrt(information))
+            return LateSignals(signals, skew, sigma, dict.fromkeys(signals, skew))
+    each = dict(zip(names[1:], map(float, skews), strict=True))
+    return LateSignals(tuple(each), 0.0, 0.0, each)

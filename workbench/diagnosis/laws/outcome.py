@@ -1,7 +1,7 @@
 """What was proposed, as a value: sentences, tables, a figure."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import ttest_rel
 
-from workbench.diagnosis import Cause, Outcome
+from workbench.arrays import Vector
+from workbench.diagnosis import Cause, Errors, Gain, Outcome
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.laws.forms import MARK, ClosedForm
 from workbench.diagnosis.laws.free import FittedLaw
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CHANCE = 0.05  # that held-out recordings fare better with a law that is none
+_WORTH = 0.1  # share of an error that a law removes at least
 _NONE = "No law is proposed"
 
 
@@ -55,15 +57,16 @@ class Proposal:
         )
 
     def _supported(self, outcome: Outcome) -> bool:
-        """Whether errors fall on what was held out, and, of what was explained, with less.
+        """Whether errors fall by what is worth a law, and, of what was explained, with less.
 
-        Without recordings that were never fitted, of what is held out in turn, by a paired t-test
-        of its mean squares.
+        On recordings that were never fitted those of a channel at least, and not those of all
+        together; without such, of what is held out in turn, by a paired t-test of its mean squares.
         """
         gain = outcome.diagnosis.gain
+        if gain is None or gain.after > (1.0 - _WORTH) * self._error_before(gain):
+            return False
         held_out = [error for error in outcome.errors if error.held_out]
-        before, after = (sum(one.samples * one.rms[i] ** 2 for one in held_out) for i in (0, 1))
-        if gain is None or (held_out and after >= before):
+        if held_out and not _falls(held_out):
             return False
         squares = np.square(list(gain.recordings.values()))
         chance = ttest_rel(squares[:, 0], squares[:, 1], alternative="greater").pvalue
@@ -74,6 +77,11 @@ class Proposal:
         return description_length(outcome.diagnosis.best) < description_length(
             self.before.diagnosis.best
         )
+
+    def _error_before(self, gain: Gain) -> float:
+        """Error on what is held out in turn without a law, but with the one cause it is beside."""
+        alone = self.before.diagnosis.gain
+        return alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
 
     @property
     def sentence(self) -> str:
@@ -95,14 +103,11 @@ class Proposal:
         ]
         beside = f", beside {' and '.join(known)}" * bool(known)
         part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
-        alone = self.before.diagnosis.gain
-        first_error = (
-            alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
-        )
+        errors = f"{self._error_before(gain):.1f} to {gain.after:.1f}"
         return (
             f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. On "
-            f"held-out recordings the error falls from {first_error:.1f} to {gain.after:.1f} times "
-            f"the noise. As a free function it is {where}."
+            f"held-out recordings the error falls from {errors} times the noise. As a "
+            f"free function it is {where}."
         )
 
     def said(self, cause: Cause) -> str:
@@ -207,6 +212,19 @@ class Proposal:
         from workbench.diagnosis.laws.report import functions_figure
 
         return functions_figure(self)
+
+
+def _falls(errors: Sequence[Errors]) -> bool:
+    """Whether errors fall, in units of what they were, and those of a channel by what is worth it.
+
+    Channels have units of their own.
+    """
+    squares: dict[str, Vector] = {}
+    for one in errors:
+        square = one.samples * np.square(one.rms)
+        squares[one.channel] = squares.get(one.channel, np.zeros(2)) + square
+    shares = np.array([after / before for before, after in squares.values() if before > 0.0])
+    return bool(shares.size and shares.min() <= (1.0 - _WORTH) ** 2 and shares.mean() < 1.0)
 
 
 def description_length(best: FittedModel) -> float:

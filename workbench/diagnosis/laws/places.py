@@ -1,7 +1,7 @@
 """Where a law may act, and what it may depend on: outputs of slots, and what is present there."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -265,11 +265,16 @@ def places(library: Library, base: str, slots: Sequence[Slot]) -> Iterator[Place
     for slot in slots:
         if slot.counts or not (slot.chained or slot.settled):
             continue
-        parts = library.components(slot.partial)
-        inputs = tuple(_quantity(library, parts[name]) for name in slot.inputs)
+        parts, bindings = library.components(slot.partial), model[slot.name].modifier.inner
+        inputs = []
+        for name in slot.inputs:
+            known = _quantity(library, parts[name])
+            if not known.unit and name in bindings:
+                known = replace(known, unit=_unit_of(library, model, bindings[name].value))
+            inputs.append(known)
         for output in slot.outputs:
             text = _lower(model[slot.name].description or slot.name)
-            yield Place(slot, text, _quantity(library, parts[output]), inputs)
+            yield Place(slot, text, _quantity(library, parts[output]), tuple(inputs))
 
 
 def _lower(text: str) -> str:
@@ -277,12 +282,30 @@ def _lower(text: str) -> str:
 
 
 def _quantity(library: Library, component: Component) -> Quantity:
+    text = _lower(component.description or component.name)
+    return Quantity(component.name, _known_unit(library, component), text)
+
+
+def _known_unit(library: Library, component: Component) -> str:
+    """Unit of a component; empty where the library does not say, as of a type of any speed."""
     unit = library.unit(component)
     try:
         check_unit(unit, component.where)
     except InputError:
-        unit = ""
-    return Quantity(component.name, unit, _lower(component.description or component.name))
+        return ""
+    return unit
+
+
+def _unit_of(library: Library, model: Mapping[str, Component], expression: str) -> str:
+    """Unit of what an input is bound to, `w` or `motor.w`; empty of any other expression."""
+    first, *path = expression.strip().split(".")
+    component = model.get(first)
+    for name in path:
+        if component is None:
+            break
+        of = library.resolve(component.type, component.owner)
+        component = library.components(of).get(name) if of in library.classes else None
+    return "" if component is None else _known_unit(library, component)
 
 
 def laws(
