@@ -113,7 +113,7 @@ def stop(time: Vector, signals: dict[str, Vector]) -> Case:
 
 def prepare(case: Case, fmu: FMU) -> Samples:
     signals = compared(SYSTEM, [case])
-    return prepare_samples(case, SYSTEM, signals, fmu.defaults, motion(fmu, SYSTEM))
+    return prepare_samples(case, SYSTEM, signals, OpenModel(fmu, motion(fmu, SYSTEM)))
 
 
 def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(

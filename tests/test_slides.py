@@ -11,7 +11,7 @@ pytest.importorskip("rumoca")
 
 from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, catalogue
-from workbench.diagnosis.data.motion import ModelSource, motion
+from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion
 from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
@@ -83,7 +83,7 @@ def sliding(noise: float) -> Case:
 def ready(case: Case, system: System = SYSTEM) -> Samples:
     with FMU(MINIMAL) as fmu:
         signals = compared(system, [case])
-        return prepare(case, system, signals, fmu.defaults, motion(fmu, system))
+        return prepare(case, system, signals, OpenModel(fmu, motion(fmu, system)))
 
 
 def slip_errors(samples: Samples, values: dict[str, float]) -> Vector:

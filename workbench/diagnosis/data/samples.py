@@ -14,10 +14,11 @@ from scipy.signal import lfilter, lfiltic
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, first_value, smooth
-from workbench.diagnosis.data.counting import count
+from workbench.diagnosis.data.counting import CountedSamples, count
 from workbench.diagnosis.data.motion import (
     Lead,
     Motion,
+    OpenModel,
     effects_on_led,
     led_by,
     noise_of,
@@ -200,8 +201,7 @@ def prepare(
     case: Case,
     system: System,
     signals: tuple[str, ...],
-    values: Mapping[str, float],
-    motion: Motion,
+    model: OpenModel,
     sound: Soundness = SOUND,
     *,
     restarting: bool = True,
@@ -211,8 +211,6 @@ def prepare(
     Parameters
     ----------
     signals : that are compared, see `compared`.
-    values : parameters of the model.
-    motion : of the model at its design point.
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
 
@@ -226,9 +224,9 @@ def prepare(
     counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     formed, told = channels(system, signals), channels(system, own)
-    slopes = np.array([one.formula.slopes(signals, values) for one in formed])
-    own_slopes = np.array([one.formula.slopes(own, values) for one in told])
-    gain, lead, ahead = _led(case, system, own, clean, deviation, counted.wrong, motion)
+    slopes = np.array([one.formula.slopes(signals, model.fmu.defaults) for one in formed])
+    own_slopes = np.array([one.formula.slopes(own, model.fmu.defaults) for one in told])
+    gain, lead, ahead = _led(case, system, own, counted, model.motion)
     silent = np.array([one not in told for one in formed])
     scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
     white = whitening(system, counted, own, own_slopes, ahead)
@@ -253,7 +251,7 @@ def prepare(
         lead=lead,
         restarts=restarts_of(system, counted),
         held=np.array([one.held for one in system.inputs]),
-        begin=_begin(system, first, motion),
+        begin=_begin(system, first, model.motion),
         rest=rest,
         rest_noise=rest_noise,
         blocks=blocks,
@@ -278,13 +276,11 @@ def _led(
     case: Case,
     system: System,
     signals: tuple[str, ...],
-    clean: Mapping[str, Vector],
-    deviation: Mapping[str, float],
-    wrong: Mapping[str, Mask],
+    counted: CountedSamples,
     motion: Motion,
 ) -> tuple[Vector, Lead | None, NDArray[np.float64]]:
     """Gain of the led output (n,), or how all lead; covariance of what they led, (n, c, c)."""
-    time = case.time
+    time, clean, deviation = case.time, counted.clean, counted.deviation
     h, steps = float(np.median(np.diff(time))), np.diff(time)
     leading = system.comparison.leading
     if leading is None:
@@ -299,7 +295,9 @@ def _led(
     # Noise of an input's sample acts until half way to its neighbours.
     acting = 0.5 * (np.append(steps, h) + np.append(h, steps))
     led = clean[leading.output]
-    walked, gain = random_walk(moved * acting, deviation[leading.output], wrong[leading.output])
+    walked, gain = random_walk(
+        moved * acting, deviation[leading.output], counted.wrong[leading.output]
+    )
     # What moves together is wrong together: its ratio is as sure as before.
     moves = [n in leading.together for n in signals]
     along = np.array([clean[n] @ led for n in signals]) / (led @ led) * moves

@@ -4,7 +4,7 @@ Source: A. J. Miller (2002), Subset Selection in Regression, 2nd ed., chapter 3 
 elimination, replacement).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -120,7 +120,11 @@ def select(
             )
             continue
         names, cosines = _confusability(trial, catalogue)
-        alike = {one: _alike(fit, one, best, less[one], steps, names, cosines) for one in less}
+        similar = {
+            effect: {names[j] for j in np.flatnonzero(row > 1.0 - fit.decides.twin)}
+            for effect, row in ((e, cosines[names.index(e.name)]) for e in less)
+        }
+        alike = {e: _alike(fit, e, best, less[e], steps, similar[e]) for e in less}
         replaced = [fit for fits in alike.values() for fit in fits.values()]
         better = min(replaced, key=lambda one: beyond(one, best), default=best)
         if interrupted or beyond(best, better) < fit.decides.needed:
@@ -137,7 +141,16 @@ def select(
         for one, fits in alike.items()
     }
     return Selection(
-        *(base, best, less, tuple(steps), trial, twins, names, cosines, interrupted, validation)
+        base=base,
+        best=best,
+        less=less,
+        steps=tuple(steps),
+        trial=trial,
+        twins=twins,
+        names=names,
+        cosines=cosines,
+        interrupted=interrupted,
+        validation=validation,
     )
 
 
@@ -168,8 +181,7 @@ def _alike(
     best: FittedModel,
     less: FittedModel,
     steps: Sequence[Step],
-    names: Sequence[str],
-    cosines: Matrix,
+    similar: Collection[str],
 ) -> dict[str, FittedModel]:
     """Fits of effects in place of one, beside the other causes, by name.
 
@@ -179,9 +191,9 @@ def _alike(
     Parameters
     ----------
     less : the best fit without the effect.
+    similar : names of effects with a like signature.
     """
-    row = dict(zip(names, cosines[names.index(effect.name)], strict=True))
-    alike = {name for name in names if row[name] > 1.0 - fit.decides.twin}
+    alike = set(similar)
     found: dict[str, FittedModel] = {}
     for step in steps:
         winner = step.rivals[0]

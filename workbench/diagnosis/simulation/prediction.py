@@ -15,10 +15,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.simulation.steps import Steps, step, steps
-from workbench.diagnosis.simulation.tangent import Tangent, advance, renew, share, tangent, tell
+from workbench.diagnosis.simulation.tangent import (
+    Tangent,
+    advance,
+    following,
+    renew,
+    share,
+    tangent,
+    tell,
+)
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.models.native import (
@@ -97,12 +105,50 @@ def _restart(model, led, error, states, errors):  # type: ignore[no-untyped-def]
             states[at, q] += errors[column, q]
 
 
+class _Run(NamedTuple):
+    """What a prediction runs along.
+
+    Attributes
+    ----------
+    time : (n,) [s] of the samples; u : (n, m) inputs; held : (m,) whether one is held.
+    y : (n, c) measured.
+    gain : (n,) of the correction by what leads alone.
+    anew : (n,) whether states are set as measured before a sample.
+    x0 : (s,) states at the start.
+    longest : of a step [s].
+    """
+
+    time: Vector
+    u: Matrix
+    held: NDArray[np.bool_]
+    y: Matrix
+    gain: Vector
+    led: _Led
+    anew: NDArray[np.bool_]
+    x0: Vector
+    longest: float
+
+
+class _State(NamedTuple):
+    """What a prediction leaves: errors (n, c), steps, and derivatives of errors and states."""
+
+    errors: Matrix
+    work: Steps
+    tangent: Tangent
+
+
 @compiled
-def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work, tangent):  # type: ignore[no-untyped-def]
-    """Fill `errors` (n, c), measured minus predicted, and their derivatives; returns a status."""
+def _predict(model, state, args):  # type: ignore[no-untyped-def]
+    """Fill state.errors (n, c) and their derivatives along `args`, a `_Run`; returns a status.
+
+    e_k = y_k - g(x_k, u_k), and x_k+1 = F(x_k + K_k e_k, u_k, u_k+1): F steps the model from one
+    sample to the next, K_k is the gain of what leads; where states restart, they are set to y_k.
+    """
+    time, u, held, y, led = args.time, args.u, args.held, args.y, args.led
+    errors, work, tangent = state.errors, state.work, state.tangent
     varied = tangent.states.shape[1] > 0
-    for i in range(x0.size):
-        model.x[i] = x0[i]
+    for i in range(args.x0.size):
+        model.x[i] = args.x0[i]
     for j in range(u.shape[1]):
         model.u[j] = u[0, j]
     if place(model):
@@ -113,13 +159,15 @@ def _predict(model, time, u, held, y, gain, led, anew, x0, longest, errors, work
     for k in range(time.size):
         if k > 0:
             before = k - 1 if varied else 0
-            if anew[k]:
+            if args.anew[k]:
                 _restart(model, led, errors[k - 1], tangent.states, tangent.errors[before])
-            _lead(model, led, gain[k - 1], errors[k - 1], tangent.states, tangent.errors[before])
+            _lead(
+                model, led, args.gain[k - 1], errors[k - 1], tangent.states, tangent.errors[before]
+            )
             if set_states(model):
                 return 1
             interval = time[k] - time[k - 1]
-            count = max(1, math.ceil(interval / longest - 1e-6))
+            count = max(1, math.ceil(interval / args.longest - 1e-6))
             for i in range(1, count + 1):
                 for j in range(u.shape[1]):
                     moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / count
@@ -249,22 +297,22 @@ class Predictor:
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         work = self._steps()
         varied = [column.variables for column in columns]
-        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, courses, absent)
-        status = _predict(
-            self._model,
-            samples.time[:end],
-            samples.u,
-            samples.held,
-            samples.y,
-            samples.gain,
-            self._led(samples),
-            np.zeros(end, np.bool_) if samples.restarts is None else samples.restarts.at[:end],
-            x0,
-            self._longest,
-            errors,
-            work,
-            along,
+        along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, absent)
+        if courses is not None:
+            along = following(along, courses)
+        restarts = samples.restarts
+        run = _Run(
+            time=samples.time[:end],
+            u=samples.u,
+            held=samples.held,
+            y=samples.y,
+            gain=samples.gain,
+            led=self._led(samples),
+            anew=np.zeros(end, np.bool_) if restarts is None else restarts.at[:end],
+            x0=x0,
+            longest=self._longest,
         )
+        status = _predict(self._model, _State(errors, work, along), run)
         raise_on_failure(status, fmu)
         if not np.isfinite(along.states).all():  # once lost, they stay so
             raise FMUError(f"{fmu.path.name}: derivatives of {samples.name} grow beyond all bounds")

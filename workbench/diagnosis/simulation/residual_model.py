@@ -72,9 +72,9 @@ class ResidualModel:
         self.given, self.cases = dict(source.given), list(cases)
         self._sound, self._workers = sound, min(engine.workers, len(cases))
         self._alone = self._workers == 1
-        self._at = list(range(len(cases)))  # of each recording, among all forms
-        self._without = list(self._at)
-        self._refused: dict[int, InputError] = {}
+        self._at = list(range(len(cases)))  # of each recording, which of the forms is in use
+        # Of each, where what is restarted does not count, or why there is none.
+        self._without: list[int | InputError] = []
         self._interrupted = threading.Event()
         with ExitStack() as stack:
             self._model = model or stack.enter_context(opened(source))
@@ -84,7 +84,7 @@ class ResidualModel:
             parts = settled_parts(self._simulator(coarse), self.nominal)
             self.simulated = coarse._replace(parts=parts)
             self._forms = self._weighed([*self.recordings, *self._lesser()])
-            every = self.simulated._replace(recordings=tuple(self._forms))
+            every = self.simulated._replace(recordings=tuple(form for form, _ in self._forms))
             self._pool = stack.enter_context(self._workers_with(every))
             self._open = stack.pop_all()
         self._choose()
@@ -131,35 +131,36 @@ class ResidualModel:
     def _ready(self, case: Case, *, restarting: bool) -> Samples:
         """A recording made ready."""
         signals = compared(self.system, self.cases)
-        given = (case, self.system, signals, self.nominal, self._model.motion, self._sound)
-        return prepare(*given, restarting=restarting)
+        return prepare(case, self.system, signals, self._model, self._sound, restarting=restarting)
 
     def _lesser(self) -> list[Samples]:
         """Recordings as they are where what is restarted does not count."""
-        found: list[Samples] = []
-        for k in (k for k, recording in enumerate(self.recordings) if recording.restarted.any()):
-            try:
-                found.append(self._ready(self.cases[k], restarting=False))
-                self._without[k] = len(self.cases) + len(found) - 1
-            except InputError as error:
-                self._refused[k] = error
-        return found
+        lesser: list[Samples] = []
+        for k, (case, recording) in enumerate(zip(self.cases, self.recordings, strict=True)):
+            form: int | InputError = k
+            if recording.restarted.any():
+                try:
+                    lesser.append(self._ready(case, restarting=False))
+                    form = len(self.cases) + len(lesser) - 1
+                except InputError as error:
+                    form = error
+            self._without.append(form)
+        return lesser
 
-    def _weighed(self, forms: Sequence[Samples]) -> list[Samples]:
-        """Forms of recordings, with what is uncertain in them weighed."""
-        owners = [*self._at, *(k for k, at in enumerate(self._without) if at != k)]
+    def _weighed(self, forms: Sequence[Samples]) -> list[tuple[Samples, dict[str, float]]]:
+        """Forms of recordings, with what is uncertain in them weighed, and states as they begin."""
+        lesser = [k for k, at in enumerate(self._without) if isinstance(at, int) and at != k]
         own = self._simulator(self.simulated._replace(recordings=tuple(forms)))
         weighed = []
-        for at, k in enumerate(owners):
+        for at, k in enumerate([*self._at, *lesser]):
             said = self.system.set_by(self.cases[k].conditions)
-            weighed.append(own.weighed(at, {**self.given, **said}))
-        self._begins = [own.begin(at) for at in range(len(forms))]
+            weighed.append((own.weighed(at, {**self.given, **said}), own.begin(at)))
         return weighed
 
     def _choose(self) -> None:
         """Take the forms of recordings that are asked for."""
-        self.recordings[:] = [self._forms[at] for at in self._at]
-        self.begin = [self._begins[at] for at in self._at]
+        self.recordings[:] = [self._forms[at][0] for at in self._at]
+        self.begin = [self._forms[at][1] for at in self._at]
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
 
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
@@ -170,11 +171,13 @@ class ResidualModel:
         InputError
             If a recording has too little else.
         """
-        for k in numbers if not counting else ():
-            if k in self._refused:
-                raise self._refused[k]
+        at = list(self._at)
         for k in numbers:
-            self._at[k] = k if counting else self._without[k]
+            form = k if counting else self._without[k]
+            if isinstance(form, InputError):
+                raise form
+            at[k] = form
+        self._at = at
         self._choose()
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[WhitenedResiduals]:

@@ -48,6 +48,11 @@ class Steps(NamedTuple):
     full : (n, n + 1) the same of all states, and Newton's correction.
     age : (1,) steps that the Jacobian has served.
     from_, to : (m,) inputs at the beginning and at the end of a step.
+    x, f : (n,) states where a step begins, and their rates.
+    moved : (n,) rates where the first stage would lead explicitly; Newton's correction.
+    k1, k2 : (n,) slopes of the two stages.
+    begin, known, scale : (n,) of a step that is solved for: where it begins, the last guess, sizes.
+    picked : (p,) solution of a system of the stiff states.
     """
 
     stiff: NDArray[np.intp]
@@ -81,12 +86,24 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
     n, p = len(fmu.states), stiff.size
     nominal = {v.name: v.nominal for v in fmu.description.variables}
     return Steps(
-        stiff,
-        np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
-        *(np.zeros((n, p)), np.zeros((p, 2 * p)), np.zeros(1), np.full(1, _KEPT)),
-        *(np.zeros((n, n + 1)), np.zeros(inputs), np.zeros(inputs)),
-        *(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)),
-        *(np.zeros(n), np.zeros(n), np.zeros(p)),
+        stiff=stiff,
+        nominal=np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
+        a=np.zeros((n, p)),
+        system=np.zeros((p, 2 * p)),
+        step=np.zeros(1),
+        age=np.full(1, _KEPT),
+        full=np.zeros((n, n + 1)),
+        from_=np.zeros(inputs),
+        to=np.zeros(inputs),
+        x=np.zeros(n),
+        f=np.zeros(n),
+        moved=np.zeros(n),
+        k1=np.zeros(n),
+        k2=np.zeros(n),
+        begin=np.zeros(n),
+        known=np.zeros(n),
+        scale=np.zeros(n),
+        picked=np.zeros(p),
     )
 
 
@@ -98,7 +115,10 @@ def restart(work):  # type: ignore[no-untyped-def]
 
 @inlined
 def _renew(model, work, h, anew):  # type: ignore[no-untyped-def]
-    """Make the matrix of a step of h [s], with the Jacobian here or the one that is kept."""
+    """Make work.system (p, 2 p), [I - gamma h A, its inverse] of the p stiff states; a status.
+
+    A = df/dx of the stiff states, (n, p), is that here or the one that is kept; h [s].
+    """
     n, p = model.x.size, work.stiff.size
     if anew:
         work.age[0] = 0

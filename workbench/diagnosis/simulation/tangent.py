@@ -39,6 +39,9 @@ class Tangent(NamedTuple):
     by_columns : (2, p, n + c) derivatives of the rates and the predicted outputs by the columns.
     entries, rows, by, slopes : (2,) and (2, n * (n + c)) those by the states that are not zero: how
         many, of what, by which.
+    first, second, moved, rates : (n, p) slopes of the two stages, states and rates between them.
+    system : (s, s + p) of the s stiff states and their right sides.
+    along : (n + c,) rates and outputs along one direction.
     """
 
     knowns: References
@@ -72,17 +75,15 @@ def tangent(
     columns: Sequence[Sequence[str]],
     samples: int,
     stiff: NDArray[np.intp],
-    courses: Matrix | None = None,
     absent: Sequence[str] = (),
 ) -> Tangent:
-    """Prepare derivatives for a run.
+    """Prepare derivatives for a run, by parameters that act alike all along; see `following`.
 
     Parameters
     ----------
     columns : variables of the FMU that each column varies together, of a state its start.
     samples : of the run.
     stiff : states that are stepped implicitly.
-    courses : (samples, p) of parameters that act by a factor that changes in time, if any does.
     absent : components of the FMU whose states nothing depends on.
     """
     within = tuple(f"{one}." for one in absent)
@@ -93,24 +94,35 @@ def tangent(
     names = [name for column in acting for name in column]
     begin = [[float(state in column) for column in columns] for state in fmu.states]
     return Tangent(
-        fmu.variables(names).references,
-        np.cumsum([0, *(len(column) for column in acting)]),
-        np.ones(len(names)),
-        np.zeros((0, p)) if courses is None else np.ascontiguousarray(courses),
-        np.ones(p) if courses is None else courses[0].copy(),
-        np.array([q > 0 and acting[q] == acting[q - 1] for q in range(p)], np.bool_),
-        *(np.array(used, np.intp), own, np.arange(n, n + c)),
-        np.reshape(begin, (n, p)),
-        np.zeros((samples if p else 1, c, p)),
-        np.zeros(1, np.intp),
-        np.zeros((2, p, n + c)),
-        np.zeros(2, np.intp),
-        *(np.zeros((2, n * (n + c)), np.intp), np.zeros((2, n * (n + c)), np.intp)),
-        np.zeros((2, n * (n + c))),
-        *(np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p)), np.zeros((n, p))),
-        np.zeros((own.size, own.size + p)),
-        np.zeros(n + c),
+        knowns=fmu.variables(names).references,
+        edges=np.cumsum([0, *(len(column) for column in acting)]),
+        seeds=np.ones(len(names)),
+        courses=np.zeros((0, p)),
+        shares=np.ones(p),
+        alike=np.array([q > 0 and acting[q] == acting[q - 1] for q in range(p)], np.bool_),
+        used=np.array(used, np.intp),
+        stiff=own,
+        told=np.arange(n, n + c),
+        states=np.reshape(begin, (n, p)),
+        errors=np.zeros((samples if p else 1, c, p)),
+        turn=np.zeros(1, np.intp),
+        by_columns=np.zeros((2, p, n + c)),
+        entries=np.zeros(2, np.intp),
+        rows=np.zeros((2, n * (n + c)), np.intp),
+        by=np.zeros((2, n * (n + c)), np.intp),
+        slopes=np.zeros((2, n * (n + c))),
+        first=np.zeros((n, p)),
+        second=np.zeros((n, p)),
+        moved=np.zeros((n, p)),
+        rates=np.zeros((n, p)),
+        system=np.zeros((own.size, own.size + p)),
+        along=np.zeros(n + c),
     )
+
+
+def following(tangent: Tangent, courses: Matrix) -> Tangent:
+    """The same by parameters that act by factors which change in time, (samples, p)."""
+    return tangent._replace(courses=np.ascontiguousarray(courses), shares=courses[0].copy())
 
 
 @inlined
