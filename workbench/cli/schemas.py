@@ -578,7 +578,8 @@ def _simulate() -> Schema:
         "additionalProperties": False,
     }
     texts = {"title": TEXT, "doubts": listed(TEXT), "reference": or_null(TEXT)}
-    case = closed({**texts, "estimators": by_name(score)})
+    numbers = {"contradicted": by_name(NUMBER)}
+    case = closed({**texts, **numbers, "estimators": by_name(score)})
     meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
     provenance = {
         **closed({"run": RUN, **VERSIONS, "fmu": FMU, "meanings": meanings}),

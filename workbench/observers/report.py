@@ -12,7 +12,7 @@ from markupsafe import Markup
 from scipy.stats import t
 
 from workbench.observers import label
-from workbench.observers.simulation import CaseResult
+from workbench.observers.simulation import CaseResult, narrow_bands
 from workbench.pages.answer import Answer, Measure, recordings, with_answer
 from workbench.pages.figures import CaseFigure
 from workbench.pages.measures import percentage
@@ -67,7 +67,9 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     objective = system.objective
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
-    lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})", header, "-" * len(header)]
+    lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})"]
+    lines += narrow_bands({result.case.name: result.contradicted for result in results})
+    lines += [header, "-" * len(header)]
     for result in results:
         cells = [_percent(result.scores[name].nrmse) for name in names]
         lines.append(f"{result.case.name:<{width}}" + "".join(f"{cell:>22}" for cell in cells))
@@ -184,20 +186,21 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
         for name, score in values["estimators"].items()
     }
     count = len(summary["cases"])
+    trust = "".join(f" {line.partition(' Either')[0]}" for line in _contradictions(summary))
     if best.worst is None:
         sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be judged."
-        return Answer(sentence, headline, details)
+        return Answer(sentence + trust, headline, details)
     share, signal = percent(best.worst), called(system, judged)
     first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
     if best.judged == 1:
         only = f"{best.case}, the only recording that was judged; one cannot say how others differ."
-        return Answer(f"{first} {only}", headline, details)
+        return Answer(f"{first} {only}{trust}", headline, details)
     sentence = f"{first} the worst of {recordings(best.judged)}, {best.case}"
     if None not in best.usual:
         middle, low, high = (percent(end or 0.0) for end in best.usual)
         ends = f"{low.removesuffix(' %')} to {high.removesuffix(' %')}"
         sentence += f", {middle} (95 %: {ends}) in a usual one"
-    return Answer(f"{sentence}.", headline, details)
+    return Answer(f"{sentence}.{trust}", headline, details)
 
 
 def write_page(
@@ -253,7 +256,8 @@ def write_page(
     page = Page(
         title=f"{capital(quantity)} estimated on {recordings(len(order))}",
         parts=parts,
-        warnings=[incomplete] * (missing > 0),
+        warnings=[incomplete] * (missing > 0)
+        + [Markup.escape(line) for line in _contradictions(summary)],
         run=_run(system, summary),
     )
     page.write(summary, path)
@@ -339,6 +343,10 @@ def _cases(
         ("case", "conditions", *errors, Numbers(root), _Z),
         rows,
     )
+
+
+def _contradictions(summary: Mapping[str, Any]) -> list[str]:
+    return narrow_bands({name: case["contradicted"] for name, case in summary["cases"].items()})
 
 
 def _doubts(system: System, summary: Mapping[str, Any], order: Sequence[str]) -> list[Text]:

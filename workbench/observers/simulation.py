@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import chi2
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 
 # A 95 % band of deviations that are too small by the root of this covers 93 %.
 OVERCONFIDENT = (1.960 / 1.812) ** 2
+
+
+_CHANCE = 1e-3  # of a recording whose innovations contradict bands that hold
 
 
 # [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
@@ -77,13 +81,42 @@ class CaseResult:
         return low_pass(self.case.time, error, bandwidth)
 
     def surprise(self, name: str) -> float:
-        """Variance of innovations over what a method says, where judged; 0 for one without."""
+        """Variance of innovations over what a method says, where judged; 0 for one without.
+
+        Of the whole recording where nothing is judged. The first sample has no innovation.
+        """
+        return self._tested(name)[0]
+
+    @property
+    def contradicted(self) -> dict[str, float]:
+        """Estimators whose innovations contradict their bands, and `surprise` of each.
+
+        The sum of normalised innovations squared is larger than chance makes it once in a thousand
+        recordings, and their mean so large that a 95 % band would cover less than 93 %.
+        Source: Y. Bar-Shalom, X.-R. Li, T. Kirubarajan, Estimation with Applications to Tracking
+        and Navigation, Wiley 2001, section 5.4.
+        """
+        tested = {name: self._tested(name) for name in self.runs}
+        return {
+            name: ratio
+            for name, (ratio, chance) in tested.items()
+            if ratio > OVERCONFIDENT and chance < _CHANCE
+        }
+
+    def _tested(self, name: str) -> tuple[float, float]:
+        """Mean of the NIS over that of chi-squared, and how likely chance makes it as large."""
         window, run = judged_window(self.case, self.system), self.runs[name]
-        nis = run.nis[window]
-        if not (nis.size and np.isfinite(nis).all()):
-            return 0.0
+        if window.stop == window.start:
+            window = slice(None)
+        known = np.isfinite(run.nis[window])
+        if run.ending is not Ending.OK or not known.any():
+            return 0.0, 1.0
+        nis = run.nis[window][known]
         fed = [signal in run.columns for signal in (*self.case.outputs, *self.case.aids)]
-        return float(nis.mean() / np.isfinite(self.case.y[window][:, fed]).sum(axis=1).mean())
+        counts = np.isfinite(self.case.y[window][:, fed]).sum(axis=1)[known]
+        if not counts.any():
+            return 0.0, 1.0
+        return float(nis.mean() / counts.mean()), float(chi2.sf(nis.sum(), counts.sum()))
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.
@@ -118,6 +151,7 @@ class CaseResult:
         return {
             "title": self.case.title,
             "doubts": list(self.case.doubts),
+            "contradicted": {name: round(ratio, 3) for name, ratio in self.contradicted.items()},
             "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
                 name: {
@@ -135,7 +169,9 @@ class CaseResult:
     def summary(self) -> str:
         """Scores by estimator, for people."""
         table = pd.DataFrame(self.to_dict()["estimators"]).T
-        return f"{self.case.name}: {self.case.title}\n{table.to_string(na_rep='n/a')}"
+        title = f"{self.case.name}: {self.case.title}"
+        lines = narrow_bands({self.case.name: self.contradicted})
+        return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":
         """Figure of all that was measured and estimated."""
@@ -194,6 +230,30 @@ class Simulation:
         if any(signal.name in case for signal in self.system.reference_signals) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoothed(case, self.system)
+
+
+def narrow_bands(contradicted: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """What is said of bands that innovations contradict: a sentence for each estimator.
+
+    Parameters
+    ----------
+    contradicted : by recording, see `CaseResult.contradicted`.
+    """
+    cases: dict[str, list[str]] = {}
+    for case, ratios in contradicted.items():
+        for name in ratios:
+            cases.setdefault(name, []).append(case)
+    lines = []
+    for name, where in cases.items():
+        worst = max(where, key=lambda case: contradicted[case][name])
+        count = f"{len(where)} of {len(contradicted)} recordings, worst in {worst}"
+        lines.append(
+            f"Bands of {name} are too narrow in {count if len(contradicted) > 1 else worst}: "
+            f"innovations have {contradicted[worst][name]:.1f} times the variance that it says. "
+            "Either the model lacks something, or noise and walks are larger than the system file "
+            "says, or samples are too far apart for the model's fastest time constant."
+        )
+    return lines
 
 
 def hidden(system: System) -> tuple[str, ...]:
@@ -449,8 +509,7 @@ def _finding(result: CaseResult) -> str:
     trust = "".join(
         f" The {label(name, system)} is overconfident: its innovations have {ratio:.1f} times the "
         "variance that it says."
-        for name in result.runs
-        if (ratio := result.surprise(name)) > OVERCONFIDENT
+        for name, ratio in result.contradicted.items()
     )
     return (
         f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "
