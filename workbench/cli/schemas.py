@@ -7,10 +7,12 @@ file has and its schema has not is a mistake in one of the two.
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
+from workbench.diagnosis.inference.residuals import Dependence
 from workbench.diagnosis.inference.sample_errors import Errors
+from workbench.diagnosis.inference.timing import LateSignals
 from workbench.observers import estimators_of
 from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
@@ -20,7 +22,7 @@ from workbench.studies.power import following, left_out
 from workbench.studies.power.planned import EffectChance
 from workbench.studies.power.sensitivity import VerdictChange
 from workbench.system.installed import installed_plugins
-from workbench.system.parts import FIRST, LARGEST, Condition
+from workbench.system.parts import FIRST, LARGEST, Condition, StepTracking
 from workbench.system.plugins import load
 from workbench.system.stopping import COMMAND, END, SPEED
 from workbench.system.system import System
@@ -101,15 +103,17 @@ def declared(kind: type, *, nullable: bool = False) -> Schema:
 def _typed(hint: Any) -> Schema:
     origin, inside = typing.get_origin(hint), typing.get_args(hint)
     if origin in (Union, types.UnionType):
-        kinds = [one for one in inside if one is not type(None)]
-        return or_null(_typed(kinds[0]))
+        return or_null(_typed(next(kind for kind in inside if kind is not type(None))))
     if origin is typing.Literal:
         return {"enum": list(inside)}
+    if origin in (Mapping, dict):
+        return by_name(_typed(inside[1]))
+    if origin in (Sequence, list) or (origin is tuple and inside[-1] is ...):
+        return listed(_typed(inside[0]))
     if origin is tuple:
-        one = listed(_typed(inside[0]))
-        return (
-            one if inside[-1] is ... else {**one, "minItems": len(inside), "maxItems": len(inside)}
-        )
+        return {**listed(_typed(inside[0])), "minItems": len(inside), "maxItems": len(inside)}
+    if dataclasses.is_dataclass(hint):
+        return declared(hint)
     return {str: TEXT, float: NUMBER, int: WHOLE, bool: FLAG}[hint]
 
 
@@ -617,7 +621,7 @@ def _tune() -> Schema:
         "label": TEXT,
         "judged": TEXT,
         "bandwidth": ERROR,
-        "follows": or_null(closed({"quantity": TEXT, "within": NUMBER, "left": NUMBER})),
+        "follows": or_null(declared(StepTracking)),
         "z": NUMBER,
         "z_reasoned": NUMBER,
         "cases": by_name(closed({"z_k": NUMBER, "z_k_reasoned": NUMBER, "unstable": WHOLE})),
@@ -669,13 +673,9 @@ def _diagnose() -> Schema:
         "gain": or_null(closed(gain)),
         "model": closed(model),
         "partial": listed(TEXT),
-        "late": or_null(
-            closed(
-                {"signals": listed(TEXT), "skew": NUMBER, "sigma": NUMBER, "skews": by_name(NUMBER)}
-            )
-        ),
+        "late": or_null(declared(LateSignals)),
         "lasting_errors": by_name(BOTH),
-        "dependences": listed(closed({"channel": TEXT, "influence": TEXT, **ends})),
+        "dependences": listed(declared(Dependence)),
         "confusability": closed({"effects": listed(TEXT), "cosines": matrix}),
         "candidates": listed(closed(candidate)),
         "steps": listed(closed(step)),

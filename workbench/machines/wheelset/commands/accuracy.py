@@ -54,11 +54,11 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Judge the estimators."""
     from workbench.machines.wheelset.accuracy import observe_stop, stop_accuracy
-    from workbench.machines.wheelset.accuracy_page import write_accuracy_page
     from workbench.machines.wheelset.accuracy_report import (
         format_accuracy,
         write_accuracies,
         write_accuracy,
+        write_accuracy_page,
     )
     from workbench.machines.wheelset.truth import read_truth
     from workbench.observers import choose, estimators_of

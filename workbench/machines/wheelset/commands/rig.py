@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
 import time
 from collections.abc import Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from workbench.cli.arguments import (
     Commands,
@@ -23,7 +24,7 @@ from workbench.cli.arguments import (
 )
 from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
-from workbench.runtime.files import locked_folder
+from workbench.runtime.files import locked_folder, write_whole
 from workbench.runtime.pool import Pool
 from workbench.system.plugins import find_plugin
 
@@ -163,8 +164,17 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _of_another(options: argparse.Namespace, output: Output, system: System) -> CommandResult:
-    """What another machine's plugin makes, which has nothing of this rig's own."""
-    from workbench.cli.planted import make_planted
+    """Make a set of recordings of another machine by its plugin, or list what can be made.
+
+    The injected effects stand in `truth.json` beside them, which nothing reads.
+
+    Raises
+    ------
+    InputError
+        If the system has no virtual rig, or that cannot do what is asked.
+    """
+    from workbench.studies.power.planting import assigned
+    from workbench.studies.power.virtual_rig import open_virtual_rig
 
     own = {"next": None, "pads": "ordinary", "rate": 200, "truth_every": 1}
     for name, usual in own.items():
@@ -175,7 +185,30 @@ def _of_another(options: argparse.Namespace, output: Output, system: System) -> 
                 expected=f"none of that of '{system.name}'",
                 remedy="leave it out",
             )
-    return make_planted(options, output, system)
+    rig = open_virtual_rig(system, options.case, options.reference)
+    known = {effect.name: effect for effect in rig.plantables}
+    if options.list:
+        recordings = "\n".join(f"  {name}" for name in rig.recordings)
+        effects = "\n".join(
+            f"  {f'{name} [{effect.unit}]':<28} {effect.effect}" for name, effect in known.items()
+        )
+        output.result(f"recordings:\n{recordings}\n\neffects, zero if not given:\n{effects}")
+        named = {name: effect.effect for name, effect in known.items()}
+        return CommandResult({"recordings": rig.recordings, "effects": named})
+    gains = assigned(options.effect, known)
+    rig.write(rig.simulate(options.seed, gains), gains, options.out)
+    truth: dict[str, Any] = {
+        "system": system.name,
+        "seed": options.seed,
+        "effects": [
+            {"name": n, "effect": known[n].effect, "size": size, "unit": known[n].unit}
+            for n, size in gains.items()
+        ],
+    }
+    write_whole(options.out / "truth.json", json.dumps(truth, indent=1) + "\n")
+    count = len(rig.recordings)
+    output.result(f"{count} recordings in {options.out}")
+    return CommandResult({"out": options.out, "cases": count, "of": count})
 
 
 def _recorded(
