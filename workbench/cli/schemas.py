@@ -112,7 +112,7 @@ def _typed(hint: Any) -> Schema:
         return listed(_typed(inside[0]))
     if origin is tuple:
         return {**listed(_typed(inside[0])), "minItems": len(inside), "maxItems": len(inside)}
-    if dataclasses.is_dataclass(hint):
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         return declared(hint)
     return {str: TEXT, float: NUMBER, int: WHOLE, bool: FLAG}[hint]
 
